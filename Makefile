@@ -1,0 +1,58 @@
+# A machine needs make and Python >= 3.11; every target does its own set-up into .venv first.
+PYTHON ?= python3
+VENV := .venv
+PY := $(VENV)/bin/python
+STAMP := $(VENV)/.installed
+PYTEST_WORKERS ?= 2
+
+# One thread per process: the work is spread over processes, and nested thread pools fight for the same cores.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+export MPLBACKEND ?= Agg
+
+.PHONY: help install demo test lint bench study clean
+
+help:
+	@echo "make demo     the main job on the data that ships; prints where the report lies"
+	@echo "make test     style, types, floors and tests"
+	@echo "make bench    the table of solver times"
+	@echo "make study    statistical studies, minutes to hours"
+	@echo "make install  the set-up alone, into $(VENV)"
+	@echo "make lint     style, types and floors alone"
+	@echo "make clean    remove caches and build products; keeps $(VENV), chains and reports"
+
+install: $(STAMP)
+
+# The build tools are installed first and pinned too, so that nothing unpinned is fetched behind the scenes.
+$(STAMP): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "bayesmembrane needs Python >= 3.11, and '$(PYTHON)' is $$($(PYTHON) --version 2>&1 || true);" \
+	       "name a newer one: make PYTHON=python3.12 $(MAKECMDGOALS)" >&2; exit 1; }
+	@test -x $(PY) || $(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
+	  echo "'$(PYTHON)' cannot make a virtual environment; install its venv module (Debian: apt install python3-venv)" >&2; exit 1; }
+	$(PY) -m pip install --quiet --disable-pip-version-check --constraint constraints.txt hatchling editables
+	$(PY) -m pip install --quiet --disable-pip-version-check --constraint constraints.txt \
+	  --no-build-isolation --editable '.[test]'
+	@touch $(STAMP)
+
+demo: $(STAMP)
+	$(VENV)/bin/bayesmembrane demo
+
+test: lint
+	$(PY) -m pytest -n $(PYTEST_WORKERS)
+
+lint: $(STAMP)
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy
+	$(VENV)/bin/lint-imports
+
+bench: $(STAMP)
+	$(PY) tests/benchmarks/bench.py
+
+study: $(STAMP)
+	$(PY) -m pytest -n $(PYTEST_WORKERS) -m study
+
+clean:
+	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find bayesmembrane tests -name __pycache__ -type d -prune -exec rm -rf {} +

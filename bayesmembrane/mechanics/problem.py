@@ -1,0 +1,71 @@
+"""The question put to a solver, checked once: films, deflections, geometry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bayesmembrane.errors import SettingsError
+from bayesmembrane.materials.base import Material
+from bayesmembrane.parameters import Array
+
+
+@dataclass(frozen=True)
+class Problem:
+    """B films at N deflections, all finite, in SI units.
+
+    Attributes
+    ----------
+    material : the strain energy
+    parameters : (B, n) membrane parameters
+    deflection : (B, N) m; a negative deflection gives the mirror image and the opposite force
+    prestretch : (B,) equibiaxial stretch l0 > 0 of the film when it was clamped
+    inner_radius, outer_radius : radii of the disc and of the ring, m
+    """
+
+    material: type[Material]
+    parameters: Array
+    deflection: Array
+    prestretch: Array
+    inner_radius: float
+    outer_radius: float
+
+    @property
+    def scaled(self) -> Array:
+        """(B, N) |deflection| over the stress-free inner radius R1/l0."""
+        return np.abs(self.deflection) * self.prestretch[:, None] / self.inner_radius
+
+    @property
+    def ratio(self) -> float:
+        """R2/R1."""
+        return self.outer_radius / self.inner_radius
+
+
+def problem(
+    material: type[Material],
+    parameters: ArrayLike,
+    deflection: ArrayLike,
+    inner_radius: float,
+    outer_radius: float,
+    prestretch: ArrayLike = 1.0,
+) -> Problem:
+    """Broadcast and check; raises `SettingsError` for shapes, radii or pre-stretches that make no sense."""
+    p = np.atleast_2d(np.asarray(parameters, dtype=float))
+    names = material.field_names()
+    if p.ndim != 2 or p.shape[1] != len(names):
+        raise SettingsError(f"{material.name} takes {len(names)} parameters ({', '.join(names)}), not {p.shape[-1]}")
+    d = np.asarray(deflection, dtype=float)
+    if not np.all(np.isfinite(d)):
+        raise SettingsError("a deflection is not a finite number", remedy="give deflections in metres")
+    l0 = np.broadcast_to(np.asarray(prestretch, dtype=float), (p.shape[0],))
+    if not np.all((l0 > 0) & np.isfinite(l0)):
+        raise SettingsError("the pre-stretch must be a positive number", remedy="1 means clamped without stretch")
+    if not 0 < inner_radius < outer_radius:
+        raise SettingsError(
+            f"the inner radius ({inner_radius * 1e3:g} mm) must be positive and smaller than the outer one "
+            f"({outer_radius * 1e3:g} mm)"
+        )
+    d = np.broadcast_to(np.atleast_1d(d) if d.ndim < 2 else d, (p.shape[0], d.shape[-1] if d.ndim else 1))
+    return Problem(material, p, d, l0, float(inner_radius), float(outer_radius))

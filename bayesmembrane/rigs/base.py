@@ -1,0 +1,53 @@
+"""What a test rig declares. One file per rig; the registry finds it by its name."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+from bayesmembrane.errors import DataError
+
+KINDS = ("annulus", "uniaxial", "equibiaxial", "planar", "biaxial")
+"""Every kind of rig that a specimen file may name; those without a file in this folder are not supported."""
+
+
+@dataclass(frozen=True)
+class Rig(ABC):
+    """The fixture that holds the film. A subclass is a frozen dataclass whose float fields are its lengths in m.
+
+    name, title : how a specimen file calls it (``rig.kind``) and how reports print it
+    columns : what its curve holds, column name without unit -> quantity (see `units`)
+    ``check`` : what its lengths must satisfy among themselves
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    columns: ClassVar[Mapping[str, str]]
+
+    def __post_init__(self) -> None:
+        """Raise `DataError` unless every length is finite and positive, and `check` agrees."""
+        for name, value in self.lengths.items():
+            if not (math.isfinite(value) and value > 0):
+                raise DataError(f"{name} must be a positive length, and {value:g} m is not", self.name)
+        self.check()
+
+    @abstractmethod
+    def check(self) -> None:
+        """Raise `DataError` if the lengths contradict each other."""
+
+    @abstractmethod
+    def size(self) -> float:
+        """The length in m that deflections and thicknesses are judged against: a film much larger is a wrong unit."""
+
+    @property
+    def lengths(self) -> dict[str, float]:
+        """The fields by name, in m."""
+        return {f.name: float(getattr(self, f.name)) for f in fields(self)}
+
+    @classmethod
+    def length_names(cls) -> tuple[str, ...]:
+        """The fields, which a specimen file gives with a unit: ``inner_radius_mm``."""
+        return tuple(f.name for f in fields(cls))
