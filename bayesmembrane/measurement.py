@@ -24,9 +24,10 @@ from bayesmembrane.tables import Table, parse_table, read_matrix, read_text
 from bayesmembrane.units import FORCE, LENGTH, TIME
 
 # What lies beyond these is a wrong unit, not a film.
-LARGEST_THICKNESS = 5e-3  # m
-LARGEST_RIG = 1.0  # m
+THICKNESSES = (1e-8, 5e-3)  # m
+RIGS = (1e-6, 1.0)  # m
 LARGEST_LIFT = 20.0  # largest deflection relative to the size of the rig
+LEAST_SD = 1e-12  # N
 
 T = TypeVar("T")
 
@@ -189,8 +190,10 @@ def check_covariance(covariance: Array, where: str | None = None) -> None:
         k = int(np.argmax(variance <= 0)) + 1
         raise DataError(f"entry {k} of the diagonal is a variance, and it is not positive", where)
     scale = np.sqrt(variance)
-    correlation = covariance / scale[:, None] / scale[None, :]
-    if np.max(np.abs(correlation - correlation.T)) > 1e-6:
+    with np.errstate(all="ignore"):
+        correlation = covariance / scale[:, None] / scale[None, :]
+        symmetric = np.max(np.abs(correlation - correlation.T)) <= 1e-6
+    if not symmetric:
         raise DataError("the covariance is not symmetric", where, "check how it was written")
     try:
         np.linalg.cholesky(0.5 * (correlation + correlation.T))
@@ -225,6 +228,9 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     provenance = Provenance(
         curve_csv.name, specimen_toml.name, covariance_file, "; ".join(o for o in origin if o), notes
     )
+    if sd is not None and np.min(sd) < LEAST_SD:
+        fault = f"a standard deviation of {np.min(sd):g} N looks like a wrong unit"
+        raise DataError(fault, options.where, "check the unit of the noise")
     return Measurement(deflection, force, rig, specimen, found.get("time"), sd, covariance, provenance)
 
 
@@ -290,7 +296,7 @@ def _rig(section: Section) -> Rig:
     lengths = [section.measure(name, LENGTH, f"{name}_mm") for name in cls.length_names()]
     section.finish()
     rig = _at(section.where, cls, *lengths)
-    if rig.size() > LARGEST_RIG:
+    if not RIGS[0] <= rig.size() <= RIGS[1]:
         raise DataError(f"a rig of {rig.size():g} m looks like a wrong unit", section.where, "check the units")
     return rig
 
@@ -300,7 +306,7 @@ def _specimen(section: Section, rig: Rig, default_name: str) -> Specimen:
     thickness = section.measure("thickness", LENGTH, "thickness_um")
     section.finish()
     specimen = _at(section.where, Specimen, name, thickness)
-    if specimen.thickness > LARGEST_THICKNESS:
+    if not THICKNESSES[0] <= specimen.thickness <= THICKNESSES[1]:
         fault = f"a film {1e3 * specimen.thickness:g} mm thick looks like a wrong unit"
         raise DataError(fault, section.where, "check the unit in the name of the key")
     return specimen
@@ -382,4 +388,4 @@ def _noise(options: Section, column: Array | None, n: int) -> tuple[Array | None
     if column is not None and not np.allclose(np.sqrt(np.diag(covariance)), column, rtol=0.02, atol=1e-9):
         fault = "the diagonal of the covariance is not the square of the column force_sd"
         raise DataError(fault, str(path), "it must be in N^2 and in the order of the curve")
-    return column, covariance, path.name
+    return np.sqrt(np.diag(covariance)), covariance, path.name

@@ -225,7 +225,8 @@ def _check_width(cells: tuple[str, ...], header: tuple[str, ...], where: str, de
         return
     counts = f"the line has {len(cells)} cells and the header {len(header)}"
     if decimal == "." and len(cells) == 2 * len(header) and all(c.lstrip("+-").isdecimal() for c in cells):
-        raise DataError(f"{counts}, as decimal commas would cause", where, f"write decimal points or {_IMPORT}")
+        fault = f"{counts}, as decimal commas would cause"
+        raise DataError(fault, where, f"write decimal points, or semicolons between the cells and {_IMPORT}")
     raise DataError(counts, where, "correct the line")
 
 

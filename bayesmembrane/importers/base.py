@@ -110,6 +110,8 @@ def _bytes(path: Path) -> bytes:
 
 
 def _importer(data: bytes, file: str) -> type[Importer]:
+    if not data.strip():
+        raise DataError("the file is empty", file, "export the measurement again")
     known: dict[str, type[Importer]] = components("importers")
     for importer in known.values():
         if importer.recognises(data):

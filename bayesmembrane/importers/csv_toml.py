@@ -37,9 +37,9 @@ class CsvToml(Importer):
     @staticmethod
     def read(data: bytes, file: str) -> Imported:
         text = decode(_text(data).encode(), file)
-        header = next(x for x in text.split("\n") if x.strip() and not x.lstrip().startswith("#"))
+        header = next((x for x in text.split("\n") if x.strip() and not x.lstrip().startswith("#")), "")
         delimiter = next((d for d in ";\t" if d in header), ",")
-        table = parse_table(text, file, delimiter, decimal=",")
+        table = parse_table(text, file, delimiter)
         decimal = _decimal(table)
         table = replace(table, header=tuple(_plain(h) for h in table.header), decimal=decimal)
         columns, notes = curve_columns(table, Annulus.columns)

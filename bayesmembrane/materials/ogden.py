@@ -41,7 +41,7 @@ class Ogden(Material):
         Parameter("ln_r2", "-", "ln(c2 a2 / (c1 a1)), stiffness of term 2 to term 1", Normal(-3.0, 2.5), (-25.0, 15.0)),
         Parameter("ln_r3", "-", "ln(c3 a3 / (c1 a1)), stiffness of term 3 to term 1", Normal(-3.0, 2.0), (-25.0, 15.0)),
         Parameter("ln_a1", "-", "logarithm of the lower positive exponent", Normal(np.log(1.5), 0.5), (-3.0, 2.5)),
-        Parameter("ln_a21", "-", "logarithm of a2 - a1", Normal(np.log(3.5), 1.0), (-5.0, 3.5)),
+        Parameter("ln_a21", "-", "logarithm of a2 - a1", Normal(np.log(3.5), 1.0), (-6.0, 5.0)),
         Parameter("ln_a3", "-", "logarithm of -a3", Normal(np.log(2.0), 0.6), (-4.0, 3.0)),
     )
 

@@ -31,8 +31,9 @@ Measure = Callable[[Any, Any, Any], Any]
 ROUND_OFF = 1e-12
 """A margin above -ROUND_OFF counts as zero: the Hessian itself is not known better."""
 
-_GRID = 161
-_CANDIDATES = 12
+_GRID = 129
+_CANDIDATES = 8
+_ROUNDS = 120
 
 
 @dataclass(frozen=True)
@@ -180,17 +181,26 @@ def _dips(value: Array, scale: Array) -> tuple[Any, Any]:
 def _zoom(
     material: Material, measure: Measure, l1: Array, l2: Array, step: float, ends: tuple[float, float]
 ) -> tuple[Array, Array, Array]:
-    """Least measure near each start (l1, l2), by ever smaller windows centred on the best point so far."""
-    offset = np.linspace(-1.5, 1.5, 13)
-    d1, d2 = (1.0 + o.ravel() * step for o in np.meshgrid(offset, offset))
+    """Least measure near each start (l1, l2), by windows that follow the best point and shrink where it rests.
+
+    A dip can be a narrow curved valley: a window that shrank at every step would stop before its lowest point.
+    """
+    offset = np.linspace(-1.0, 1.0, 9)
+    d1, d2 = (o.ravel() for o in np.meshgrid(offset, offset))
+    travels = np.maximum(np.abs(d1), np.abs(d2)) > 0.6
+    half = np.full((len(l1), 1), 1.5 * step)
     row = np.arange(len(l1))
     value, _ = _on_points(material, l1, l2, measure)
-    while step > 1e-9:
-        w1, w2 = np.clip(l1[:, None] * d1, *ends), np.clip(l2[:, None] * d2, *ends)
+    for _ in range(_ROUNDS):
+        w1 = np.clip(l1[:, None] * (1.0 + half * d1), *ends)
+        w2 = np.clip(l2[:, None] * (1.0 + half * d2), *ends)
         v, _ = _on_points(material, w1, w2, measure)
         best = np.argmin(v, axis=1)
+        moves = travels[best] & (v[row, best] < value)
         l1, l2, value = w1[row, best], w2[row, best], v[row, best]
-        d1, d2, step = 1.0 + SHRINK * (d1 - 1.0), 1.0 + SHRINK * (d2 - 1.0), SHRINK * step
+        half *= np.where(moves, 1.0, SHRINK)[:, None]
+        if np.all(half < 1e-9):
+            break
     return value, l1, l2
 
 

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     derivatives: Any = None
 
 NODES = 32
-ROUNDS = 24
 HALF = 4
 SHRINK = 0.5
-"""Windows shrink slowly, because a dip can be a narrow curved valley along which the search must still travel."""
+ROUNDS = 60
+RESOLUTION = 1e-8
 
 
 def k_least(l1: Any, low: Any, high: Any) -> Any:
@@ -84,20 +84,27 @@ def might_dip(grid: Any, i: Any, j: Any) -> Any:
 
 
 def zoomed(p: Any, l1: Any, l2: Any, step: Any, low: Any, high: Any) -> Any:
-    """Least eigenvalue near (l1, l2), by ever smaller windows; stops as soon as it is negative."""
+    """Least eigenvalue near (l1, l2); stops as soon as it is negative.
+
+    Windows follow the best point and shrink where it rests: a dip can be a narrow curved valley, and a window that
+    shrank at every step would stop before its lowest point.
+    """
     best = np.inf
     for _ in range(ROUNDS):
-        c1, c2 = l1, l2
+        c1, c2, far = l1, l2, 0
         for i in range(-HALF, HALF + 1):
             for j in range(-HALF, HALF + 1):
                 x = min(max(c1 * (1.0 + i * step / HALF), low), high)
                 y = min(max(c2 * (1.0 + j * step / HALF), low), high)
                 v = least_at(p, x, y)
                 if v < best:
-                    best, l1, l2 = v, x, y
+                    best, l1, l2, far = v, x, y, max(abs(i), abs(j))
         if best < 0.0:
             break
-        step *= SHRINK
+        if 2 * far <= HALF:
+            step *= SHRINK
+        if step < RESOLUTION:
+            break
     return best
 
 

@@ -69,3 +69,9 @@ def problem(
         )
     d = np.broadcast_to(np.atleast_1d(d) if d.ndim < 2 else d, (p.shape[0], d.shape[-1] if d.ndim else 1))
     return Problem(material, p, d, l0, float(inner_radius), float(outer_radius))
+
+
+def extensibility(problem: Problem) -> Array:
+    """(B,) the bound on I1 - 3 of each film, infinite unless its chains lock."""
+    bound = problem.material.extensibility(problem.parameters.T)
+    return np.broadcast_to(np.asarray(bound, dtype=float), problem.prestretch.shape)

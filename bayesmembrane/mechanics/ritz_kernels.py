@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 U, S, W, L1, P1, P2, P11, P12, P22, ENERGY = range(10)
 ROWS = 10
 # Rows per deflection in the array of results.
-FORCE, SLOPE, STORED, STATUS, VARIATION, STRETCH, ELLIPTIC, CONVEX, LEAST_P1, LEAST_P2, SLACK, COUNT = range(12)
+FORCE, SLOPE, STORED, STATUS, COUNT, GAIN, VARIATION, STRETCH, ELLIPTIC, CONVEX, LEAST_P11, LEAST_P1, LEAST_P2, SLACK = range(14)
+RESULTS = 14
 
 
 def states(q, d, l0, p, points, phi, both, slope, beta, first, last, x):  # type: ignore[no-untyped-def]
@@ -203,11 +204,11 @@ def examine(x, points, inner, growth, gd, out, o):  # type: ignore[no-untyped-de
     """Diagnostics of a converged state, into rows o + VARIATION .. o + SLACK of ``out``.
 
     rms variation of R P1 sin(theta) over its mean; largest stretch; least of P11, P22 and least eigenvalue of the
-    Hessian of W, both over G d; least P1; least P2; least of max(P1, P2), not positive where the film is slack.
+    Hessian of W, both over G d; least P11, P1, P2; least of max(P1, P2), not positive where the film is slack.
     """
     zero, top = splat(0.0), splat(np.inf)
     total, stretch = zero, zero
-    ellipse, convex, low1, low2, slack = top, top, top, top, top
+    ellipse, convex, low11, low1, low2, slack = top, top, top, top, top, top
     for g in range(points):
         r = ROWS * g
         l1, p1, p2 = load(x, r + L1), load(x, r + P1), load(x, r + P2)
@@ -218,7 +219,7 @@ def examine(x, points, inner, growth, gd, out, o):  # type: ignore[no-untyped-de
         stretch = greatest(greatest(l1, load(x, r + S)), stretch)
         ellipse = least(least(p11, p22), ellipse)
         convex = least(0.5 * (p11 + p22) - np.sqrt(half * half + p12 * p12), convex)
-        low1, low2, slack = least(p1, low1), least(p2, low2), least(greatest(p1, p2), slack)
+        low11, low1, low2, slack = least(p11, low11), least(p1, low1), least(p2, low2), least(greatest(p1, p2), slack)
     mean, square = total / inner, zero
     for g in range(inner):
         r = ROWS * g
@@ -228,9 +229,34 @@ def examine(x, points, inner, growth, gd, out, o):  # type: ignore[no-untyped-de
     store(out, o + STRETCH, stretch)
     store(out, o + ELLIPTIC, ellipse / gd)
     store(out, o + CONVEX, convex / gd)
+    store(out, o + LEAST_P11, low11)
     store(out, o + LEAST_P1, low1)
     store(out, o + LEAST_P2, low2)
     store(out, o + SLACK, slack)
+
+
+def energy_gain(x, weight, extra, elements, out, o):  # type: ignore[no-untyped-def]
+    """How much energy the next two bubbles of every element would release, sum of g^2 / (2 K_ii), into row o + GAIN.
+
+    extra (3, 2, points per element, elements) : phi + phi', phi and slope of these bubbles, as in the tables.
+    """
+    gain, zero = splat(0.0), splat(0.0)
+    size = extra.shape[2]
+    for e in range(elements):
+        for i in range(2):
+            ga, gb, ka, kb = zero, zero, zero, zero
+            for j in range(size):
+                g = e * size + j
+                a, f, b, om, r = extra[0, i, j, e], extra[1, i, j, e], extra[2, i, j, e], weight[g], ROWS * g
+                p1, p11, inverse = load(x, r + P1), load(x, r + P11), 1.0 / load(x, r + L1)
+                co, si, geo = load(x, r + U) * inverse, load(x, r + W) * inverse, p1 * inverse
+                ga = ga + om * (p1 * co * a + load(x, r + P2) * f)
+                gb = gb + om * p1 * si * b
+                cross = load(x, r + P12) * co
+                ka = ka + om * ((p11 * co * co + geo * si * si) * a * a + (2.0 * cross * a + load(x, r + P22) * f) * f)
+                kb = kb + om * (p11 * si * si + geo * co * co) * b * b
+            gain = gain + 0.5 * (ga * ga / abs(ka) + gb * gb / abs(kb))
+    store(out, o + GAIN, gain)
 
 
 def force_sensitivity(x, p, z, inner, phi, both, slope, beta, weight, first, last, out, o):  # type: ignore[no-untyped-def]
@@ -251,7 +277,7 @@ def force_sensitivity(x, p, z, inner, phi, both, slope, beta, weight, first, las
             store(out, o + m, load(out, o + m) + weight[g] * (rows[m][1] * along - rows[m][2] * across))
 
 
-def decide(j, iteration, most_trust, d, lane, sums, dots, pivot, status, result):  # type: ignore[no-untyped-def]
+def decide(j, iteration, most_trust, d, lane, sums, dots, pivot, result):  # type: ignore[no-untyped-def]
     """Per lane: accept the trial state, halve the step, restart or finish. Scalar code, a few operations per lane.
 
     lane (8, LANES), kept between iterations: accept, halve, restart, finish (masks), alpha, base energy, fall, state
@@ -297,13 +323,13 @@ def follow(p_rows, gd_row, l0_row, grid, q, tables, most, tolerance, with_sens, 
     tables : see `ritz.basis`
     most, tolerance : largest number of iterations; Newton decrement, over d I_d, at which a state has converged
     keep (M,) : False where a deflection only serves the continuation and is not examined
-    result (12 M, LANES) : the rows named FORCE .. COUNT above for each deflection, in scaled units
+    result (RESULTS M, LANES) : the rows named FORCE .. SLACK above for each deflection, in scaled units
     sens (n_fields M, LANES) : dF/dp if with_sens
     trace (2n M, LANES) or (0, LANES) : the unknowns at every deflection
 
     A lane that loses the path keeps status 5 from there on.
     """
-    phi, both, slope, beta, growth, weight, first, last, start, stop, low, width = tables
+    phi, both, slope, beta, growth, weight, first, last, start, stop, low, width, extra = tables
     n, points, inner = phi.shape[0], phi.shape[1], weight.shape[0]
     m = 2 * n
     p, gd, l0 = load_all(p_rows, FIELDS), load(gd_row, 0), load(l0_row, 0)
@@ -332,9 +358,9 @@ def follow(p_rows, gd_row, l0_row, grid, q, tables, most, tolerance, with_sens, 
         for i in range(m):
             store(old, i, load(q, i))
             store(dold, i, load(dq, i))
-        for r in range(12):
-            store(result, 12 * j + r, np.nan)
-        store(result, 12 * j + STATUS, 5.0)
+        for r in range(RESULTS):
+            store(result, RESULTS * j + r, np.nan)
+        store(result, RESULTS * j + STATUS, 5.0)
         for k in range(LANES):
             lane[7, k] = 3.0 if lane[7, k] == 3.0 else 0.0
         for iteration in range(most):
@@ -354,7 +380,7 @@ def follow(p_rows, gd_row, l0_row, grid, q, tables, most, tolerance, with_sens, 
             store(dots, 0, gy)
             store(dots, 1, gz)
             store(dots, 2, kz)
-            over = decide(j, iteration, tolerance, grid[j], lane, sums, dots, pivot[0], 0, result[12 * j : 12 * j + 12])
+            over = decide(j, iteration, tolerance, grid[j], lane, sums, dots, pivot[0], result[RESULTS * j : RESULTS * (j + 1)])
             if over == LANES:
                 break
             accept, halve, restart, finish, alpha = (
@@ -380,9 +406,13 @@ def follow(p_rows, gd_row, l0_row, grid, q, tables, most, tolerance, with_sens, 
                 zi = load(z, i)
                 store(tangent, i, where(finish, zi, load(tangent, i)))
                 store(dq, i, where(finish, -zi, load(dq, i)))
+        for k in range(LANES):
+            if lane[7, k] != 2.0:
+                lane[7, k] = 3.0
         if keep[j]:
             states(q, d, l0, p, points, phi, both, slope, beta, first, last, x)
-            examine(x, points, inner, growth, gd, result, 12 * j)
+            examine(x, points, inner, growth, gd, result, RESULTS * j)
+            energy_gain(x, weight, extra, extra.shape[3], result, RESULTS * j)
             if with_sens:
                 force_sensitivity(
                     x, p, tangent, inner, phi, both, slope, beta, weight, first, last, sens, len(FIELDS) * j

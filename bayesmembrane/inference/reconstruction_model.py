@@ -1,0 +1,311 @@
+"""The posterior of a measured curve given distances to simulated ones: tabulated simulations, prior, residuals.
+
+    L_kr = | y_r - F_k(x_r) (1 + error_k) | + error_kr,   y = F_0(x) exp(u(x)) + nugget,   x_r evenly spaced
+
+k counts the rows of the published table, r its ranges; F_0 is the simulated curve of the first row. The logarithm u of
+the measured over that reference is one smooth curve for all ranges: a straight line plus an integrated Wiener process
+in the deflection, in its Karhunen-Loève form. Everything unknown is one vector of numbers with independent standard
+normal priors (logistic for the first positions): what follows is a nonlinear least-squares problem with heavy tails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.special import expit, gammaln
+
+from bayesmembrane.errors import DataError
+from bayesmembrane.inference.reconstruction_table import PublishedTable
+from bayesmembrane.parameters import Array
+
+Simulate = Callable[[str, Sequence[float], Array], Array]
+"""(material, parameters, deflection (N,) in m) -> force (N,) in N, nan where there is none."""
+
+STEP = 0.25e-3  # m between the tabulated forces
+NEAREST = 0.05e-3  # m: closer to zero no force can be told from none
+MODES = 20  # of the integrated Wiener process: the next one moves the curve by less than 1e-3 of the first
+LINE = (1.0, 0.3)  # prior standard deviations of u: level, and slope per 10 mm
+LENGTH = 0.010  # m, unit of deflection in the integrated Wiener process
+TAIL = 3.0  # degrees of freedom of the Student t that a loss follows
+SAME = 1e-6  # curves whose ratio is constant to this are one curve up to a factor
+
+
+class Knobs(NamedTuple):
+    """Scales that the unknowns are measured in; arrays of shape (B,) or scalars, ``solver`` with one more axis.
+
+    Attributes
+    ----------
+    roughness : standard deviation of the integrated Wiener process after 10 mm, times sqrt(3)
+    nugget : load-cell noise of a single measured force, N
+    solver : (..., n_ranges) error of a simulated force relative to the typical largest one of the range
+    rounding : what is left of that error between rows whose simulations are one curve up to a factor
+    """
+
+    roughness: float | Array
+    nugget: float | Array
+    solver: Array
+    rounding: float | Array
+
+    def take(self, index: NDArray[np.intp]) -> Knobs:
+        """The settings at ``index``."""
+        return Knobs(*(np.asarray(v)[index] for v in self))
+
+
+@dataclass(frozen=True)
+class Simulations:
+    """The simulated curves of all rows as splines: ln F_0 in ln x, ln(F_k / F_0) in x.
+
+    Attributes
+    ----------
+    usable : (K,) False where the forward model has no curve for a row
+    family : (K,) number of the family of curves that are equal up to a factor, -1 for a curve of its own
+    ends : (R,) m, last deflection of each range
+    typical : (R,) N, median force at the ends
+    """
+
+    reference: CubicSpline
+    ratios: CubicSpline
+    usable: NDArray[np.bool_]
+    family: NDArray[np.intp]
+    ends: Array
+    typical: Array
+
+    def forces(self, x: Array) -> tuple[Array, Array, Array]:
+        """F (..., K), dF/dx (..., K) and F_0 (...) at deflections x (...) in m; below 0.05 mm as at 0.05 mm."""
+        x = np.maximum(x, NEAREST)
+        log_x = np.log(x)
+        reference = np.exp(self.reference(log_x))
+        slope = self.reference(log_x, 1) / x
+        force = reference[..., None] * np.exp(self.ratios(x))
+        return force, force * (slope[..., None] + self.ratios(x, 1)), reference
+
+
+def tabulate(table: PublishedTable, simulate: Simulate) -> Simulations:
+    """Simulate every row once on a fine grid up to the largest end; raises `DataError` if the first row has no curve."""
+    top = max(table.ends)
+    x = np.concatenate([[NEAREST, 0.1e-3, 0.15e-3, 0.2e-3], np.arange(STEP, top, STEP), [top]])
+    force = np.array([simulate(row.material, row.values, x) for row in table.rows])
+    usable = np.all(np.isfinite(force) & (force > 0), axis=1)
+    if not usable[0]:
+        raise DataError(
+            "the forward model gives no force over the whole range", table.rows[0].label, "put another row first"
+        )
+    logs = np.log(np.where(usable[:, None], force, force[0]))
+    ratios = logs - logs[0]
+    ends = np.array(table.ends)
+    at_ends = np.array([np.interp(ends, x, f) for f in force[usable]])
+    return Simulations(
+        CubicSpline(np.log(x), logs[0]),
+        CubicSpline(x, ratios.T),
+        usable,
+        _families(ratios, usable),
+        ends,
+        np.median(at_ends, axis=0),
+    )
+
+
+def _families(ratios: Array, usable: NDArray[np.bool_]) -> NDArray[np.intp]:
+    family = np.full(usable.size, -1, dtype=np.intp)
+    count = 0
+    for k in np.flatnonzero(usable):
+        alike = usable & (np.ptp(ratios - ratios[k], axis=1) < SAME) & (family < 0)
+        if np.count_nonzero(alike) > 1:
+            family[alike] = count
+            count += 1
+    return family
+
+
+@cache
+def wiener_basis(top: float) -> CubicSpline:
+    """Functions of u on [0, top] (m): level, slope, and the first `MODES` of the integrated Wiener process.
+
+    k(a, b) = a^2 (3 b - a) / 6 for a <= b, in units of 10 mm; each mode has the size it has for roughness 1.
+    """
+    x = np.linspace(0.0, top, 1201)
+    s = x / LENGTH
+    low, high = np.minimum(s[:, None], s), np.maximum(s[:, None], s)
+    sizes, modes = np.linalg.eigh(low**2 * (3 * high - low) / 6)
+    modes = modes[:, ::-1][:, :MODES] * np.sqrt(sizes[::-1][:MODES])
+    modes = modes * np.sign(modes[-1])
+    return CubicSpline(x, np.column_stack([np.full(x.size, LINE[0]), LINE[1] * s, modes]))
+
+
+class State(NamedTuple):
+    """What B vectors of unknowns mean.
+
+    Attributes
+    ----------
+    x, force, smooth, slope : (B, N) deflections in m; measured force; its smooth part; its slope in N/m
+    first : (B, R) first positions, m
+    residual : (B, R K) model minus printed loss, N
+    jacobian : (B, R K, P) its derivatives
+    force_jacobian : (B, N, P) derivatives of the measured forces
+    """
+
+    x: Array
+    force: Array
+    smooth: Array
+    slope: Array
+    first: Array
+    residual: Array
+    jacobian: Array
+    force_jacobian: Array
+
+
+@dataclass(frozen=True)
+class Model:
+    """The posterior at given numbers of points.
+
+    Attributes
+    ----------
+    simulations : the simulated curves
+    losses : (R, K) printed losses, N
+    use : (K,) rows that are believed
+    ranges : indices of the ranges looked at
+    counts : number of points of each of them
+    widest : largest first position, in spacings
+    tail : degrees of freedom of the Student t
+    """
+
+    simulations: Simulations
+    losses: Array
+    use: NDArray[np.bool_]
+    ranges: tuple[int, ...]
+    counts: tuple[int, ...]
+    widest: float = 1.0
+    tail: float = TAIL
+
+    def without(self, row: int) -> Model:
+        """The model that does not believe a row."""
+        use = self.use.copy()
+        use[row] = False
+        return replace(self, use=use)
+
+    # ---- layout of the unknowns: u | nugget | family errors | first positions ------------------------------------------
+
+    @property
+    def points(self) -> int:
+        """Number of points of all ranges together."""
+        return sum(self.counts)
+
+    @property
+    def families(self) -> int:
+        """Number of families of curves equal up to a factor."""
+        return int(self.simulations.family.max()) + 1
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return 2 + MODES + self.points * (1 + self.families) + len(self.ranges)
+
+    def blocks(self) -> list[slice]:
+        """Where the points of each range stand."""
+        stops = np.cumsum(self.counts)
+        return [slice(int(b - n), int(b)) for b, n in zip(stops, self.counts, strict=True)]
+
+    @property
+    def reach(self) -> Array:
+        """(R,) the largest first position: ``widest`` spacings, m."""
+        counts = np.array(self.counts)
+        return self.widest * self.simulations.ends[list(self.ranges)] / (counts - 1 + self.widest)
+
+    def positions(self, logit: Array) -> tuple[Array, Array, Array, Array]:
+        """x (B, N), first (B, R), d first / d logit (B, R), and dx / d first (N,) from the logits (B, R)."""
+        share = expit(logit)
+        first = self.reach * share
+        ends = self.simulations.ends[list(self.ranges)]
+        weight = [1.0 - np.arange(n) / (n - 1) for n in self.counts]
+        x = [end - (end - first[:, [i]]) * w for i, (end, w) in enumerate(zip(ends, weight, strict=True))]
+        return np.concatenate(x, axis=1), first, first * (1 - share), np.concatenate(weight)
+
+    # ---- the posterior -------------------------------------------------------------------------------------------------
+
+    def evaluate(self, theta: Array, knobs: Knobs) -> State:
+        """Positions, forces, residuals and derivatives for unknowns (B, P)."""
+        nb, n, families = 2 + MODES, self.points, self.families
+        x, first, dfirst, weight = self.positions(theta[:, -len(self.ranges) :])
+        simulated, dsimulated, reference = self.simulations.forces(x)
+        basis, dbasis = wiener_basis(float(max(self.simulations.ends))), self._basis_scale(theta, knobs)
+        shape = basis(x) * dbasis[:, None, :]
+        u = np.einsum("bnj,bj->bn", shape, theta[:, :nb])
+        du = np.einsum("bnj,bj->bn", basis(x, 1) * dbasis[:, None, :], theta[:, :nb])
+        smooth = reference * np.exp(u)
+        slope = smooth * (dsimulated[:, :, 0] / simulated[:, :, 0] + du)
+        nugget = np.broadcast_to(np.asarray(knobs.nugget, dtype=float), theta.shape[:1])
+        force = smooth + nugget[:, None] * theta[:, nb : nb + n]
+        dforce = np.zeros((*x.shape, self.size))
+        dforce[:, :, :nb] = smooth[:, :, None] * shape
+        dforce[:, np.arange(n), nb + np.arange(n)] = nugget[:, None]
+        error = theta[:, nb + n : nb + n * (1 + families)].reshape(-1, families, n)
+        scale = self._by_point(np.broadcast_to(knobs.solver, (theta.shape[0], len(self.ranges))))
+        residual, jacobian = [], []
+        for i, block in enumerate(self.blocks()):
+            at = self.size - len(self.ranges) + i
+            dforce[:, block, at] = slope[:, block] * weight[block] * dfirst[:, [i]]
+            part, relative = simulated[:, block], np.zeros_like(simulated[:, block])
+            for f in range(families):
+                relative[:, :, self.simulations.family == f] = (scale * error[:, f])[:, block, None]
+            gap = force[:, block, None] - part * (1 + relative)
+            distance = np.sqrt(np.sum(gap**2, axis=1))
+            unit = np.moveaxis(gap / distance[:, None, :], 1, 2)
+            d = unit @ dforce[:, block]
+            moved = dsimulated[:, block] * (1 + relative) * weight[block][:, None] * dfirst[:, [i], None]
+            d[:, :, at] -= np.einsum("bkn,bnk->bk", unit, moved)
+            for f in range(families):
+                rows = self.simulations.family == f
+                columns = nb + n * (1 + f) + np.arange(n)[block]
+                d[np.ix_(range(len(d)), np.flatnonzero(rows), columns)] -= (
+                    unit[:, rows] * np.moveaxis(part[:, :, rows], 1, 2) * scale[:, None, block]
+                )
+            residual.append(distance - self.losses[self.ranges[i]])
+            jacobian.append(d)
+        return State(
+            x, force, smooth, slope, first, np.concatenate(residual, 1), np.concatenate(jacobian, 1), dforce
+        )
+
+    def log_posterior(self, theta: Array, knobs: Knobs, loosen: float = 1.0) -> tuple[Array, Array]:
+        """ln p(losses, theta) (B,), normalised in the losses and in theta, and its gradient (B, P)."""
+        state = self.evaluate(theta, knobs)
+        scale = self.error_scale(knobs, theta.shape[0]) * loosen
+        z = state.residual / scale
+        believed = np.tile(self.use, len(self.ranges))
+        density = self._t_constant - np.log(scale) - (self.tail + 1) / 2 * np.log1p(z**2 / self.tail)
+        pull = np.where(believed, -(self.tail + 1) * z / (self.tail + z**2) / scale, 0.0)
+        inner, logit = theta[:, : -len(self.ranges)], theta[:, -len(self.ranges) :]
+        share = expit(logit)
+        value = np.sum(np.where(believed, density, 0.0), axis=1) - 0.5 * np.sum(inner**2, axis=1)
+        value += np.sum(np.log(share * (1 - share)), axis=1) - 0.5 * inner.shape[1] * np.log(2 * np.pi)
+        gradient = np.einsum("bm,bmp->bp", pull, state.jacobian)
+        gradient[:, : -len(self.ranges)] -= inner
+        gradient[:, -len(self.ranges) :] += 1 - 2 * share
+        return value, gradient
+
+    def error_scale(self, knobs: Knobs, batch: int) -> Array:
+        """(B, R K) scale of the difference between model and printed loss, N."""
+        typical = self.simulations.typical[list(self.ranges)]
+        single = np.broadcast_to(knobs.solver, (batch, len(self.ranges))) * typical
+        rounding = np.broadcast_to(np.asarray(knobs.rounding, dtype=float), (batch,))
+        shared = np.minimum(rounding[:, None] * typical, single)
+        alone = self.simulations.family < 0
+        return np.concatenate(
+            [np.where(alone, single[:, [i]], shared[:, [i]]) for i in range(len(self.ranges))], axis=1
+        )
+
+    @property
+    def _t_constant(self) -> float:
+        v = self.tail
+        return float(gammaln((v + 1) / 2) - gammaln(v / 2) - 0.5 * np.log(v * np.pi))
+
+    def _basis_scale(self, theta: Array, knobs: Knobs) -> Array:
+        scale = np.ones((theta.shape[0], 2 + MODES))
+        scale[:, 2:] = np.broadcast_to(np.asarray(knobs.roughness, dtype=float), theta.shape[:1])[:, None]
+        return scale
+
+    def _by_point(self, per_range: Array) -> Array:
+        return np.repeat(per_range, self.counts, axis=1)

@@ -1,0 +1,103 @@
+"""Noise that remembers: an autoregressive process of first order along the order of measurement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bayesmembrane.measurement import Measurement
+from bayesmembrane.noise.base import LN_SD, Noise, NoiseLikelihood, force_scale
+from bayesmembrane.parameters import Array, Normal, Parameter
+
+LN_LENGTH = Parameter(
+    "ln_length",
+    "-",
+    "log of the correlation length, in median steps of the measurement",
+    Normal(0.0, 1.5),
+    (-5.0, 8.0),
+)
+SHORTEST = 1e-3
+"""Points closer than this part of the median step are kept apart, so that two equal ones do not make Sigma singular."""
+
+
+@dataclass(frozen=True)
+class AR1(Noise):
+    """Sigma_ij = Sigma_given_ij + tau^2 exp(-|s_i - s_j| / length), with rho = exp(-1/length).
+
+    s counts median steps along the order of measurement: elapsed time, or without times the distance that the disc has
+    travelled, over its median step; evenly spaced points have the correlation rho^|i - j|. The noise that remembers is
+    always inferred: without it this model would be `White`.
+    """
+
+    name: ClassVar[str] = "ar1"
+    title: ClassVar[str] = "noise that remembers, AR(1)"
+
+    @property
+    def coordinates(self) -> tuple[Parameter, ...]:
+        return (LN_SD, LN_LENGTH)
+
+    @property
+    def field_names(self) -> tuple[str, ...]:
+        return ("sd", "rho")
+
+    def natural(self, x: Array, scale: float) -> Array:
+        return np.stack([np.exp(x[:, 0]) * scale, np.exp(-np.exp(-x[:, 1]))], axis=1)
+
+    def bind(self, measurement: Measurement) -> AR1Likelihood:
+        return AR1Likelihood(measurement)
+
+
+class AR1Likelihood(NoiseLikelihood):
+    """O(N) by a Kalman filter where the points' own noise is independent, else one Cholesky factor for each draw."""
+
+    def __init__(self, measurement: Measurement) -> None:
+        self.scale = force_scale(measurement)
+        self.gap = _gaps(measurement)
+        self.given = measurement.covariance
+        n = len(measurement)
+        self.variance = np.zeros(n) if measurement.force_sd is None else measurement.force_sd**2
+        place = np.concatenate([[0.0], np.cumsum(self.gap)])
+        self.distance = np.abs(place[:, None] - place[None, :])
+
+    def log_likelihood(self, residual: Array, x: Array) -> Array:
+        tau = np.exp(x[:, 0]) * self.scale
+        rate = np.exp(-x[:, 1])
+        if self.given is None:
+            return self._filter(residual, tau * tau, rate)
+        sigma = self.given + (tau * tau)[:, None, None] * np.exp(-rate[:, None, None] * self.distance)
+        root = np.linalg.cholesky(sigma)
+        z = np.linalg.solve(root, residual[:, :, None])[:, :, 0]
+        log_det = np.sum(np.log(np.diagonal(root, axis1=1, axis2=2)), axis=1)
+        return np.asarray(-0.5 * np.sum(z * z, axis=1) - log_det - 0.5 * self.variance.size * np.log(2 * np.pi))
+
+    def covariance(self, x: Array) -> Array:
+        tau = float(np.exp(x[0])) * self.scale
+        given = np.diag(self.variance) if self.given is None else self.given
+        return np.asarray(given + tau**2 * np.exp(-np.exp(-x[1]) * self.distance))
+
+    def _filter(self, residual: Array, power: Array, rate: Array) -> Array:
+        """State u with variance ``power`` and u_i = phi_i u_(i-1) + ..., observed as r_i = u_i + own noise."""
+        phi = np.exp(-rate[:, None] * self.gap)
+        mean, variance = np.zeros_like(power), power.copy()
+        total = np.zeros_like(power)
+        for i in range(residual.shape[1]):
+            if i:
+                f = phi[:, i - 1]
+                mean, variance = f * mean, power + f * f * (variance - power)
+            s = variance + self.variance[i]
+            e = residual[:, i] - mean
+            total -= 0.5 * (e * e / s + np.log(2 * np.pi * s))
+            gain = variance / s
+            mean, variance = mean + gain * e, variance * (1 - gain)
+        return total
+
+
+def _gaps(measurement: Measurement) -> Array:
+    """(N - 1,) steps between points relative to their median: of time, or else of the distance travelled."""
+    place = measurement.deflection if measurement.time is None else measurement.time
+    gap = np.abs(np.diff(place))
+    if gap.size == 0 or np.median(gap) == 0:
+        return np.ones(gap.size)
+    return np.maximum(gap / np.median(gap), SHORTEST)
