@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -41,6 +41,7 @@ class Prediction:
     films : (B, n) membrane parameters
     sensitivity : (B, N, k) dF/dx in the coordinates that shape the curve, or None if not asked for
     convexity, ellipticity : (B,) margins over all states reached up to the end of the whole measured range
+    convexity_at, ellipticity_at : (B, M) the same, deflection by deflection; nan where there is no state
     """
 
     deflection: Array
@@ -50,6 +51,8 @@ class Prediction:
     sensitivity: Array | None
     convexity: Array
     ellipticity: Array
+    convexity_at: Array
+    ellipticity_at: Array
 
     @property
     def ok(self) -> NDArray[np.bool_]:
@@ -91,7 +94,7 @@ class Forward:
     def _unit(self) -> tuple[Curves, Curves]:
         """The film of modulus one, without and with the helpers."""
         one = np.ones((1, 1))
-        return self._solve(one, self.deflection, True), self._solve(one, self._all, True)
+        return self.curves(one, self.deflection, True), self.curves(one, self._all, True)
 
     def __call__(
         self, coordinates: ArrayLike, sensitivities: bool = False, reached: bool = True, solver: str = "ritz"
@@ -102,31 +105,25 @@ class Forward:
         """
         x = np.atleast_2d(np.asarray(coordinates, dtype=float))
         films = self.hypothesis.films(x)
-        at = self._all if reached else self.deflection
         if self.hypothesis.material.scales == (1,) and solver == "ritz":
-            curves = self._unit[int(reached)]
-            force, status = films * curves.force, np.repeat(curves.status, len(films), axis=0)
-            slope = None if curves.sensitivity is None else np.repeat(curves.sensitivity, len(films), axis=0)
-            one = np.ones(len(films))
-            convexity, ellipticity = reached_convexity(curves) * one, reached_ellipticity(curves) * one
+            curves = _scaled(self._unit[int(reached)], films)
         else:
-            curves = self._solve(films, at, sensitivities, solver)
-            force, status, slope = curves.force, curves.status, curves.sensitivity
-            convexity, ellipticity = reached_convexity(curves), reached_ellipticity(curves)
-        n = self.deflection.size
-        chained = None
-        if sensitivities and slope is not None:
-            chained = np.einsum("bni,bik->bnk", slope[:, :n], self._jacobian(x))
-        return Prediction(self.deflection, force[:, :n], status[:, :n], films, chained, convexity, ellipticity)
+            curves = self.curves(films, self._all if reached else self.deflection, sensitivities, solver)
+        n, chained = self.deflection.size, None
+        if sensitivities and curves.sensitivity is not None:
+            chained = np.einsum("bni,bik->bnk", curves.sensitivity[:, :n], self.jacobian(x))
+        margins = reached_convexity(curves), reached_ellipticity(curves), curves.convexity, curves.ellipticity
+        return Prediction(self.deflection, curves.force[:, :n], curves.status[:, :n], films, chained, *margins)
 
-    def _solve(self, films: Array, deflection: Array, sensitivities: bool, solver: str = "ritz") -> Curves:
+    def curves(self, films: Array, deflection: Array, sensitivities: bool = False, solver: str = "ritz") -> Curves:
+        """Curves of ``films`` (B, n) at ``deflection`` (N,) m on the rig of the measurement."""
         rig = annulus(self.measurement)
         options: dict[str, Any] = {"inner_radius": rig.inner_radius, "outer_radius": rig.outer_radius}
         return self.solve(
             self.hypothesis.material, films, deflection, sensitivities=sensitivities, solver=solver, **options
         )
 
-    def _jacobian(self, x: Array) -> Array:
+    def jacobian(self, x: Array) -> Array:
         """d films / d coordinates, (B, n, k), by central differences of fourth order: exact to 1e-12 or so."""
         k = self.hypothesis.curve_size
         out = np.zeros((len(x), len(self.hypothesis.material.field_names()), k))
@@ -136,6 +133,14 @@ class Forward:
             f = self.hypothesis.films
             out[:, :, j] = (8 * (f(x + h) - f(x - h)) - (f(x + 2 * h) - f(x - 2 * h))) / (12 * h[j])
         return out
+
+
+def _scaled(unit: Curves, films: Array) -> Curves:
+    """Curves of films of one modulus (B, 1) from the one of modulus one: F(c) = c F(1), dF/dc = F(1)."""
+    shape = (len(films), unit.force.shape[1])
+    same = {f.name: getattr(unit, f.name) for f in fields(Curves)}
+    wide = {k: np.broadcast_to(v, (*shape, *v.shape[2:])) for k, v in same.items() if v is not None}
+    return Curves(**{**same, **wide, **{k: films * same[k] for k in ("force", "slope", "energy")}})
 
 
 def predict(

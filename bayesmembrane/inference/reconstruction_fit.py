@@ -6,7 +6,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import logit, logsumexp
+from scipy.special import expit, logit, logsumexp
 
 from bayesmembrane.errors import DataError
 from bayesmembrane.inference.reconstruction_model import MODES, Knobs, Model, State, wiener_basis
@@ -15,10 +15,11 @@ from bayesmembrane.parameters import Array
 LOOSEN = (64.0, 16.0, 4.0, 1.0)  # errors are first taken as larger than they are: the way to the mode is then smooth
 ROUNDS = 8
 MOST_STEPS = 80
-LEAST_GAIN = 1e-6
+LEAST_GAIN = 1e-4
 SHARES = (0.3, 0.05, 0.8)  # first positions, in parts of the largest, from which the mode is looked for
-STEP, LEAPS = 0.22, 20  # Hamiltonian step in units of the posterior's own scales, and steps per draw
+STEP, LEAPS = 0.2, 20  # first Hamiltonian step in units of the posterior's own scales, and most steps per draw
 WARM_UP = 40
+ACCEPT = 0.8  # acceptance at which each chain's step is aimed during the warm-up
 
 
 class Mode(NamedTuple):
@@ -49,10 +50,8 @@ def knobs_at(roughness: float, nugget: float, rounding: float, solver: tuple[flo
     return Knobs(np.array([roughness]), np.array([nugget]), np.array([solver]), np.array([rounding]))
 
 
-def find_mode(model: Model, knobs: Knobs, start: Array | None = None) -> Mode:
-    """The mode from ``start``, or the best of those from trilateration at several first positions."""
-    if start is not None:
-        return _climb(model, start, knobs, 1.0)
+def find_mode(model: Model, knobs: Knobs) -> Mode:
+    """The best of the modes that trilateration at several first positions leads to."""
     found = []
     for share in SHARES:
         theta = trilaterate(model, knobs, np.full(len(model.ranges), share))
@@ -61,6 +60,18 @@ def find_mode(model: Model, knobs: Knobs, start: Array | None = None) -> Mode:
             theta = mode.theta
         found.append(mode)
     return max(found, key=lambda m: m.value)
+
+
+def descend(model: Model, knobs: list[Knobs]) -> list[Mode]:
+    """The modes at settings that allow for ever smaller errors, each started from the one before."""
+    found: list[list[Mode]] = []
+    for share in SHARES:
+        theta = trilaterate(model, knobs[0], np.full(len(model.ranges), share))
+        path: list[Mode] = []
+        for k in knobs:
+            path.append(_climb(model, _restart(path[-1], k) if path else theta, k, 1.0))
+        found.append(path)
+    return [max(at, key=lambda m: m.value) for at in zip(*found, strict=True)]
 
 
 def trilaterate(model: Model, knobs: Knobs, share: Array) -> Array:
@@ -72,14 +83,14 @@ def trilaterate(model: Model, knobs: Knobs, share: Array) -> Array:
     """
     nb, count = 2 + MODES, len(model.ranges)
     x, _, _, _ = model.positions(logit(share)[None])
-    force, _, reference = (v[0] for v in model.simulations.forces(x))
+    force, reference = model.simulations.forces(x)[0][0], model.simulations.reference_force(x)[0][0]
     basis = wiener_basis(float(max(model.simulations.ends)))(x[0])
     basis[:, 2:] *= np.ravel(knobs.roughness)[0]
     usable = force[:, model.use & model.simulations.usable]
     c = np.linalg.solve(
         basis.T @ basis / 0.02**2 + np.eye(nb), basis.T @ np.median(np.log(usable / reference[:, None]), 1) / 0.02**2
     )
-    scale = model.error_scale(knobs, 1).reshape(count, -1) * LOOSEN[-2] * 2
+    scale = model.error_scale(knobs, 1).reshape(count, -1) * LOOSEN[1]
     weight = np.tile(model.use.astype(float), (count, 1))
     for _ in range(ROUNDS):
         y = reference * np.exp(basis @ c)
@@ -144,28 +155,26 @@ def _curvature(model: Model, theta: Array, knobs: Knobs, loosen: float) -> tuple
     """Negative curvature (P, P) and gradient (P,) of the log posterior."""
     state = model.evaluate(theta[None], knobs)
     scale = model.error_scale(knobs, 1)[0] * loosen
-    z = state.residual[0] / scale
-    weight = np.tile(model.use, len(model.ranges)) * (model.tail + 1) / (model.tail + z**2) / scale**2
+    weight = model.weights(state.residual / scale)[0][0] / scale**2
     jacobian = state.jacobian[0]
-    share = 1 / (1 + np.exp(-theta[-len(model.ranges) :]))
+    share = expit(theta[-len(model.ranges) :])
     prior = np.concatenate([np.ones(theta.size - share.size), 2 * share * (1 - share)])
-    gradient = -jacobian.T @ (weight * state.residual[0])
-    gradient[: -share.size] -= theta[: -share.size]
-    gradient[-share.size :] += 1 - 2 * share
+    gradient = model.log_prior(theta[None])[1][0] - jacobian.T @ (weight * state.residual[0])
     return (jacobian.T * weight) @ jacobian + np.diag(prior), gradient
 
 
 # ---- scales that are not known beforehand ------------------------------------------------------------------------------
 
 
-def scan(model: Model, grid: list[Knobs], start: Mode | None = None) -> tuple[list[Mode], float]:
-    """The modes at all settings of the scales, and ln of their mean evidence (equal prior weights)."""
-    modes: list[Mode] = []
-    best = start if start is not None else find_mode(model, grid[len(grid) // 2])
-    for knobs in grid:
-        modes.append(find_mode(model, knobs, _restart(best, knobs)))
-    evidence = np.array([m.evidence for m in modes])
-    return modes, float(logsumexp(evidence) - np.log(evidence.size))
+def scan(model: Model, grid: list[Knobs], start: Mode) -> list[Mode]:
+    """The modes at all settings of the scales, each from ``start``."""
+    return [_climb(model, _restart(start, knobs), knobs, 1.0) for knobs in grid]
+
+
+def again(model: Model, mode: Mode, knobs: Knobs | None = None) -> Mode:
+    """The mode of a model that differs a little from the one that ``mode`` belongs to, or at other scales."""
+    knobs = mode.knobs if knobs is None else knobs
+    return _climb(model, _restart(mode, knobs), knobs, 1.0)
 
 
 def _restart(mode: Mode, knobs: Knobs) -> Array:
@@ -226,9 +235,12 @@ def sample(model: Model, modes: list[Mode], chains: int, steps: int, seed: int) 
     theta = theta + 0.3 * np.einsum("bpq,bq->bp", root, rng.standard_normal(theta.shape))
     kept, accepted = [], []
     value, gradient = _safe(model, theta, knobs)
+    size = np.full(chains, STEP)
     for step in range(WARM_UP + steps):
-        theta, value, gradient, chance = _leap(model, theta, value, gradient, knobs, root, rng)
-        if step >= WARM_UP:
+        theta, value, gradient, chance = _leap(model, theta, value, gradient, knobs, root, size, rng)
+        if step < WARM_UP:
+            size = size * np.exp(0.15 * (chance - ACCEPT))
+        else:
             kept.append(theta)
             accepted.append(chance)
     if np.mean(accepted) < 0.2:
@@ -237,11 +249,18 @@ def sample(model: Model, modes: list[Mode], chains: int, steps: int, seed: int) 
 
 
 def _leap(
-    model: Model, theta: Array, value: Array, gradient: Array, knobs: Knobs, root: Array, rng: np.random.Generator
-) -> tuple[Array, Array, Array, float]:
-    """One Hamiltonian step of all chains: theta, value, gradient, mean chance of acceptance."""
+    model: Model,
+    theta: Array,
+    value: Array,
+    gradient: Array,
+    knobs: Knobs,
+    root: Array,
+    size: Array,
+    rng: np.random.Generator,
+) -> tuple[Array, Array, Array, Array]:
+    """One Hamiltonian step of all chains: theta, value, gradient, chance of acceptance (B,)."""
     start = rng.standard_normal(theta.shape)
-    step = STEP * (1 + 0.2 * rng.standard_normal((theta.shape[0], 1)))
+    step = (size * (1 + 0.2 * rng.standard_normal(size.size)))[:, None]
     new, slope = theta, np.einsum("bp,bpq->bq", gradient, root)
     momentum = start + 0.5 * step * slope
     leaps = int(rng.integers(LEAPS // 2, LEAPS + 1))
@@ -257,7 +276,7 @@ def _leap(
         np.where(take[:, None], new, theta),
         np.where(take, trial, value),
         np.where(take[:, None], new_gradient, gradient),
-        float(np.mean(chance)),
+        chance,
     )
 
 

@@ -4,8 +4,14 @@
 
 k counts the rows of the published table, r its ranges; F_0 is the simulated curve of the first row. The logarithm u of
 the measured over that reference is one smooth curve for all ranges: a straight line plus an integrated Wiener process
-in the deflection, in its Karhunen-Loève form. Everything unknown is one vector of numbers with independent standard
-normal priors (logistic for the first positions): what follows is a nonlinear least-squares problem with heavy tails.
+in the deflection, in its Karhunen-Loève form. error_k is the
+numerical error of the published simulations: shared by rows whose curves are equal up to a factor (neo-Hookean rows),
+since it does not depend on the factor. error_kr, what else is wrong with a simulation or a print, has heavy tails: it is
+a vector of Student t, one for each material and range, since what makes a material hard to simulate is common to its
+rows. Everything unknown is one vector of numbers with independent standard
+normal priors: what follows is a nonlinear least-squares problem with heavy tails. Only the first positions a_r differ:
+they follow one recipe, uniform between zero and a largest one that is common to the ranges and unknown (ln uniform,
+not below the recording step s), in the smooth form p(a) ~ (s^4 + sum_r a_r^4)^(-R/4), and at most one spacing.
 """
 
 from __future__ import annotations
@@ -32,7 +38,8 @@ NEAREST = 0.05e-3  # m: closer to zero no force can be told from none
 MODES = 20  # of the integrated Wiener process: the next one moves the curve by less than 1e-3 of the first
 LINE = (1.0, 0.3)  # prior standard deviations of u: level, and slope per 10 mm
 LENGTH = 0.010  # m, unit of deflection in the integrated Wiener process
-TAIL = 3.0  # degrees of freedom of the Student t that a loss follows
+POWER = 4  # of the smooth maximum in the prior of the first positions
+TAIL = 2.0  # degrees of freedom of the Student t that the losses of one material over one range follow
 SAME = 1e-6  # curves whose ratio is constant to this are one curve up to a factor
 
 
@@ -64,6 +71,7 @@ class Simulations:
     Attributes
     ----------
     usable : (K,) False where the forward model has no curve for a row
+    material : (K,) number of the material
     family : (K,) number of the family of curves that are equal up to a factor, -1 for a curve of its own
     ends : (R,) m, last deflection of each range
     typical : (R,) N, median force at the ends
@@ -72,18 +80,24 @@ class Simulations:
     reference: CubicSpline
     ratios: CubicSpline
     usable: NDArray[np.bool_]
+    material: NDArray[np.intp]
     family: NDArray[np.intp]
     ends: Array
     typical: Array
 
-    def forces(self, x: Array) -> tuple[Array, Array, Array]:
-        """F (..., K), dF/dx (..., K) and F_0 (...) at deflections x (...) in m; below 0.05 mm as at 0.05 mm."""
+    def reference_force(self, x: Array) -> tuple[Array, Array]:
+        """F_0 and dF_0/dx at deflections x in m, both of its shape; below 0.05 mm as at 0.05 mm."""
         x = np.maximum(x, NEAREST)
         log_x = np.log(x)
-        reference = np.exp(self.reference(log_x))
-        slope = self.reference(log_x, 1) / x
+        force = np.exp(self.reference(log_x))
+        return force, force * self.reference(log_x, 1) / x
+
+    def forces(self, x: Array) -> tuple[Array, Array]:
+        """F (..., K) of all rows and dF/dx (..., K) at deflections x (...) in m; below 0.05 mm as at 0.05 mm."""
+        reference, slope = self.reference_force(x)
+        x = np.maximum(x, NEAREST)
         force = reference[..., None] * np.exp(self.ratios(x))
-        return force, force * (slope[..., None] + self.ratios(x, 1)), reference
+        return force, force * ((slope / reference)[..., None] + self.ratios(x, 1))
 
 
 def tabulate(table: PublishedTable, simulate: Simulate) -> Simulations:
@@ -104,6 +118,7 @@ def tabulate(table: PublishedTable, simulate: Simulate) -> Simulations:
         CubicSpline(np.log(x), logs[0]),
         CubicSpline(x, ratios.T),
         usable,
+        np.unique([row.material for row in table.rows], return_inverse=True)[1].astype(np.intp),
         _families(ratios, usable),
         ends,
         np.median(at_ends, axis=0),
@@ -169,8 +184,10 @@ class Model:
     use : (K,) rows that are believed
     ranges : indices of the ranges looked at
     counts : number of points of each of them
+    step : m, the recording step of the measurement
+    recipe : False for first positions that are uniform and independent
     widest : largest first position, in spacings
-    tail : degrees of freedom of the Student t
+    tail : degrees of freedom of the Student t vectors
     """
 
     simulations: Simulations
@@ -178,6 +195,8 @@ class Model:
     use: NDArray[np.bool_]
     ranges: tuple[int, ...]
     counts: tuple[int, ...]
+    step: float
+    recipe: bool = True
     widest: float = 1.0
     tail: float = TAIL
 
@@ -226,65 +245,108 @@ class Model:
 
     # ---- the posterior -------------------------------------------------------------------------------------------------
 
+    def smooth(self, theta: Array, knobs: Knobs, x: Array) -> tuple[Array, Array, Array]:
+        """Smooth force (B, N) at x (B, N), its slope in N/m, and its derivatives (B, N, J) in the first unknowns."""
+        basis = wiener_basis(float(max(self.simulations.ends)))
+        scale = np.ones((theta.shape[0], 1, 2 + MODES))
+        scale[:, 0, 2:] = np.broadcast_to(np.asarray(knobs.roughness, dtype=float), theta.shape[:1])[:, None]
+        shape, coefficients = basis(x) * scale, theta[:, : 2 + MODES]
+        reference, slope = self.simulations.reference_force(x)
+        force = reference * np.exp(np.einsum("bnj,bj->bn", shape, coefficients))
+        du = np.einsum("bnj,bj->bn", basis(x, 1) * scale, coefficients)
+        return force, force * (slope / reference + du), force[:, :, None] * shape
+
     def evaluate(self, theta: Array, knobs: Knobs) -> State:
         """Positions, forces, residuals and derivatives for unknowns (B, P)."""
-        nb, n, families = 2 + MODES, self.points, self.families
-        x, first, dfirst, weight = self.positions(theta[:, -len(self.ranges) :])
-        simulated, dsimulated, reference = self.simulations.forces(x)
-        basis, dbasis = wiener_basis(float(max(self.simulations.ends))), self._basis_scale(theta, knobs)
-        shape = basis(x) * dbasis[:, None, :]
-        u = np.einsum("bnj,bj->bn", shape, theta[:, :nb])
-        du = np.einsum("bnj,bj->bn", basis(x, 1) * dbasis[:, None, :], theta[:, :nb])
-        smooth = reference * np.exp(u)
-        slope = smooth * (dsimulated[:, :, 0] / simulated[:, :, 0] + du)
+        nb, n, ranges = 2 + MODES, self.points, len(self.ranges)
+        x, first, dfirst, weight = self.positions(theta[:, -ranges:])
+        smooth, slope, shape = self.smooth(theta, knobs, x)
         nugget = np.broadcast_to(np.asarray(knobs.nugget, dtype=float), theta.shape[:1])
         force = smooth + nugget[:, None] * theta[:, nb : nb + n]
         dforce = np.zeros((*x.shape, self.size))
-        dforce[:, :, :nb] = smooth[:, :, None] * shape
+        dforce[:, :, :nb] = shape
         dforce[:, np.arange(n), nb + np.arange(n)] = nugget[:, None]
-        error = theta[:, nb + n : nb + n * (1 + families)].reshape(-1, families, n)
-        scale = self._by_point(np.broadcast_to(knobs.solver, (theta.shape[0], len(self.ranges))))
-        residual, jacobian = [], []
+        moving = weight * np.repeat(dfirst, self.counts, axis=1)
         for i, block in enumerate(self.blocks()):
-            at = self.size - len(self.ranges) + i
-            dforce[:, block, at] = slope[:, block] * weight[block] * dfirst[:, [i]]
-            part, relative = simulated[:, block], np.zeros_like(simulated[:, block])
-            for f in range(families):
-                relative[:, :, self.simulations.family == f] = (scale * error[:, f])[:, block, None]
-            gap = force[:, block, None] - part * (1 + relative)
-            distance = np.sqrt(np.sum(gap**2, axis=1))
-            unit = np.moveaxis(gap / distance[:, None, :], 1, 2)
-            d = unit @ dforce[:, block]
-            moved = dsimulated[:, block] * (1 + relative) * weight[block][:, None] * dfirst[:, [i], None]
-            d[:, :, at] -= np.einsum("bkn,bnk->bk", unit, moved)
-            for f in range(families):
-                rows = self.simulations.family == f
-                columns = nb + n * (1 + f) + np.arange(n)[block]
-                d[np.ix_(range(len(d)), np.flatnonzero(rows), columns)] -= (
-                    unit[:, rows] * np.moveaxis(part[:, :, rows], 1, 2) * scale[:, None, block]
-                )
-            residual.append(distance - self.losses[self.ranges[i]])
-            jacobian.append(d)
-        return State(
-            x, force, smooth, slope, first, np.concatenate(residual, 1), np.concatenate(jacobian, 1), dforce
-        )
+            dforce[:, block, self.size - ranges + i] = (slope * moving)[:, block]
+        parts = [self._range(i, theta, knobs, x, force, dforce, moving) for i in range(ranges)]
+        residual, jacobian = (np.concatenate(v, axis=1) for v in zip(*parts, strict=True))
+        return State(x, force, smooth, slope, first, residual, jacobian, dforce)
+
+    def _range(
+        self, i: int, theta: Array, knobs: Knobs, x: Array, force: Array, dforce: Array, moving: Array
+    ) -> tuple[Array, Array]:
+        """Residuals (B, K) of range i and their derivatives (B, K, P)."""
+        block = self.blocks()[i]
+        simulated, slope = self.simulations.forces(x[:, block])
+        scale = np.broadcast_to(knobs.solver, (theta.shape[0], len(self.ranges)))[:, i]
+        relative = np.zeros_like(simulated)
+        columns = [self._error_columns(f)[block] for f in range(self.families)]
+        for f, at in enumerate(columns):
+            relative[:, :, self.simulations.family == f] = (scale[:, None] * theta[:, at])[:, :, None]
+        gap = force[:, block, None] - simulated * (1 + relative)
+        distance = np.sqrt(np.sum(gap**2, axis=1))
+        unit = np.swapaxes(gap / distance[:, None, :], 1, 2)
+        jacobian = unit @ dforce[:, block]
+        shift = slope * (1 + relative) * moving[:, block, None]
+        jacobian[:, :, self.size - len(self.ranges) + i] -= np.einsum("bkn,bnk->bk", unit, shift)
+        for f, at in enumerate(columns):
+            rows = np.flatnonzero(self.simulations.family == f)
+            change = unit[:, rows] * np.swapaxes(simulated[:, :, rows], 1, 2) * scale[:, None, None]
+            jacobian[:, rows[:, None], at] -= change
+        return distance - self.losses[self.ranges[i]], jacobian
+
+    def _error_columns(self, family: int) -> NDArray[np.intp]:
+        return 2 + MODES + self.points * (1 + family) + np.arange(self.points)
 
     def log_posterior(self, theta: Array, knobs: Knobs, loosen: float = 1.0) -> tuple[Array, Array]:
-        """ln p(losses, theta) (B,), normalised in the losses and in theta, and its gradient (B, P)."""
+        """ln p(losses, theta) (B,) and its gradient (B, P); normalised in the losses."""
         state = self.evaluate(theta, knobs)
         scale = self.error_scale(knobs, theta.shape[0]) * loosen
         z = state.residual / scale
-        believed = np.tile(self.use, len(self.ranges))
-        density = self._t_constant - np.log(scale) - (self.tail + 1) / 2 * np.log1p(z**2 / self.tail)
-        pull = np.where(believed, -(self.tail + 1) * z / (self.tail + z**2) / scale, 0.0)
-        inner, logit = theta[:, : -len(self.ranges)], theta[:, -len(self.ranges) :]
-        share = expit(logit)
-        value = np.sum(np.where(believed, density, 0.0), axis=1) - 0.5 * np.sum(inner**2, axis=1)
-        value += np.sum(np.log(share * (1 - share)), axis=1) - 0.5 * inner.shape[1] * np.log(2 * np.pi)
-        gradient = np.einsum("bm,bmp->bp", pull, state.jacobian)
-        gradient[:, : -len(self.ranges)] -= inner
-        gradient[:, -len(self.ranges) :] += 1 - 2 * share
-        return value, gradient
+        weight, size, total = self.weights(z)
+        constant = gammaln((self.tail + size) / 2) - gammaln(self.tail / 2) - 0.5 * size * np.log(self.tail * np.pi)
+        value, gradient = self.log_prior(theta)
+        value = value + np.sum(constant - 0.5 * (self.tail + size) * np.log1p(total / self.tail), axis=1)
+        value = value - np.sum(np.where(self.believed, np.log(scale), 0.0), axis=1)
+        return value, gradient - np.einsum("bm,bmp->bp", weight * z / scale, state.jacobian)
+
+    @property
+    def believed(self) -> NDArray[np.bool_]:
+        """(R K,) which losses count."""
+        return np.tile(self.use, len(self.ranges))
+
+    def weights(self, z: Array) -> tuple[Array, Array, Array]:
+        """Weights (B, R K) of scaled residuals z (B, R K); number (G,) and sum of squares (B, G) of each vector.
+
+        A vector of n residuals has the weight (tail + n) / (tail + sum z^2): 1 or so where they are as expected.
+        """
+        members = self.members
+        size = np.sum(members, axis=1)
+        total = z**2 @ members.T
+        return ((self.tail + size) / (self.tail + total)) @ members, size, total
+
+    @property
+    def members(self) -> Array:
+        """(G, R K) 1 where a believed loss belongs to a material and range."""
+        material = np.concatenate(
+            [self.simulations.material + r * (1 + self.simulations.material.max()) for r in range(len(self.ranges))]
+        )
+        return np.where(np.unique(material)[:, None] == material, self.believed, False).astype(float)
+
+    def log_prior(self, theta: Array) -> tuple[Array, Array]:
+        """ln p(theta) (B,) and its gradient (B, P); up to a constant that all numbers of points share."""
+        ranges = len(self.ranges)
+        inner, share = theta[:, :-ranges], expit(theta[:, -ranges:])
+        value = -0.5 * np.sum(inner**2, axis=1) - 0.5 * inner.shape[1] * np.log(2 * np.pi)
+        gradient = np.concatenate([-inner, 1 - 2 * share], axis=1)
+        first, reach = self.reach * share / self.step, self.reach / self.step
+        value += np.sum(np.log(reach * share * (1 - share)), axis=1)
+        if not self.recipe:
+            return value - np.sum(np.log(reach)), gradient
+        total = 1 + np.sum(first**POWER, axis=1)
+        gradient[:, -ranges:] -= ranges * first**POWER * (1 - share) / total[:, None]
+        return value - ranges / POWER * np.log(total), gradient
 
     def error_scale(self, knobs: Knobs, batch: int) -> Array:
         """(B, R K) scale of the difference between model and printed loss, N."""
@@ -296,16 +358,3 @@ class Model:
         return np.concatenate(
             [np.where(alone, single[:, [i]], shared[:, [i]]) for i in range(len(self.ranges))], axis=1
         )
-
-    @property
-    def _t_constant(self) -> float:
-        v = self.tail
-        return float(gammaln((v + 1) / 2) - gammaln(v / 2) - 0.5 * np.log(v * np.pi))
-
-    def _basis_scale(self, theta: Array, knobs: Knobs) -> Array:
-        scale = np.ones((theta.shape[0], 2 + MODES))
-        scale[:, 2:] = np.broadcast_to(np.asarray(knobs.roughness, dtype=float), theta.shape[:1])[:, None]
-        return scale
-
-    def _by_point(self, per_range: Array) -> Array:
-        return np.repeat(per_range, self.counts, axis=1)

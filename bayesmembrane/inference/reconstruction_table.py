@@ -60,6 +60,7 @@ class PublishedTable:
     ranges : names of the ranges
     ends : (n_ranges,) last training deflection of each, m
     inner_radius, outer_radius, thickness : the rig and the film, m
+    step : recording step of the measurement, m
     """
 
     rows: tuple[Row, ...]
@@ -68,6 +69,7 @@ class PublishedTable:
     inner_radius: float
     outer_radius: float
     thickness: float
+    step: float
 
     def __post_init__(self) -> None:
         if len(self.rows) < 4:
@@ -90,11 +92,14 @@ class PublishedTable:
         return replace(self, rows=tuple(rows))
 
 
-def read_published_table(parameters: Path | None = None, losses: Path | None = None, facts: Path | None = None) -> PublishedTable:
+def read_published_table(
+    parameters: Path | None = None, losses: Path | None = None, facts: Path | None = None
+) -> PublishedTable:
     """The table in two CSV files and a TOML file; those of the source paper unless others are given.
 
     Columns: ``material,column,parameter,value`` and ``material,column,range,loss_N``. The TOML has ``[geometry]`` with
-    radii and thickness, and ``[ranges]`` with ``<range>_end_mm``. Raises `DataError` with file and line.
+    radii and thickness, and ``[ranges]`` with ``<range>_end_mm``, ``[protocol]`` with ``step_mm``.
+    Raises `DataError` with file and line.
     """
     sets = _parameter_sets(_load(parameters or shipped("paper_parameters.csv")))
     printed = _losses(_load(losses or shipped("paper_losses.csv")))
@@ -119,6 +124,7 @@ def read_published_table(parameters: Path | None = None, losses: Path | None = N
         geometry.measure("inner_radius", LENGTH, "inner_radius_mm") or 0.0,
         geometry.measure("outer_radius", LENGTH, "outer_radius_mm") or 0.0,
         geometry.measure("thickness", LENGTH, "thickness_um") or 0.0,
+        root.section("protocol").measure("step", LENGTH, "step_mm") or 0.0,
     )
 
 
