@@ -1,7 +1,8 @@
 """What a report needs of a run and the run's draws do not say by themselves: computed once, stored beside them.
 
 Bands of the curve inside and beyond the fitted range, residuals, the states that the film reaches, the map of its
-convexity, its deformed shapes, and what thicker films of the same silicone should do. A report reads this and solves nothing.
+convexity, its deformed shapes, and what thicker films of the same silicone should do. A report reads this and solves
+nothing.
 """
 
 from __future__ import annotations
@@ -21,16 +22,14 @@ from numpy.typing import ArrayLike, NDArray
 from bayesmembrane.errors import StorageError
 from bayesmembrane.forward import Forward, Solve, annulus
 from bayesmembrane.hypothesis import CONVEXITY, Hypothesis
+from bayesmembrane.inference.goodness import goodness
+from bayesmembrane.inference.published import BreakPoint
 from bayesmembrane.materials.base import Material
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.mechanics import api
 from bayesmembrane.mechanics.convexity import least_eigenvalue
 from bayesmembrane.mechanics.solution import Status
 from bayesmembrane.parameters import Array
-from bayesmembrane.settings import load_toml
-from bayesmembrane.shipped import shipped
-from bayesmembrane.tables import number, parse_table, read_text
-from bayesmembrane.units import FORCE, LENGTH
 
 FILE = "digest.nc"
 QUANTILES = (0.05, 0.5, 0.95)
@@ -40,16 +39,6 @@ POINTS = 101
 MAP = (161, 101)
 FEWEST = 0.5
 """Where fewer than this share of the draws have a force, no band is given."""
-
-
-@dataclass(frozen=True)
-class BreakPoint:
-    """Where a specimen of some thickness broke: m, m, N. Films of one silicone differ in thickness alone."""
-
-    specimen: str
-    thickness: float
-    deflection: float
-    force: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +55,8 @@ class Digest:
     lost : (L, G) share of the draws without a force, one row per reason in ``reasons``
     residual, rest_residual : (Q, N), (Q, R) N, measured minus computed
     curves_at : (Q, N) N, computed curve at the fitted points
-    chi2 : (Q,) sum of r^T C^-1 r / N over the draws, with the measurement's own noise C; nan if it states none
+    fit : `Goodness` of the draw whose curve is nearest to the median one, as plain values: rmse_N, loss_N, max_N,
+        reduced_chi2, p_value, own_noise_N; None for the last three if the measurement states no noise
     film : (n,) membrane parameters of the draw whose curve is nearest to the median one
     convex : by convexity mode, the share of draws that meet it
     shape_at : (D,) m, deflections of what follows
@@ -95,7 +85,7 @@ class Digest:
     residual: Array
     rest_residual: Array
     curves_at: Array
-    chi2: Array
+    fit: dict[str, float | None]
     film: Array
     convex: dict[str, float]
     shape_at: Array
@@ -129,7 +119,7 @@ _DIMS = {
     "at": "point", "force": "point", "sd": "point",
     "rest_at": "rest", "rest_force": "rest", "rest_sd": "rest",
     "deflection": "grid", "beyond": "grid", "curve": "quantile grid", "repeat": "quantile grid", "lost": "reason grid",
-    "residual": "quantile point", "rest_residual": "quantile rest", "curves_at": "quantile point", "chi2": "quantile",
+    "residual": "quantile point", "rest_residual": "quantile rest", "curves_at": "quantile point",
     "film": "parameter", "shape_at": "shape", "state_1": "shape radius", "state_2": "shape radius",
     "shape_radius": "shape draw radius", "shape_height": "shape draw radius",
     "map_1": "stretch_1", "map_2": "stretch_2", "eigenvalue": "stretch_1 stretch_2",
@@ -204,11 +194,9 @@ def digest_draws(
         residual=_band(measurement.force - here.force),
         rest_residual=_band(unused.force - rest_force),
         curves_at=_band(here.force),
-        chi2=_chi2(measurement, here.force),
+        fit=goodness(measurement, here.force[chosen], hypothesis.curve_size).summary(),
         film=films[chosen],
-        convex={
-            m: float(np.mean(_meets(here.margin(m, hypothesis), m))) for m in CONVEXITY if m != "none"
-        },
+        convex={m: float(np.mean(_meets(here.margin(m, hypothesis), m))) for m in CONVEXITY if m != "none"},
         shape_at=shape_at,
         state_1=states[2],
         state_2=states[3],
@@ -226,17 +214,7 @@ def digest_draws(
     )
 
 
-def paper_break_points() -> tuple[BreakPoint, ...]:
-    """The break points that the source paper publishes, from the file that ships."""
-    path = shipped("paper_break_points.csv")
-    table = parse_table(read_text(path), str(path))
-    columns = [table.require("thickness", LENGTH), table.require("deflection", LENGTH), table.require("force", FORCE)]
-    values = zip(*(table.column(*c) for c in columns), strict=True)
-    names = (row[table.header.index("specimen")] for row in table.rows)
-    return tuple(BreakPoint(n, *(float(v) for v in row)) for n, row in zip(names, values, strict=True))
-
-
-# ---- pieces ------------------------------------------------------------------------------------------------------------
+# ---- pieces ----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -250,7 +228,9 @@ class _Points:
         if measurement is None:
             return _Points(*(np.empty(0) for _ in range(3)))
         sd = _given_sd(measurement)
-        return _Points(measurement.deflection, measurement.force, sd if sd is not None else np.full(len(measurement), np.nan))
+        return _Points(
+            measurement.deflection, measurement.force, sd if sd is not None else np.full(len(measurement), np.nan)
+        )
 
 
 def _given_sd(measurement: Measurement) -> Array | None:
@@ -291,14 +271,6 @@ def _representative(force: Array) -> int:
     return int(np.argmin(np.where(np.isfinite(distance), distance, np.inf)))
 
 
-def _chi2(measurement: Measurement, force: Array) -> Array:
-    covariance = measurement.noise_covariance
-    if covariance is None:
-        return np.full(len(QUANTILES), np.nan)
-    white = np.linalg.solve(np.linalg.cholesky(covariance), (measurement.force - force).T)
-    return _band(np.sum(white**2, axis=0)[:, None] / len(measurement))[:, 0]
-
-
 def _noise_sd(hypothesis: Hypothesis, measurement: Measurement, x: Array, at: Array) -> Array:
     """(B, G) N: the measurement's own noise, carried on between and beyond its points, and the inferred one."""
     own = _given_sd(measurement)
@@ -336,7 +308,7 @@ def _map(film: Material, states: Array) -> tuple[Array, Array, Array]:
     return l1, l2, np.asarray(value / gd)
 
 
-# ---- storage -----------------------------------------------------------------------------------------------------------
+# ---- storage ---------------------------------------------------------------------------------------------------------
 
 
 def save_digest(found: Digest, folder: Path) -> Path:
@@ -348,7 +320,9 @@ def save_digest(found: Digest, folder: Path) -> Path:
         _write(found, Path(name))
         os.replace(name, path)
     except OSError as error:
-        raise StorageError(f"the digest cannot be written ({error.strerror})", str(path), "free space or choose --out") from None
+        raise StorageError(
+            f"the digest cannot be written ({error.strerror})", str(path), "free space or choose --out"
+        ) from None
     return path
 
 
@@ -365,9 +339,11 @@ def load_digest(folder: Path) -> Digest | None:
         raise StorageError(
             f"the digest cannot be read ({type(error).__name__})", str(path), "remove it and sample again"
         ) from None
-    arrays["beyond"] = arrays["beyond"].astype(bool)
-    lists = {k: tuple(v) if isinstance(v, list) else v for k, v in rest.items()}
-    return Digest(**arrays, **lists)
+    values: dict[str, Any] = {**rest, **arrays}
+    values["beyond"] = arrays["beyond"].astype(bool)
+    for name in ("reasons", "specimens"):
+        values[name] = tuple(rest[name])
+    return Digest(**values)
 
 
 def _write(found: Digest, path: Path) -> None:

@@ -24,9 +24,10 @@ from bayesmembrane.mechanics.solution import Status
 from bayesmembrane.parameters import Array
 
 LOSSES = ("euclidean", "weighted")
-SCREENED, INFLATED, STARTED, POLISHED = 768, 256, 16, 3
+SCREENED, INFLATED, STARTED, POLISHED = 768, 256, 12, 2
 INFLATION = 2.5
 APART, DISTINCT = 1.5, 0.3  # least distance of starts, and of what they lead to, in prior standard deviations
+HOPEFUL = 10.0  # a start that misses the data by this many times the best one's |r| is not followed
 FEW, MOST = 50, 300  # evaluations of a first and of a last search
 TO_BOUND = 40  # iterations towards a bound
 NEAR = 1e-3  # of the width of the bounds: an estimate this close is at the bound
@@ -129,8 +130,8 @@ def fit(
     enough_points(hypothesis, measurement)
     objective = Objective(hypothesis, measurement, loss, solve)
     rng = np.random.default_rng(seed)
-    pool = objective.pool(rng)
-    x, status = _global(objective, pool, [np.asarray(s, dtype=float) for s in starts])
+    pool, size = objective.pool(rng)
+    x, status = _global(objective, pool[size < HOPEFUL * size[0]], [np.asarray(s, dtype=float) for s in starts])
     free = objective.result(x, status)
     held = _constrained(objective, pool, free)
     if held is not None and held.objective < free.objective:
@@ -208,8 +209,8 @@ class Objective:
             good = np.all((x >= self.low[:n]) & (x <= self.high[:n]), axis=1) & (s > 0) & np.isfinite(size)
         return x[good], size[good]
 
-    def pool(self, rng: np.random.Generator) -> Array:
-        """Rescaled draws (M, k), the best first: of the prior, of one that is wider, or of the bounds if need be."""
+    def pool(self, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Rescaled draws (M, k) and their |r| (M,), the best first: of the prior and of a wider one, or of the bounds."""
         n, k = self.hypothesis.material_size, self.hypothesis.curve_size
         prior = JointPrior(self.hypothesis).draw(rng, SCREENED + INFLATED)[:, :k]
         prior[SCREENED:] = self.centre + INFLATION * (prior[SCREENED:] - self.centre)
@@ -219,7 +220,8 @@ class Objective:
             if len(start):
                 # Draws of the effects are independent of those of the material: any of them will do.
                 start = np.concatenate([start, candidates[: len(start), n:]], axis=1)
-                return np.asarray(start[np.argsort(size, kind="stable")])
+                order = np.argsort(size, kind="stable")
+                return start[order], size[order]
         raise SettingsError(
             f"no {self.hypothesis.label()} film with admissible parameters reaches "
             f"{1e3 * np.max(self.measurement.deflection):g} mm",
@@ -236,7 +238,7 @@ class Objective:
         """Prior standard deviations (k,): the scale on which starts lie apart."""
         return np.array([float(p.prior.distribution().std()) for p in self.parameters])
 
-    def polish(self, x: Array, evaluations: int = MOST) -> tuple[Array, float, str]:
+    def polish(self, x: Array, evaluations: int = MOST, tolerance: float = 1e-8) -> tuple[Array, float, str]:
         """(x, |r|, status) after a trust-region search from x (k,)."""
         room = 1e-6 * (self.high - self.low)
         done = least_squares(
@@ -245,9 +247,9 @@ class Objective:
             jac=lambda x: self(x)[1],
             bounds=(self.low, self.high),
             x_scale="jac",
-            ftol=1e-11,
-            xtol=1e-11,
-            gtol=1e-13,
+            ftol=tolerance,
+            xtol=tolerance,
+            gtol=None,
             max_nfev=evaluations,
         )
         return done.x, float(np.sqrt(2 * done.cost)), "converged" if done.status > 0 else "evaluation limit"
@@ -323,13 +325,13 @@ def _covariance(r: Array, jacobian: Array, held: Array) -> Array:
 def _global(objective: Objective, pool: Array, published: list[Array]) -> tuple[Array, str]:
     """The best of all polished starts, (x, status)."""
     h = objective.hypothesis
-    starts = _apart(pool, objective.spread * APART, STARTED)
+    starts = apart(pool, objective.spread * APART, STARTED)
     for films in published:
         start = h.material.to_coordinates(h.material.from_vector(films).vector)
         if np.all(np.isfinite(start)):
             starts.append(np.concatenate([start, starts[0][h.material_size :]]))
-    first = sorted((objective.polish(s, FEW) for s in starts if np.all(np.isfinite(objective(s)[0]))), key=_size)
-    best = _apart(np.array([x for x, _, _ in first]), objective.spread * DISTINCT, POLISHED)
+    first = sorted((objective.polish(s, FEW, 1e-4) for s in starts if np.all(np.isfinite(objective(s)[0]))), key=_size)
+    best = apart(np.array([x for x, _, _ in first]), objective.spread * DISTINCT, POLISHED)
     best_x, _, status = min((objective.polish(b) for b in best), key=_size)
     return best_x, status
 
@@ -338,7 +340,7 @@ def _size(found: tuple[Array, float, str]) -> float:
     return found[1]
 
 
-def _apart(pool: Array, distance: Array, count: int) -> list[Array]:
+def apart(pool: Array, distance: Array, count: int) -> list[Array]:
     """The first ``count`` rows of pool (M, k) that lie further from each other than ``distance`` (k,)."""
     chosen: list[Array] = []
     for x in pool:
@@ -397,7 +399,7 @@ def _constrained_search(objective: Objective, start: Array) -> Array:
         method="SLSQP",
         bounds=list(zip(objective.low, objective.high, strict=True)),
         constraints={"type": "ineq", "fun": margins, "jac": margin_slopes},
-        options={"maxiter": 80, "ftol": 1e-10},
+        options={"maxiter": 50, "ftol": 1e-7},
     )
     return np.asarray(np.clip(done.x, objective.low, objective.high))
 

@@ -20,6 +20,7 @@ from bayesmembrane.inference.reconstruction_counts import (
     Found,
     best_counts,
     compare_counts,
+    search_again,
     search_counts,
     tell_counts,
 )
@@ -32,7 +33,7 @@ from bayesmembrane.mechanics.api import force_curve
 from bayesmembrane.parameters import Array
 
 # Scales of the errors, all equally probable beforehand; those in the middle are used where one setting must do.
-ROUGHNESS = (0.07, 0.14, 0.28)
+ROUGHNESS = (0.07, 0.14, 0.28, 0.56)
 NUGGET = 5e-3  # N: a load cell of a few kN resolves millinewtons
 ROUNDING = (5e-5, 1.5e-4, 4.5e-4)
 SOLVER = (3e-4, 7e-4, 1.6e-3)
@@ -43,7 +44,8 @@ def simulate_on(table: PublishedTable) -> Simulate:
     """The package's solver on the table's rig, as a function of material, parameters and deflections."""
 
     def simulate(material: str, parameters: Sequence[float], deflection: Array) -> Array:
-        return force_curve(material, parameters, deflection, table.inner_radius, table.outer_radius)[0]
+        force, _ = force_curve(material, parameters, deflection, table.inner_radius, table.outer_radius)
+        return force
 
     return simulate
 
@@ -68,6 +70,7 @@ def reconstruct(table: PublishedTable | None = None, simulate: Simulate | None =
     middle = knobs_at(ROUGHNESS[1], NUGGET, ROUNDING[1], (SOLVER[1],) * len(ranges))
     model = replace(model, counts=tuple(max(f, key=lambda n: f[n][0]) for f in searched))
     model = set_aside(model, find_mode(model, middle))[0]
+    searched = [search_again(model, r, ROUGHNESS[1], NUGGET, f) for r, f in enumerate(searched)]
     grid = knob_grid(ROUGHNESS[1:2], (NUGGET,), ROUNDING[1:2], SOLVER, len(ranges))
     compared = compare_counts(model, middle, searched, grid)
     model = replace(model, counts=best_counts(compared))
@@ -148,7 +151,7 @@ def _at_mode(model: Model, mode: Mode, draws: Draws) -> tuple[Array, Array]:
     return np.concatenate(forces), np.concatenate(firsts)
 
 
-# ---- what other assumptions would give ---------------------------------------------------------------------------------
+# ---- what other assumptions would give -------------------------------------------------------------------------------
 
 
 def _influence(model: Model, mode: Mode) -> tuple[Influence, ...]:
@@ -188,7 +191,8 @@ def _uncoupled(model: Model, mode: Mode, x: Array) -> Influence:
 def _moved(model: Model, mode: Mode, x: Array) -> Array:
     """(N,) forces of a mode at deflections x (1, N), moved along its smooth curve."""
     state = model.evaluate(mode.theta[None], mode.knobs)
-    return (state.force + model.smooth(mode.theta[None], mode.knobs, x)[0] - state.smooth)[0]
+    force: Array = (state.force + model.smooth(mode.theta[None], mode.knobs, x)[0] - state.smooth)[0]
+    return force
 
 
 def _scales(table: PublishedTable, modes: list[Mode]) -> dict[str, float]:

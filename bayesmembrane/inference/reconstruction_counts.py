@@ -30,9 +30,7 @@ def search_counts(model: Model, r: int, roughness: float, nugget: float) -> Foun
     found: Found = {}
     hopeless = 0
     for n in range(COUNTS[0], COUNTS[1] + 1):
-        trial = replace(model, ranges=(r,), counts=(n,))
-        modes = descend(trial, [knobs_at(roughness, nugget, s / 5, (s,)) for s in COARSE])
-        found[n] = _mean_evidence(modes), _first(trial, modes)[0]
+        found[n] = _count(model, r, n, roughness, nugget)
         best = max(found, key=lambda k: found[k][0])
         hopeless = hopeless + 1 if found[n][0] < found[best][0] - HOPELESS else 0
         if hopeless >= PATIENCE and n > best + PATIENCE:
@@ -40,14 +38,35 @@ def search_counts(model: Model, r: int, roughness: float, nugget: float) -> Foun
     return found
 
 
+def search_again(model: Model, r: int, roughness: float, nugget: float, found: Found) -> Found:
+    """The likely numbers of an earlier search, for a model that believes fewer rows; the others fall back as they did.
+
+    A wrong row raises the errors that a search has to allow for, and so makes wrong numbers look possible.
+    """
+    likely = _likely(found)
+    new = {n: _count(model, r, n, roughness, nugget) for n in likely}
+    shift = max(e for e, _ in new.values()) - max(found[n][0] for n in likely)
+    return {n: new[n] if n in new else (e + shift, a) for n, (e, a) in found.items()}
+
+
+def _count(model: Model, r: int, n: int, roughness: float, nugget: float) -> tuple[float, float]:
+    trial = replace(model, ranges=(r,), counts=(n,))
+    modes = descend(trial, [knobs_at(roughness, nugget, s / 5, (s,)) for s in COARSE])
+    return _mean_evidence(modes), _first(trial, modes)[0]
+
+
+def _likely(found: Found) -> list[int]:
+    top = max(e for e, _ in found.values())
+    return [n for n, (e, _) in found.items() if e > top - CANDIDATE]
+
+
 def compare_counts(model: Model, knobs: Knobs, searched: list[Found], grid: list[Knobs]) -> Compared:
     """The likely numbers of points of all ranges together.
 
     The ranges sample one curve, so what one says about the curve helps to count the points of the other.
     """
-    likely = [[n for n, (e, _) in f.items() if e > max(v for v, _ in f.values()) - CANDIDATE] for f in searched]
     compared: Compared = {}
-    for counts in product(*likely):
+    for counts in product(*(_likely(f) for f in searched)):
         trial = replace(model, counts=counts)
         modes = scan(trial, grid, find_mode(trial, knobs))
         compared[counts] = _mean_evidence(modes), _first(trial, modes)

@@ -15,7 +15,7 @@ from bayesmembrane.parameters import Array
 LOOSEN = (64.0, 16.0, 4.0, 1.0)  # errors are first taken as larger than they are: the way to the mode is then smooth
 ROUNDS = 8
 MOST_STEPS = 80
-LEAST_GAIN = 1e-4
+LEAST_GAIN, ROUGH_GAIN = 1e-4, 1e-2  # gain of the log posterior at which a mode is found, and nearly found
 SHARES = (0.3, 0.05, 0.8)  # first positions, in parts of the largest, from which the mode is looked for
 STEP, LEAPS = 0.2, 20  # first Hamiltonian step in units of the posterior's own scales, and most steps per draw
 WARM_UP = 40
@@ -42,7 +42,7 @@ class Mode(NamedTuple):
 
     def covariance(self) -> Array:
         """(P, P) covariance of the unknowns in Laplace's approximation."""
-        return np.linalg.inv(self.precision)
+        return np.asarray(np.linalg.inv(self.precision), dtype=float)
 
 
 def knobs_at(roughness: float, nugget: float, rounding: float, solver: tuple[float, ...]) -> Knobs:
@@ -56,10 +56,11 @@ def find_mode(model: Model, knobs: Knobs) -> Mode:
     for share in SHARES:
         theta = trilaterate(model, knobs, np.full(len(model.ranges), share))
         for loosen in LOOSEN:
-            mode = _climb(model, theta, knobs, loosen)
+            mode = _climb(model, theta, knobs, loosen, ROUGH_GAIN)
             theta = mode.theta
         found.append(mode)
-    return max(found, key=lambda m: m.value)
+    best = max(found, key=lambda m: m.value)
+    return _climb(model, best.theta, knobs)
 
 
 def descend(model: Model, knobs: list[Knobs]) -> list[Mode]:
@@ -69,7 +70,7 @@ def descend(model: Model, knobs: list[Knobs]) -> list[Mode]:
         theta = trilaterate(model, knobs[0], np.full(len(model.ranges), share))
         path: list[Mode] = []
         for k in knobs:
-            path.append(_climb(model, _restart(path[-1], k) if path else theta, k, 1.0))
+            path.append(_climb(model, _restart(path[-1], k) if path else theta, k, least=ROUGH_GAIN))
         found.append(path)
     return [max(at, key=lambda m: m.value) for at in zip(*found, strict=True)]
 
@@ -116,65 +117,70 @@ def _robust_lines(a: Array, b: Array, believed: Array, priors: int, tail: float)
     prior = np.concatenate([np.ones(priors), np.full(a.shape[1] - priors, 1e-12)])
     weight = believed
     for _ in range(ROUNDS):
-        s: Array = np.linalg.solve((a.T * weight) @ a + np.diag(prior), a.T @ (weight * b))
+        s = np.asarray(np.linalg.solve((a.T * weight) @ a + np.diag(prior), a.T @ (weight * b)), dtype=float)
         weight = believed * (tail + 1) / (tail + (a @ s - b) ** 2)
     return s
 
 
-def _climb(model: Model, theta: Array, knobs: Knobs, loosen: float) -> Mode:
+def _climb(model: Model, theta: Array, knobs: Knobs, loosen: float = 1.0, least: float = LEAST_GAIN) -> Mode:
     """Damped Gauss-Newton from ``theta``; every step raises the posterior density, or it is the last."""
-    value = _value(model, theta, knobs, loosen)
+    here = _look(model, theta, knobs, loosen)
     damping = 1e-3
-    precision, gradient = _curvature(model, theta, knobs, loosen)
     for _ in range(MOST_STEPS):
+        gain = 0.0
         for _ in range(15):
-            step = np.linalg.solve(precision + damping * np.diag(np.diag(precision)), gradient)
+            step = np.linalg.solve(here.precision + damping * np.diag(np.diag(here.precision)), here.gradient)
             step = step / max(1.0, float(np.max(np.abs(step[-len(model.ranges) :]))))
-            trial = _value(model, theta + step, knobs, loosen)
-            if trial > value:
+            there = _look(model, here.theta + step, knobs, loosen)
+            gain = there.value - here.value
+            if gain > 0:
                 break
             damping = max(damping, 1e-7) * 5
-        else:
+        if gain <= 0:
             break
-        theta, gain, value = theta + step, trial - value, trial
-        damping = max(damping / 10, 1e-10)
-        precision, gradient = _curvature(model, theta, knobs, loosen)
-        if gain < LEAST_GAIN:
+        here, damping = there, max(damping / 10, 1e-10)
+        if gain < least:
             break
-    evidence = value + 0.5 * theta.size * np.log(2 * np.pi) - 0.5 * float(np.linalg.slogdet(precision)[1])
-    return Mode(theta, value, precision, evidence, knobs)
+    spread = 0.5 * theta.size * np.log(2 * np.pi) - 0.5 * float(np.linalg.slogdet(here.precision)[1])
+    return Mode(here.theta, here.value, here.precision, here.value + spread, knobs)
 
 
-def _value(model: Model, theta: Array, knobs: Knobs, loosen: float) -> float:
+class _Place(NamedTuple):
+    """Unknowns, log posterior (-inf where there is none), its gradient, and its negative curvature."""
+
+    theta: Array
+    value: float
+    gradient: Array
+    precision: Array
+
+
+def _look(model: Model, theta: Array, knobs: Knobs, loosen: float) -> _Place:
     with np.errstate(all="ignore"):
-        value = float(model.log_posterior(theta[None], knobs, loosen)[0][0])
-    return value if np.isfinite(value) else -np.inf
-
-
-def _curvature(model: Model, theta: Array, knobs: Knobs, loosen: float) -> tuple[Array, Array]:
-    """Negative curvature (P, P) and gradient (P,) of the log posterior."""
-    state = model.evaluate(theta[None], knobs)
+        state = model.evaluate(theta[None], knobs)
+        values, gradients = model.log_density(theta[None], state, knobs, loosen)
+    value, gradient = float(values[0]), gradients[0]
+    if not (np.isfinite(value) and np.all(np.isfinite(gradient))):
+        return _Place(theta, -np.inf, gradient, np.eye(theta.size))
     scale = model.error_scale(knobs, 1)[0] * loosen
     weight = model.weights(state.residual / scale)[0][0] / scale**2
-    jacobian = state.jacobian[0]
     share = expit(theta[-len(model.ranges) :])
     prior = np.concatenate([np.ones(theta.size - share.size), 2 * share * (1 - share)])
-    gradient = model.log_prior(theta[None])[1][0] - jacobian.T @ (weight * state.residual[0])
-    return (jacobian.T * weight) @ jacobian + np.diag(prior), gradient
+    precision = (state.jacobian[0].T * weight) @ state.jacobian[0] + np.diag(prior)
+    return _Place(theta, value, gradient, precision)
 
 
-# ---- scales that are not known beforehand ------------------------------------------------------------------------------
+# ---- scales that are not known beforehand ----------------------------------------------------------------------------
 
 
 def scan(model: Model, grid: list[Knobs], start: Mode) -> list[Mode]:
     """The modes at all settings of the scales, each from ``start``."""
-    return [_climb(model, _restart(start, knobs), knobs, 1.0) for knobs in grid]
+    return [_climb(model, _restart(start, knobs), knobs) for knobs in grid]
 
 
 def again(model: Model, mode: Mode, knobs: Knobs | None = None) -> Mode:
     """The mode of a model that differs a little from the one that ``mode`` belongs to, or at other scales."""
     knobs = mode.knobs if knobs is None else knobs
-    return _climb(model, _restart(mode, knobs), knobs, 1.0)
+    return _climb(model, _restart(mode, knobs), knobs)
 
 
 def _restart(mode: Mode, knobs: Knobs) -> Array:
@@ -195,7 +201,7 @@ def knob_grid(
     return [knobs_at(r, g, q, s) for r, g, q, s in product(roughness, nugget, rounding, product(solver, repeat=ranges))]
 
 
-# ---- draws -------------------------------------------------------------------------------------------------------------
+# ---- draws -----------------------------------------------------------------------------------------------------------
 
 
 class Draws(NamedTuple):

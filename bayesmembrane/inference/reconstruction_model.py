@@ -4,12 +4,11 @@
 
 k counts the rows of the published table, r its ranges; F_0 is the simulated curve of the first row. The logarithm u of
 the measured over that reference is one smooth curve for all ranges: a straight line plus an integrated Wiener process
-in the deflection, in its Karhunen-Loève form. error_k is the
-numerical error of the published simulations: shared by rows whose curves are equal up to a factor (neo-Hookean rows),
-since it does not depend on the factor. error_kr, what else is wrong with a simulation or a print, has heavy tails: it is
-a vector of Student t, one for each material and range, since what makes a material hard to simulate is common to its
-rows. Everything unknown is one vector of numbers with independent standard
-normal priors: what follows is a nonlinear least-squares problem with heavy tails. Only the first positions a_r differ:
+in the deflection, in its Karhunen-Loève form. error_k is the numerical error of the published simulations: shared by
+rows whose curves are equal up to a factor (neo-Hookean rows), since it does not depend on the factor. error_kr, what
+else is wrong with a simulation or a print, has heavy tails: a Student t vector for each material and range, since what
+makes a material hard to simulate is common to its rows. Everything unknown is one vector of numbers with independent
+standard normal priors: the mode is that of a robust least-squares problem. Only the first positions a_r differ:
 they follow one recipe, uniform between zero and a largest one that is common to the ranges and unknown (ln uniform,
 not below the recording step s), in the smooth form p(a) ~ (s^4 + sum_r a_r^4)^(-R/4), and at most one spacing.
 """
@@ -101,7 +100,10 @@ class Simulations:
 
 
 def tabulate(table: PublishedTable, simulate: Simulate) -> Simulations:
-    """Simulate every row once on a fine grid up to the largest end; raises `DataError` if the first row has no curve."""
+    """Simulate every row once on a fine grid up to the largest end.
+
+    Raises `DataError` if the first row has no curve there: the others are told relative to it.
+    """
     top = max(table.ends)
     x = np.concatenate([[NEAREST, 0.1e-3, 0.15e-3, 0.2e-3], np.arange(STEP, top, STEP), [top]])
     force = np.array([simulate(row.material, row.values, x) for row in table.rows])
@@ -206,7 +208,7 @@ class Model:
         use[row] = False
         return replace(self, use=use)
 
-    # ---- layout of the unknowns: u | nugget | family errors | first positions ------------------------------------------
+    # ---- layout of the unknowns: u | nugget | family errors | first positions ----------------------------------------
 
     @property
     def points(self) -> int:
@@ -243,7 +245,7 @@ class Model:
         x = [end - (end - first[:, [i]]) * w for i, (end, w) in enumerate(zip(ends, weight, strict=True))]
         return np.concatenate(x, axis=1), first, first * (1 - share), np.concatenate(weight)
 
-    # ---- the posterior -------------------------------------------------------------------------------------------------
+    # ---- the posterior -----------------------------------------------------------------------------------------------
 
     def smooth(self, theta: Array, knobs: Knobs, x: Array) -> tuple[Array, Array, Array]:
         """Smooth force (B, N) at x (B, N), its slope in N/m, and its derivatives (B, N, J) in the first unknowns."""
@@ -301,7 +303,10 @@ class Model:
 
     def log_posterior(self, theta: Array, knobs: Knobs, loosen: float = 1.0) -> tuple[Array, Array]:
         """ln p(losses, theta) (B,) and its gradient (B, P); normalised in the losses."""
-        state = self.evaluate(theta, knobs)
+        return self.log_density(theta, self.evaluate(theta, knobs), knobs, loosen)
+
+    def log_density(self, theta: Array, state: State, knobs: Knobs, loosen: float) -> tuple[Array, Array]:
+        """As `log_posterior`, from what the unknowns mean; ``loosen`` multiplies the errors."""
         scale = self.error_scale(knobs, theta.shape[0]) * loosen
         z = state.residual / scale
         weight, size, total = self.weights(z)

@@ -130,13 +130,13 @@ def set_aside(model: Model, mode: Mode) -> tuple[Model, Mode]:
     return model, mode
 
 
-# ---- corrections -------------------------------------------------------------------------------------------------------
+# ---- corrections -----------------------------------------------------------------------------------------------------
 
 
 def suspect(table: PublishedTable, model: Model, mode: Mode, check: RowCheck, simulate: Simulate) -> Suspect:
     """What the row would have to say, by its smallest corrections: one parameter or loss, then several losses."""
     row = table.rows[check.index]
-    sets = [(c,) for c in _parameter_corrections(row, model, mode, check, simulate)]
+    sets: list[tuple[Correction, ...]] = [(c,) for c in _parameter_corrections(row, model, mode, check, simulate)]
     losses = _loss_corrections(table, row, check)
     sets = sorted([*sets, losses] if losses else sets, key=lambda s: (len(s), _edits(s)))
     return Suspect(
@@ -182,9 +182,12 @@ def _parameter_corrections(row: Row, model: Model, mode: Mode, check: RowCheck, 
         miss = (np.array(gap) - row.loss[list(model.ranges)]) / check.sd
         return np.where(np.isfinite(miss), miss, np.inf)
 
+    def miss_of(j: int) -> Callable[[float], Array]:
+        return lambda value: miss([*row.values[:j], value, *row.values[j + 1 :]])
+
     found = []
     for j, name in enumerate(row.names):
-        best = _best_value(lambda v, j=j: miss([*row.values[:j], v, *row.values[j + 1 :]]), row.values[j])
+        best = _best_value(miss_of(j), row.values[j])
         if best is not None:
             found.append(Correction(name, row.parameters[j], _shortest(*best), *best))
     return found
@@ -195,6 +198,8 @@ def _best_value(miss: Callable[[float], Array], printed: float) -> tuple[float, 
 
     The misses are far from linear over the range of values tried, so every dip of their interpolant is followed up.
     """
+    if printed == 0:
+        return None
     values = np.sort(printed * FACTORS)
     misses = np.array([miss(float(v)) for v in values])
     good = np.all(np.isfinite(misses), axis=1)
@@ -213,15 +218,17 @@ def _refine(miss: Callable[[float], Array], value: float, scale: float) -> tuple
     """Gauss-Newton on one parameter: the value and its standard deviation."""
     step, slope = 1e-5 * scale, np.ones(1)
     for _ in range(30):
-        base = miss(value)
-        slope = (miss(value + step) - base) / step
-        if not np.all(np.isfinite(slope)) or not np.any(slope):
+        base, ahead = miss(value), miss(value + step)
+        if not (np.all(np.isfinite(base)) and np.all(np.isfinite(ahead))):
+            break
+        slope = (ahead - base) / step
+        if not np.any(slope):
             break
         change = -float(slope @ base) / float(slope @ slope)
         value += float(np.clip(change, -0.02 * scale, 0.02 * scale))
         if abs(change) < 1e-8 * scale:
             break
-    return value, 1.0 / float(np.linalg.norm(slope))
+    return value, 1.0 / max(float(np.linalg.norm(slope)), 1e-300)
 
 
 def _shortest(best: float, sd: float) -> float:

@@ -11,8 +11,9 @@ from __future__ import annotations
 import hashlib
 import inspect
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
@@ -21,6 +22,8 @@ import numba
 from bayesmembrane.materials.base import Material
 
 OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "arcp"}}
+# numba watches the file of a kernel, not those it borrows from: their texts go into its name.
+BORROWED = ("simd.py",)
 
 
 @cache
@@ -30,30 +33,24 @@ def bind(kernels: tuple[Callable[..., Any], ...], material: type[Material], **co
     Returns a namespace with the compiled functions under their own names. ``constants`` replace module globals of the
     same name.
     """
-    source = material.source_text() + "".join(inspect.getsource(k) for k in kernels) + repr(sorted(constants.items()))
+    borrowed = [Path(__file__).with_name(name).read_text(encoding="utf-8") for name in BORROWED]
+    parts = [material.source_text(), *map(inspect.getsource, kernels), repr(sorted(constants.items())), *borrowed]
+    source = "".join(parts)
     tag = f"{material.__qualname__}_{hashlib.sha256(source.encode()).hexdigest()[:10]}"
     physics = (material.derivatives, material.sensitivities)
     namespace: dict[str, Any] = {}
     for kernel in kernels:
         namespace.update(vars(sys.modules[kernel.__module__]))
     # The material's module may use its own imports (np, math): its functions keep their own globals.
-    namespace.update({f.__name__: _compile(f, f.__globals__, tag, inline=True) for f in physics}, **constants)
+    namespace.update({f.__name__: _compile(f, f.__globals__, tag) for f in physics}, **constants)
     compiled = {}
     for kernel in kernels:
-        compiled[kernel.__name__] = namespace[kernel.__name__] = _compile(kernel, namespace, tag, inline=False)
+        compiled[kernel.__name__] = namespace[kernel.__name__] = _compile(kernel, namespace, tag)
     return SimpleNamespace(**compiled)
 
 
-def _compile(function: Any, namespace: dict[str, Any], tag: str, inline: bool) -> Any:
+def _compile(function: Any, namespace: dict[str, Any], tag: str) -> Any:
     copy = FunctionType(function.__code__, namespace, f"{function.__name__}_{tag}", function.__defaults__)
     copy.__qualname__ = copy.__name__
     copy.__module__ = function.__module__
     return numba.njit(copy, **OPTIONS)
-
-
-def lanes_of(array_length: int, lanes: int) -> int:
-    """Number of lane blocks that hold ``array_length`` walkers."""
-    return -(-array_length // lanes)
-
-
-__all__: Sequence[str] = ("bind",)

@@ -15,11 +15,11 @@ from bayesmembrane.mechanics import ritz_kernels as kernels
 from bayesmembrane.mechanics.compiled import bind
 from bayesmembrane.mechanics.locking import locking_deflection
 from bayesmembrane.mechanics.problem import Problem, extensibility
+from bayesmembrane.mechanics.simd import LANES
 from bayesmembrane.mechanics.solution import Curves, Note, Status
 from bayesmembrane.parameters import Array
 
-LANES = kernels.LANES
-# Elements x bubbles per element, tried in this order until R P1 sin(theta) is even enough.
+# Elements x bubbles per element: every basis contains those before it.
 LEVELS = ((1, 6), (2, 6), (4, 7), (8, 8), (24, 8))
 # A force is exact to 1e-6 while the next bubbles would release less than this part of F delta (measured: the error is
 # at most a hundred times the gain, over draws from the priors of all materials), and the first integral is even.
@@ -27,9 +27,12 @@ GAIN_LIMIT = 2e-9
 VARIATION_LIMIT = 5e-4
 TOLERANCE = 1e-11
 MOST_ITERATIONS = 40
+LIMITS = (MOST_ITERATIONS, TOLERANCE, GAIN_LIMIT, VARIATION_LIMIT)
 # Largest step of the continuation in asinh(d), and the first deflection reached from the flat film.
 STRIDE = 0.8
 FIRST = 0.4
+# A film that is not deflected has a stiffness: it is looked at this far up (scaled).
+SMALLEST = 1e-4
 # The end of a path is searched in two sweeps of this many deflections, and believed if two bases agree to this part.
 SEARCH = 16
 SAME_END = 0.02
@@ -83,19 +86,29 @@ def _next_bubbles(lengths: Array, nodes: Array, bubbles: int, growth: Array) -> 
     return extra
 
 
+@cache
+def _prolongation(ratio: float, level: int) -> Array:
+    """(n', n) : the functions of one level, n, as sums of those of the next, n'."""
+    span = np.log(ratio)
+    elements, bubbles = LEVELS[level + 1]
+    points = np.linspace(0, span, 4 * elements * (bubbles + 2) + 1)
+    new, old = (_shape_functions(ratio, *LEVELS[k], points)[0] for k in (level + 1, level))
+    return np.asarray(np.linalg.lstsq(new.T, old.T)[0])
+
+
 def shape(problem: Problem, t: Array) -> tuple[Array, Array, Array, Array]:
     """(l2, u, w, h) of the first film at its first deflection, at t = ln(R/R1) (M,).
 
     u = l1 cos(theta), w = l1 sin(theta), and the rise h from the disc outwards in units of R1/l0. nan if unresolved.
     """
     one = replace(problem, parameters=problem.parameters[:1], prestretch=problem.prestretch[:1])
-    d = np.maximum(problem.scaled[:1, :1], 1e-4)
+    d = np.maximum(problem.scaled[:1, :1], SMALLEST)
     for level, (elements, bubbles) in enumerate(LEVELS):
-        result, _, trace = follow(one, d, level, STRIDE / 2**level, False, trace=True)
-        if judge(result, d.T)[0, 0] == Status.OK:
+        result, unknowns = follow(one, d, level, wishes=(False, True, False))
+        if result[0, kernels.STATUS, 0] == Status.OK:
             span, l0 = np.log(problem.ratio), problem.prestretch[0]
             phi, slope = _shape_functions(problem.ratio, elements, bubbles, t)
-            a, b = trace[0, 0::2, 0], trace[0, 1::2, 0]
+            a, b = unknowns[0, 0::2, 0], unknowns[0, 1::2, 0]
             l2 = l0 + a @ phi
             return l2, l2 + a @ slope, np.exp(-t) * (d[0, 0] / span + b @ slope), d[0, 0] * t / span + b @ phi
     gap = np.full(t.shape, np.nan)
@@ -140,88 +153,76 @@ def _bubbles(x: Array, count: int) -> tuple[Array, Array]:
 @cache
 def compiled(material: type[Material]) -> Any:
     """The kernels of one material."""
-    k = kernels
-    chain = (k.states, k.assemble, k.factorise, k.backsolve, k.predict, k.examine, k.energy_gain, k.force_sensitivity, k.decide, k.follow)
-    return bind(chain, material, FIELDS=(0.0,) * len(material.field_names()))
+    return bind(kernels.KERNELS, material, FIELDS=(0.0,) * len(material.field_names()))
 
 
-@dataclass(frozen=True)
-class _Path:
-    """Continuation of B films: the deflections asked for, in ascending order, and helpers in between.
+def _path(d: Array, stride: float) -> tuple[Array, NDArray[np.bool_]]:
+    """From the flat film through ascending scaled deflections d (B, N) > 0, in steps of ``stride`` in asinh(d).
 
-    grid : (M, B) ascending scaled deflections
-    keep : (M,) True for those that were asked for
+    Returns deflections (M, B), and a mask (M,) of those that were asked for.
     """
-
-    grid: Array
-    keep: NDArray[np.bool_]
-
-
-def _path(d: Array, stride: float) -> _Path:
-    """From the flat film through the sorted scaled deflections d (B, N) > 0, in steps of ``stride`` in asinh(d)."""
-    x = np.arcsinh(d)
-    rows, keep = [], []
-    previous = np.minimum(np.arcsinh(FIRST), x[:, 0])
-    if np.any(previous < x[:, 0]):
-        rows.append(previous)
-        keep.append(False)
-    for i in range(x.shape[1]):
-        gap = x[:, i] - previous
-        steps = max(1, int(np.ceil(np.max(gap) / stride))) if rows else 1
-        for s in range(1, steps + 1):
-            rows.append(previous + gap * s / steps)
-            keep.append(s == steps)
-        previous = x[:, i]
-    return _Path(np.sinh(np.array(rows)), np.array(keep))
+    x = np.arcsinh(d.T)
+    start = np.minimum(np.arcsinh(FIRST), x[:1])
+    before = np.concatenate([start, x[:-1]])
+    gap = x - before
+    steps = np.maximum(np.ceil(np.max(gap, axis=1) / stride), 1).astype(int)
+    lead = bool(np.any(gap[0] > 0))
+    if not lead:
+        steps[0] = 1
+    home = np.repeat(np.arange(len(x)), steps)
+    part = np.arange(home.size) - np.repeat(np.cumsum(steps) - steps, steps) + 1
+    keep = part == steps[home]
+    grid = d.T[home]
+    grid[~keep] = np.sinh(before[home] + gap[home] * (part / steps[home])[:, None])[~keep]
+    if lead:
+        return np.concatenate([np.sinh(start), grid]), np.concatenate([[False], keep])
+    return grid, keep
 
 
 def follow(
-    problem: Problem, d: Array, level: int, stride: float, sensitivities: bool, trace: bool = False
-) -> tuple[Array, Array, Array]:
-    """Run the kernels over all films in blocks of `LANES`.
+    problem: Problem, d: Array, level: int, wishes: tuple[bool, bool, bool] = (False, False, False)
+) -> tuple[Array, Array]:
+    """Continue B films from the flat film through ascending scaled deflections d (B, N).
 
-    d (B, N) are ascending scaled deflections. Returns results (N, 12, B), sensitivities (N, n, B) and unknowns
-    (N, 2 functions, B), all scaled; the last two are empty if not asked for.
+    wishes : sensitivities, unknowns everywhere, unknowns of unresolved states
+    Returns results (B, rows, N) and unknowns (B, 2 functions, N), or (B, 2 functions, 0) if not wished for, see
+    `ritz_kernels.follow`.
     """
-    k, material, count = kernels, problem.material, problem.parameters.shape[0]
-    shape = basis(problem.ratio, *LEVELS[level])
-    path = _path(d, stride)
-    blocks = -(-count // LANES)
+    grid, keep = _path(d, STRIDE / 2**level)
+    start = np.zeros((d.shape[0], 2 * basis(problem.ratio, *LEVELS[level]).functions))
+    return _run(problem, grid, keep, start, level, wishes)
+
+
+def _run(
+    problem: Problem, grid: Array, keep: NDArray[np.bool_], start: Array, level: int, wishes: tuple[bool, bool, bool]
+) -> tuple[Array, Array]:
+    """`kernels.follow` over deflections grid (M, B) from unknowns start (B, 2n)."""
+    shape, count, fields = basis(problem.ratio, *LEVELS[level]), grid.shape[1], problem.parameters.shape[1]
+    blocks, n = -(-count // LANES), int(np.count_nonzero(keep))
     pad = np.minimum(np.arange(blocks * LANES), count - 1)
-    p, l0, grid = problem.parameters[pad].T, problem.prestretch[pad], path.grid[:, pad]
-    gd = np.broadcast_to(np.asarray(material.shear_modulus(p), dtype=float), l0.shape)
-    fields, m, wanted = p.shape[0], path.grid.shape[0], int(path.keep.sum())
-    result = np.empty((wanted, k.RESULTS, blocks * LANES))
-    sens = np.empty((wanted if sensitivities else 0, fields, blocks * LANES))
-    states = np.empty((wanted if trace else 0, 2 * shape.functions, blocks * LANES))
-    run = compiled(material).follow
-    out, out_sens = np.empty((k.RESULTS * m, LANES)), np.empty((fields * m if sensitivities else 0, LANES))
-    out_trace = np.empty((2 * shape.functions * m if trace else 0, LANES))
-    for block in range(blocks):
-        at = slice(block * LANES, (block + 1) * LANES)
-        rows = (np.ascontiguousarray(v) for v in (p[:, at], gd[None, at], l0[None, at], grid[:, at]))
-        q = np.zeros((2 * shape.functions, LANES))
-        run(*rows, q, shape.tables, MOST_ITERATIONS, TOLERANCE, sensitivities, path.keep, out, out_sens, out_trace)
-        result[..., at] = out.reshape(m, k.RESULTS, LANES)[path.keep]
-        if sensitivities:
-            sens[..., at] = out_sens.reshape(m, fields, LANES)[path.keep]
-        if trace:
-            states[..., at] = out_trace.reshape(m, -1, LANES)[path.keep]
-    return result[..., :count], sens[..., :count], states[..., :count]
+
+    def blocked(rows: Array) -> Array:
+        """(R, B) -> (blocks, R, LANES), the last film repeated."""
+        return np.ascontiguousarray(rows[:, pad].reshape(len(rows), blocks, LANES).transpose(1, 0, 2))
+
+    gd = np.broadcast_to(_shear_modulus(problem), (1, count))
+    result = np.empty((blocks, LANES, kernels.RESULTS + (fields if wishes[0] else 0), n))
+    unknowns = np.empty((blocks, LANES, 2 * shape.functions, n if any(wishes[1:]) else 0))
+    rows = (blocked(v) for v in (problem.parameters.T, gd, problem.prestretch[None], grid, start.T))
+    compiled(problem.material).follow(*rows, shape.tables, LIMITS, keep, wishes, result, unknowns)
+    padded = blocks * LANES
+    return (
+        result.reshape(padded, *result.shape[2:])[:count],
+        unknowns.reshape(padded, *unknowns.shape[2:])[:count],
+    )
 
 
-def judge(result: Array, d: Array) -> NDArray[np.int8]:
-    """Status codes (N, B) of kernel results (N, rows, B) at ascending scaled deflections d (N, B)."""
-    k = kernels
-    status = result[:, k.STATUS].astype(np.int8)
-    # Bubbles judge each on its own; where the film is about to soften without bound they see less of what is missing.
-    strict = np.clip(result[:, k.ELLIPTIC], 1e-3, 1.0)
-    rough = ~(result[:, k.GAIN] <= GAIN_LIMIT * strict * np.abs(result[:, k.FORCE] * d))
-    rough |= ~(result[:, k.VARIATION] <= VARIATION_LIMIT)
-    status[(status == Status.OK) & rough] = Status.UNRESOLVED
-    converged = status != Status.ITERATION_LIMIT
-    status[converged & ~(result[:, k.LEAST_P11] > 0)] = Status.NOT_ELLIPTIC
-    return status
+def _shear_modulus(problem: Problem) -> Array:
+    return np.asarray(problem.material.shear_modulus(problem.parameters.T), dtype=float)
+
+
+def _films(problem: Problem, films: NDArray[np.intp]) -> Problem:
+    return replace(problem, parameters=problem.parameters[films], prestretch=problem.prestretch[films])
 
 
 def solve(problem: Problem, sensitivities: bool = False) -> Curves:
@@ -229,40 +230,121 @@ def solve(problem: Problem, sensitivities: bool = False) -> Curves:
 
         F = dE/d(delta),  E(delta) = min over the deformation of 2 pi int R^2 W dt.
 
-    Every film is first tried with six polynomials over the whole width; films whose next polynomials would still
-    release energy, or that did not converge, are tried again with more and shorter elements and shorter continuation
-    steps. A path that ends at the same deflection for two bases ends physically, and is given its reason; what is left
-    is flagged.
+    Every film is first followed with six polynomials over the whole width. States whose next polynomials would still
+    release energy are refined, each from its own solution, with more and shorter elements; films whose path was lost
+    are followed again with these and with shorter steps. A path that ends at the same deflection for two bases ends
+    physically, and is given its reason; what is left is flagged.
     """
-    sign = np.sign(problem.deflection)
-    d, back = _ascending(np.where(sign == 0, 1e-4, problem.scaled))
-    locked = d >= locking_deflection(extensibility(problem), problem.prestretch, problem.ratio)[:, None]
-    # A locked deflection is replaced by the last one that can be reached; its answer is not used.
-    reach = np.max(np.where(locked, 0.0, d), axis=1, keepdims=True)
-    d = np.where(locked, np.where(reach > 0, reach, 1e-3), d)
-    count, n = d.shape
-    result = np.full((n, kernels.RESULTS, count), np.nan)
-    sens = np.full((n, problem.parameters.shape[1], count), np.nan) if sensitivities else np.empty((0, 0, count))
-    status = np.full((n, count), Status.ITERATION_LIMIT, np.int8)
-    ends, todo = np.full(count, np.nan), np.arange(count)
-    for level in range(len(LEVELS)):
-        part = replace(problem, parameters=problem.parameters[todo], prestretch=problem.prestretch[todo])
-        new, new_sens, _ = follow(part, d[todo], level, STRIDE / 2**level, sensitivities)
-        verdict, before = judge(new, d[todo].T), status[:, todo]
-        ends[todo] = _explain_lost(part, d[todo], verdict, ends[todo], level)
-        better = (before != Status.OK) & ~(_named(before) & ~_named(verdict) & (verdict != Status.OK))
-        result[:, :, todo] = np.where(better[:, None], new, result[:, :, todo])
-        if sensitivities:
-            sens[..., todo] = np.where(better[:, None], new_sens, sens[..., todo])
-        status[:, todo] = np.where(better, verdict, before)
-        # The loss of ellipticity is believed when a finer basis confirms it.
-        unsettled = (status[:, todo] != Status.OK) & (~_named(status[:, todo]) | (level == 0))
-        todo = todo[np.any(unsettled & ~locked[todo].T, axis=0)]
-        if todo.size == 0:
+    d, back = _ascending(np.where(problem.deflection == 0, SMALLEST, problem.scaled))
+    bound = extensibility(problem)
+    locked = np.zeros(d.shape, np.bool_)
+    if np.any(bound < np.inf):
+        locked = d >= locking_deflection(bound, problem.prestretch, problem.ratio)[:, None]
+        # A locked deflection is replaced by the last one that can be reached; its answer is not used.
+        reach = np.max(np.where(locked, 0.0, d), axis=1, keepdims=True)
+        d = np.where(locked, np.where(reach > 0, reach, 1e-3), d)
+    search = _Search(problem, d, ~locked, sensitivities)
+    for level in range(1, len(LEVELS)):
+        if search.settled:
             break
-    _pass_on(status)
-    status[locked.T] = Status.LOCKED
-    return _curves(problem, result, sens if sensitivities else None, status, back, sign)
+        search.improve(level)
+    _pass_on(search.status)
+    search.status[locked] = Status.LOCKED
+    return _curves(problem, search, back)
+
+
+_Rough = tuple[NDArray[np.intp], NDArray[np.intp], Array]
+
+
+class _Search:
+    """What is known of B films at N ascending scaled deflections d (B, N), and how to know more.
+
+    Attributes
+    ----------
+    wanted : (B, N) True where an answer is wanted
+    result, status : (B, rows, N) and (B, N) `Status` codes
+    rough : (film, column, unknowns) of the states to be refined: (K,), (K,), and (K, 2 functions) of the last basis
+    ends : (B,) scaled deflection at which the path was lost with the last basis, nan if it was not
+    """
+
+    def __init__(self, problem: Problem, d: Array, wanted: NDArray[np.bool_], sensitivities: bool) -> None:
+        self.problem, self.d, self.wanted = problem, d, wanted
+        self.wishes = sensitivities, False, True
+        self.result, unknowns = follow(problem, d, 0, self.wishes)
+        self.status = self.result[:, kernels.STATUS].astype(np.int8)
+        self.ends = np.full(len(d), np.nan)
+        self._explain(np.arange(len(d)), self.status, 0)
+        film, column = np.nonzero((self.status == Status.UNRESOLVED) & wanted)
+        self.rough: _Rough = film, column, unknowns[film, :, column]
+
+    @property
+    def settled(self) -> bool:
+        """True if a finer basis has nothing to do."""
+        return not np.any(self.wanted & (self.status != Status.OK))
+
+    def improve(self, level: int) -> None:
+        """One level up: refine the rough states, and follow again the films whose path was lost."""
+        doubtful = self.status == Status.ITERATION_LIMIT
+        if level == 1:
+            # The loss of stability is believed when a finer basis confirms it.
+            doubtful |= (self.status == Status.NOT_ELLIPTIC) | (self.status == Status.INDEFINITE)
+        doubtful &= self.wanted
+        films = np.flatnonzero(np.any(doubtful, axis=1))
+        parts = [self._refine(level), self._follow(level, films, doubtful[films])]
+        film, column, unknowns = (np.concatenate(v) for v in zip(*parts, strict=True))
+        self.rough = film, column, unknowns
+
+    def _refine(self, level: int) -> _Rough:
+        """Each rough state from its own solution, all side by side; returns those that are still rough."""
+        film, column, unknowns = self.rough
+        if not film.size:
+            return self._nothing(level)
+        ratio, d = self.problem.ratio, self.d[film, column]
+        start = np.kron(_prolongation(ratio, level - 1), np.eye(2)) @ unknowns.T
+        result, unknowns = _run(_films(self.problem, film), d[None], np.ones(1, np.bool_), start.T, level, self.wishes)
+        verdict = result[:, kernels.STATUS, 0].astype(np.int8)
+        self.result[film, :, column], self.status[film, column] = result[..., 0], verdict
+        still = verdict == Status.UNRESOLVED
+        return film[still], column[still], unknowns[still, :, 0]
+
+    def _follow(self, level: int, films: NDArray[np.intp], doubtful: NDArray[np.bool_]) -> _Rough:
+        """Whole films from the start, for the sake of their doubtful columns; returns those that are rough now."""
+        if not films.size:
+            return self._nothing(level)
+        result, unknowns = follow(_films(self.problem, films), self.d[films], level, self.wishes)
+        verdict = result[:, kernels.STATUS].astype(np.int8)
+        self._explain(films, verdict, level)
+        # A reason is not given up for a numerical failure.
+        doubtful = doubtful & ~(_named(self.status[films]) & (verdict == Status.ITERATION_LIMIT))
+        at, column = np.nonzero(doubtful)
+        self.result[films[at], :, column] = result[at, :, column]
+        self.status[films[at], column] = verdict[at, column]
+        at, column = np.nonzero(doubtful & (verdict == Status.UNRESOLVED))
+        return films[at], column, unknowns[at, :, column]
+
+    def _nothing(self, level: int) -> _Rough:
+        none = np.empty(0, np.intp)
+        return none, none, np.empty((0, 2 * basis(self.problem.ratio, *LEVELS[level]).functions))
+
+    def _explain(self, films: NDArray[np.intp], verdict: NDArray[np.int8], level: int) -> None:
+        """Name the reason, in ``verdict`` (K, N) of K films, of paths that end where they ended with the basis before."""
+        lost = verdict == Status.ITERATION_LIMIT
+        some = np.flatnonzero(np.any(lost, axis=1))
+        before = self.ends[films[some]]
+        self.ends[films] = np.nan
+        if not some.size:
+            return
+        problem, d = _films(self.problem, films[some]), self.d[films[some]]
+        first, rows = np.argmax(lost[some], axis=1), np.arange(some.size)
+        high = d[rows, first]
+        low = np.where(first > 0, d[rows, np.maximum(first - 1, 0)], high * 0.01)
+        ends, bent = _path_end(problem, low, high, level)
+        self.ends[films[some]] = ends
+        # Chains that lock end the path by stiffening: that is no loss of stability.
+        same = (np.abs(ends - before) < SAME_END * ends) & np.isinf(extensibility(problem))
+        reason = np.where(bent, Status.NOT_ELLIPTIC, Status.INDEFINITE).astype(np.int8)
+        for i in np.flatnonzero(same):
+            verdict[some[i], lost[some[i]]] = reason[i]
 
 
 def _named(status: NDArray[np.int8]) -> NDArray[np.bool_]:
@@ -270,34 +352,12 @@ def _named(status: NDArray[np.int8]) -> NDArray[np.bool_]:
 
 
 def _pass_on(status: NDArray[np.int8]) -> None:
-    """What could not be solved beyond a loss of stability, in ascending deflection (N, B), is given that reason."""
+    """What could not be solved beyond a loss of stability, in ascending deflection (B, N), is given that reason."""
+    if not np.any(status):
+        return
     for reason in (Status.NOT_ELLIPTIC, Status.INDEFINITE):
-        passed = np.logical_or.accumulate(status == reason, axis=0)
+        passed = np.logical_or.accumulate(status == reason, axis=1)
         status[passed & np.isin(status, (Status.UNRESOLVED, Status.ITERATION_LIMIT))] = reason
-
-
-def _explain_lost(problem: Problem, d: Array, verdict: NDArray[np.int8], before: Array, level: int) -> Array:
-    """Name the reason, in ``verdict`` (N, B), of paths that end where they ended with the basis before.
-
-    before (B,) : scaled deflection at which the path ended with the last basis, nan if it did not. Returns the same
-    for this basis.
-    """
-    ends = np.full(before.shape, np.nan)
-    lost = verdict == Status.ITERATION_LIMIT
-    films = np.flatnonzero(np.any(lost, axis=0))
-    if films.size == 0:
-        return ends
-    some = replace(problem, parameters=problem.parameters[films], prestretch=problem.prestretch[films])
-    first = np.argmax(lost[:, films], axis=0)
-    high = d[films, first]
-    low = np.where(first > 0, d[films, np.maximum(first - 1, 0)], high * 0.01)
-    ends[films], bent = _path_end(some, low, high, level)
-    reason = np.where(bent, Status.NOT_ELLIPTIC, Status.INDEFINITE)
-    # Chains that lock end the path by stiffening: that is no loss of stability.
-    same = (np.abs(ends[films] - before[films]) < SAME_END * ends[films]) & np.isinf(extensibility(some))
-    for i in np.flatnonzero(same):
-        verdict[lost[:, films[i]], films[i]] = reason[i]
-    return ends
 
 
 def _path_end(problem: Problem, low: Array, high: Array, level: int) -> tuple[Array, NDArray[np.bool_]]:
@@ -306,58 +366,55 @@ def _path_end(problem: Problem, low: Array, high: Array, level: int) -> tuple[Ar
     P11 then goes like the root of the distance: over the last sweep it falls by more than half, or is small already.
     """
     rows, bent = np.arange(low.size), np.zeros(low.size, np.bool_)
-    gd = np.broadcast_to(np.asarray(problem.material.shear_modulus(problem.parameters.T), dtype=float), low.shape)
     for _ in range(2):
         fine = low[:, None] + (high - low)[:, None] * np.arange(SEARCH) / (SEARCH - 1)
-        result, _, _ = follow(problem, fine, level, STRIDE / 2**level, False)
-        last = np.sum(np.cumprod(result[:, kernels.STATUS] != Status.ITERATION_LIMIT, axis=0), axis=0) - 1
+        result, _ = follow(problem, fine, level)
+        found = result[:, kernels.STATUS] != Status.ITERATION_LIMIT
+        last = np.sum(np.logical_and.accumulate(found, axis=1), axis=1) - 1
         good, at = last >= 0, np.maximum(last, 0)
-        p11 = result[at, kernels.LEAST_P11, rows]
-        bent |= good & ((p11 < NEARLY_BENT * gd) | (p11 < 0.5 * result[0, kernels.LEAST_P11]))
+        p11 = result[rows, kernels.LEAST_P11, at]
+        bent |= good & ((p11 < NEARLY_BENT * _shear_modulus(problem)) | (p11 < 0.5 * result[:, kernels.LEAST_P11, 0]))
         high = np.where(good, fine[rows, np.minimum(last + 1, SEARCH - 1)], high)
         low = np.where(good, fine[rows, at], low)
     return low, bent
 
 
-def _ascending(d: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Sorted distinct columns of d (B, N), and for each original column the place of its value.
-
-    Columns are sorted by their first row: every film sees the same order, since films differ by small shifts at most.
-    """
-    order = np.argsort(d[0], kind="stable")
-    gap = np.any(np.diff(d[:, order], axis=1) > 0, axis=0)
-    place = np.concatenate([[0], np.cumsum(gap)])
-    back = np.empty(order.size, np.intp)
-    back[order] = place
-    firsts = order[np.concatenate([[True], gap])]
-    return d[:, firsts], back
+def _ascending(d: Array) -> tuple[Array, NDArray[np.intp] | None]:
+    """d (B, N) sorted film by film, and the place (B, N) of each original value; None if they were sorted."""
+    if np.all(d[:, 1:] >= d[:, :-1]):
+        return d, None
+    order = np.argsort(d, axis=1, kind="stable")
+    return np.take_along_axis(d, order, axis=1), np.argsort(order, axis=1)
 
 
-def _curves(
-    problem: Problem, result: Array, sens: Array | None, status: NDArray[np.int8], back: NDArray[np.intp], sign: Array
-) -> Curves:
+def _curves(problem: Problem, search: _Search, back: NDArray[np.intp] | None) -> Curves:
     """Undo the scaling and the sorting."""
-    k = kernels
-    result, status = result[back], status[back].T
-    rho = problem.inner_radius / problem.prestretch[:, None]
-    ok = status == Status.OK
-    note = np.where(result[:, k.LEAST_P2].T < 0, Note.WRINKLED, 0) | np.where(result[:, k.SLACK].T <= 0, Note.SLACK, 0)
+    k, result, status = kernels, search.result, search.status
+    if back is not None:
+        result = np.take_along_axis(result, back[:, None], axis=2)
+        status = np.take_along_axis(status, back, axis=1)
+    ok, sign = status == Status.OK, np.sign(problem.deflection)
+    length = problem.inner_radius / problem.prestretch[:, None]
+    note = np.where(result[:, k.LEAST_P2] < 0, Note.WRINKLED, 0) | np.where(result[:, k.SLACK] <= 0, Note.SLACK, 0)
+    factor = 2 * np.pi * length
 
-    def row(index: int, factor: Any = 1.0) -> Array:
-        return np.where(ok, result[:, index].T * factor, np.nan)
+    def row(index: int, scale: Any = 1.0) -> Array:
+        return np.where(ok, result[:, index] * scale, np.nan)
 
-    flat = sign == 0
-    force = np.where(flat & ok, 0.0, row(k.FORCE, 2 * np.pi * rho) * sign)
+    sensitivity = None
+    if search.wishes[0]:
+        rows = np.where(ok[:, None], result[:, k.RESULTS :] * (factor * sign)[:, None], np.nan)
+        sensitivity = np.ascontiguousarray(np.moveaxis(rows, 1, 2))
     return Curves(
         deflection=problem.deflection,
-        force=force,
+        force=row(k.FORCE, factor * sign),
         status=status,
         note=np.where(ok, note, 0).astype(np.int8),
         slope=row(k.SLOPE, 2 * np.pi),
-        sensitivity=None if sens is None else np.moveaxis(sens[back], 2, 0) * (2 * np.pi * rho * sign)[:, :, None],
+        sensitivity=sensitivity,
         variation=row(k.VARIATION),
         max_stretch=row(k.STRETCH),
         ellipticity=row(k.ELLIPTIC),
         convexity=row(k.CONVEX),
-        energy=row(k.STORED, 2 * np.pi * rho**2),
+        energy=row(k.STORED, factor * length),
     )

@@ -9,10 +9,11 @@ is minimised by Newton's method with the exact Hessian K. With g the gradient, K
 z = K^-1 K_d, one factorisation gives
     step -K^-1 g,  F ~ I_d - z.g,  dF/dd ~ I_dd - z.K_d,  dq/dd = -z,  dF/dp ~ I_dp - z.g_p  (envelope theorem).
 
-Every array of films is C-contiguous with shape (rows, LANES), moved by `simd.load` and `simd.store`; lanes never mix, so
-a film's result does not depend on its neighbours. Functions are numbered 0..n-1, with unknown 2i for a_i and 2i+1 for
-b_i; function i is non-zero only at the points g with first[g] <= i < last[g], that is start[i] <= g < stop[i], which
-keeps K banded when there are several elements: K_ij (j <= i) stands in row i width + i - j.
+Every array of films is C-contiguous with shape (rows, LANES), moved by `simd.load` and `simd.store`; lanes never mix,
+so a film's result does not depend on its neighbours. Functions are numbered 0..n-1, with unknown 2i for a_i and 2i+1
+for b_i; function i is non-zero only at the points g with first[g] <= i < last[g], that is start[i] <= g < stop[i],
+which keeps K banded when there are several elements: K_ij (j <= i) stands in row i width + i - j.
+Loops are ordered so that neighbouring steps do not wait for each other's sums.
 ``derivatives``, ``sensitivities`` and ``FIELDS`` are the material's (see `compiled.bind`).
 """
 
@@ -25,16 +26,22 @@ import numpy as np
 from bayesmembrane.mechanics.simd import LANES, greatest, least, load, load_all, splat, store, where
 
 if TYPE_CHECKING:
-    derivatives: Any
-    sensitivities: Any
-    FIELDS: Any
+    derivatives: Any = None
+    sensitivities: Any = None
+    FIELDS: Any = ()
 
 # Rows per point in the array of local quantities.
 U, S, W, L1, P1, P2, P11, P12, P22, ENERGY = range(10)
 ROWS = 10
 # Rows per deflection in the array of results.
-FORCE, SLOPE, STORED, STATUS, COUNT, GAIN, VARIATION, STRETCH, ELLIPTIC, CONVEX, LEAST_P11, LEAST_P1, LEAST_P2, SLACK = range(14)
-RESULTS = 14
+FORCE, SLOPE, STORED, STATUS, COUNT, GAIN, VARIATION = range(7)
+STRETCH, ELLIPTIC, CONVEX, LEAST_P11, LEAST_P2, SLACK = range(7, 13)
+RESULTS = 13
+# What a lane does, and what it is about to do (see `decide`).
+ACCEPT, HALVE, RESTART, FINISH, ALPHA, BASE, FALL, MODE = range(8)
+FRESH, RUNNING, DONE, LOST = 0.0, 1.0, 2.0, 3.0
+# Codes of `solution.Status`.
+OK, NOT_ELLIPTIC, INDEFINITE, UNRESOLVED, ITERATION_LIMIT = 0.0, 2.0, 3.0, 4.0, 5.0
 
 
 def states(q, d, l0, p, points, phi, both, slope, beta, first, last, x):  # type: ignore[no-untyped-def]
@@ -59,6 +66,16 @@ def states(q, d, l0, p, points, phi, both, slope, beta, first, last, x):  # type
         store(x, r + P12, p12)
         store(x, r + P22, p22)
         store(x, r + ENERGY, e)
+
+
+def put(band, i, j, width, aa, ab, ba, bb):  # type: ignore[no-untyped-def]
+    """The four entries of K that couple functions i and j <= i."""
+    o = 2 * i * width + 2 * (i - j)
+    store(band, o, aa)
+    store(band, o + width, bb)
+    store(band, o + width + 1, ba)
+    if j < i:
+        store(band, o - 1, ab)
 
 
 def assemble(x, c, row, sums, phi, both, slope, beta, weight, start, stop, low, width, grad, mixed, band):  # type: ignore[no-untyped-def]
@@ -108,44 +125,55 @@ def assemble(x, c, row, sums, phi, both, slope, beta, weight, start, stop, low, 
         store(grad, 2 * i + 1, gb)
         store(mixed, 2 * i, ka)
         store(mixed, 2 * i + 1, kb)
-        for j in range(low[2 * i] // 2, i + 1):
+        for j in range(low[2 * i] // 2, i + 1, 2):
+            # Two functions at once: the rows are loaded once for both.
+            k = min(j + 1, i)
             aa, ab, ba, bb = zero, zero, zero, zero
-            for g in range(max(start[i], start[j]), min(stop[i], stop[j])):
-                a, f, b, r = both[j, g], phi[j, g], slope[j, g], 6 * g
-                aa = aa + load(row, r) * a + load(row, r + 1) * f
-                ab = ab + load(row, r + 2) * b
-                ba = ba + load(row, r + 3) * a + load(row, r + 4) * f
-                bb = bb + load(row, r + 5) * b
-            o = 2 * i * width + 2 * (i - j)
-            store(band, o, aa)
-            store(band, o + width, bb)
-            store(band, o + width + 1, ba)
-            if j < i:
-                store(band, o - 1, ab)
+            cc, cd, dc, dd = zero, zero, zero, zero
+            for g in range(max(start[i], start[j]), min(stop[i], stop[k])):
+                r = 6 * g
+                on_u, on_s, on_w = load(row, r), load(row, r + 1), load(row, r + 2)
+                of_u, of_s, of_w = load(row, r + 3), load(row, r + 4), load(row, r + 5)
+                aa = aa + on_u * both[j, g] + on_s * phi[j, g]
+                cc = cc + on_u * both[k, g] + on_s * phi[k, g]
+                ba = ba + of_u * both[j, g] + of_s * phi[j, g]
+                dc = dc + of_u * both[k, g] + of_s * phi[k, g]
+                ab = ab + on_w * slope[j, g]
+                cd = cd + on_w * slope[k, g]
+                bb = bb + of_w * slope[j, g]
+                dd = dd + of_w * slope[k, g]
+            put(band, i, j, width, aa, ab, ba, bb)
+            put(band, i, k, width, cc, cd, dc, dd)
 
 
-def factorise(band, low, width):  # type: ignore[no-untyped-def]
-    """K = L D L^T in place: L_ij for low[i] <= j < i and 1/D_i; returns the least pivot.
+def factorise(band, low, width, scaled, pivots):  # type: ignore[no-untyped-def]
+    """K = L D L^T in place, column by column: L_ij for low[i] <= j < i, and 1/D_i; returns the least pivot.
 
     A pivot that is not positive is replaced by its magnitude, so that the Newton step still descends.
+    scaled, pivots (2n, LANES) : room for the row D_r L_jr and for D
     """
-    smallest = splat(np.inf)
-    for i in range(low.shape[0]):
-        bi = i * width + i
-        for j in range(low[i], i):
-            bj = j * width + j
+    smallest, rows = splat(np.inf), low.shape[0]
+    for j in range(rows):
+        bj = j * width + j
+        pivot = load(band, bj - j)
+        for r in range(low[j], j):
+            v = load(band, bj - r)
+            y = v * load(pivots, r)
+            store(scaled, r, y)
+            pivot = pivot - v * y
+        smallest = least(pivot, smallest)
+        pivot = greatest(abs(pivot), splat(1e-300))
+        inverse = 1.0 / pivot
+        store(pivots, j, pivot)
+        store(band, bj - j, inverse)
+        for i in range(j + 1, rows):
+            if low[i] > j:
+                break
+            bi = i * width + i
             v = load(band, bi - j)
             for r in range(max(low[i], low[j]), j):
-                v = v - load(band, bi - r) * load(band, bj - r)
-            store(band, bi - j, v)
-        pivot = load(band, bi - i)
-        for j in range(low[i], i):
-            v = load(band, bi - j)
-            y = v * load(band, j * width)
-            pivot = pivot - v * y
-            store(band, bi - j, y)
-        smallest = least(pivot, smallest)
-        store(band, bi - i, 1.0 / greatest(abs(pivot), splat(1e-300)))
+                v = v - load(band, bi - r) * load(scaled, r)
+            store(band, bi - j, v * inverse)
     return smallest
 
 
@@ -172,14 +200,15 @@ def backsolve(band, low, width, y, z):  # type: ignore[no-untyped-def]
             store(z, j, load(z, j) - v * b)
 
 
-def predict(q, dq, old, dold, d_new, d, d_old, order, guess):  # type: ignore[no-untyped-def]
-    """Extrapolate the unknowns to d_new: Hermite cubic through two states (order 3) or the tangent (1).
+def predict(q, dq, old, dold, d_new, d, d_old, guess):  # type: ignore[no-untyped-def]
+    """Extrapolate the unknowns to d_new: Hermite cubic through two states, or the tangent if they are the same.
 
     For small d the hoop coefficients grow like d^2 and then saturate, the height's grow like d: divided by
     d^2/(1+d^2) and by d they vary slowly with x = ln d, and so they are extrapolated.
     """
-    ahead, span = np.log(d_new / d), np.log(d / d_old)
-    one = splat(1.0)
+    ahead, span, one = np.log(d_new / d), np.log(d / d_old), splat(1.0)
+    cubic = where(greatest(span - 1e-9, 0.0), one, 0.0)
+    inverse = 1.0 / (span + (1.0 - cubic))
     for i in range(q.shape[0]):
         if i % 2 == 0:
             r0, rm = 1.0 / (1.0 + d * d), 1.0 / (1.0 + d_old * d_old)
@@ -189,26 +218,23 @@ def predict(q, dq, old, dold, d_new, d, d_old, order, guess):  # type: ignore[no
             s0, sm, rate0, ratem, back = d, d_old, one, one, d_new
         y = load(q, i) / s0
         m = load(dq, i) * d / s0 - rate0 * y
-        if order == 1:
-            store(guess, i, (y + m * ahead) * back)
-        else:
-            ym = load(old, i) / sm
-            mm = load(dold, i) * d_old / sm - ratem * ym
-            chord = (y - ym) / span
-            c2 = (m - chord) / span
-            c3 = (m + mm - 2.0 * chord) / (span * span)
-            store(guess, i, (y + ahead * (m + ahead * (c2 + (ahead + span) * c3))) * back)
+        ym = load(old, i) / sm
+        mm = load(dold, i) * d_old / sm - ratem * ym
+        chord = (y - ym) * inverse
+        c2 = cubic * (m - chord) * inverse
+        c3 = cubic * (m + mm - 2.0 * chord) * inverse * inverse
+        store(guess, i, (y + ahead * (m + ahead * (c2 + (ahead + span) * c3))) * back)
 
 
-def examine(x, points, inner, growth, gd, out, o):  # type: ignore[no-untyped-def]
-    """Diagnostics of a converged state, into rows o + VARIATION .. o + SLACK of ``out``.
+def examine(x, points, inner, growth, gd, out):  # type: ignore[no-untyped-def]
+    """Diagnostics of a converged state, into rows VARIATION .. SLACK of ``out`` (RESULTS, LANES).
 
     rms variation of R P1 sin(theta) over its mean; largest stretch; least of P11, P22 and least eigenvalue of the
-    Hessian of W, both over G d; least P11, P1, P2; least of max(P1, P2), not positive where the film is slack.
+    Hessian of W, both over G d; least P11 and P2; least of max(P1, P2), not positive where the film is slack.
     """
     zero, top = splat(0.0), splat(np.inf)
     total, stretch = zero, zero
-    ellipse, convex, low11, low1, low2, slack = top, top, top, top, top, top
+    ellipse, convex, low11, low2, slack = top, top, top, top, top
     for g in range(points):
         r = ROWS * g
         l1, p1, p2 = load(x, r + L1), load(x, r + P1), load(x, r + P2)
@@ -219,24 +245,23 @@ def examine(x, points, inner, growth, gd, out, o):  # type: ignore[no-untyped-de
         stretch = greatest(greatest(l1, load(x, r + S)), stretch)
         ellipse = least(least(p11, p22), ellipse)
         convex = least(0.5 * (p11 + p22) - np.sqrt(half * half + p12 * p12), convex)
-        low11, low1, low2, slack = least(p11, low11), least(p1, low1), least(p2, low2), least(greatest(p1, p2), slack)
+        low11, low2, slack = least(p11, low11), least(p2, low2), least(greatest(p1, p2), slack)
     mean, square = total / inner, zero
     for g in range(inner):
         r = ROWS * g
         e = growth[g] * load(x, r + P1) * load(x, r + W) / load(x, r + L1) - mean
         square = square + e * e
-    store(out, o + VARIATION, np.sqrt(square / inner) / abs(mean))
-    store(out, o + STRETCH, stretch)
-    store(out, o + ELLIPTIC, ellipse / gd)
-    store(out, o + CONVEX, convex / gd)
-    store(out, o + LEAST_P11, low11)
-    store(out, o + LEAST_P1, low1)
-    store(out, o + LEAST_P2, low2)
-    store(out, o + SLACK, slack)
+    store(out, VARIATION, np.sqrt(square / inner) / abs(mean))
+    store(out, STRETCH, stretch)
+    store(out, ELLIPTIC, ellipse / gd)
+    store(out, CONVEX, convex / gd)
+    store(out, LEAST_P11, low11)
+    store(out, LEAST_P2, low2)
+    store(out, SLACK, slack)
 
 
-def energy_gain(x, weight, extra, elements, out, o):  # type: ignore[no-untyped-def]
-    """How much energy the next two bubbles of every element would release, sum of g^2 / (2 K_ii), into row o + GAIN.
+def energy_gain(x, weight, extra, elements, out):  # type: ignore[no-untyped-def]
+    """How much energy the next two bubbles of every element would release, sum of g^2 / (2 K_ii), into row GAIN.
 
     extra (3, 2, points per element, elements) : phi + phi', phi and slope of these bubbles, as in the tables.
     """
@@ -256,167 +281,239 @@ def energy_gain(x, weight, extra, elements, out, o):  # type: ignore[no-untyped-
                 ka = ka + om * ((p11 * co * co + geo * si * si) * a * a + (2.0 * cross * a + load(x, r + P22) * f) * f)
                 kb = kb + om * (p11 * si * si + geo * co * co) * b * b
             gain = gain + 0.5 * (ga * ga / abs(ka) + gb * gb / abs(kb))
-    store(out, o + GAIN, gain)
+    store(out, GAIN, gain)
 
 
-def force_sensitivity(x, p, z, inner, phi, both, slope, beta, weight, first, last, out, o):  # type: ignore[no-untyped-def]
-    """dF/dp_m = dI_d/dp_m - z.dg/dp_m, into rows o + m of ``out``."""
+def force_sensitivity(x, p, dq, inner, phi, both, slope, beta, weight, first, last, out):  # type: ignore[no-untyped-def]
+    """dF/dp_m = dI_d/dp_m + dq/dd.dg/dp_m, into rows RESULTS + m of ``out``."""
     for m in range(len(FIELDS)):
-        store(out, o + m, 0.0)
+        store(out, RESULTS + m, 0.0)
     for g in range(inner):
         r = ROWS * g
         l1 = load(x, r + L1)
         co, si = load(x, r + U) / l1, load(x, r + W) / l1
         along, across = si * beta[g], splat(0.0)
         for i in range(first[g], last[g]):
-            a = load(z, 2 * i)
-            along = along - co * a * both[i, g] - si * load(z, 2 * i + 1) * slope[i, g]
+            a = load(dq, 2 * i)
+            along = along + co * a * both[i, g] + si * load(dq, 2 * i + 1) * slope[i, g]
             across = across + a * phi[i, g]
         rows = sensitivities(p, l1, load(x, r + S))
         for m in range(len(FIELDS)):
-            store(out, o + m, load(out, o + m) + weight[g] * (rows[m][1] * along - rows[m][2] * across))
+            add = weight[g] * (rows[m][1] * along + rows[m][2] * across)
+            store(out, RESULTS + m, load(out, RESULTS + m) + add)
 
 
-def decide(j, iteration, most_trust, d, lane, sums, dots, pivot, result):  # type: ignore[no-untyped-def]
+def decide(first, last_chance, tolerance, d, lane, sums, dots, pivot, out):  # type: ignore[no-untyped-def]
     """Per lane: accept the trial state, halve the step, restart or finish. Scalar code, a few operations per lane.
 
-    lane (8, LANES), kept between iterations: accept, halve, restart, finish (masks), alpha, base energy, fall, state
-    (0 fresh, 1 running, 2 done, 3 lost). Returns the number of lanes that are done or lost.
+    lane (8, LANES), kept between iterations: accept, halve, restart, finish (masks), alpha, base energy, fall, mode.
+    first : True for the first trial state at this deflection; it may be restarted unless it is the ``last_chance``.
+    tolerance : Newton decrement, over d I_d, at which a state has converged
+    Returns the number of lanes that are done or lost.
     """
     over = 0
     for k in range(LANES):
         for r in range(4):
             lane[r, k] = 0.0
-        if lane[7, k] >= 2.0:
+        if lane[MODE, k] >= DONE:
             over += 1
             continue
         energy, decrement = sums[0, k], dots[0, k]
         scale = abs(sums[1, k] * d[k])
         good = np.isfinite(energy) and np.isfinite(decrement) and sums[3, k] > 0.0
-        if good and lane[7, k] == 1.0 and lane[6, k] > 1e-5 * scale and lane[6, k] > 1e-12 * abs(energy):
+        if good and lane[MODE, k] == RUNNING and lane[FALL, k] > 1e-5 * scale and lane[FALL, k] > 1e-12 * abs(energy):
             # Smaller falls drown in the round-off of the energy: there the step is trusted.
-            good = energy <= lane[5, k] - 1e-4 * lane[4, k] * lane[6, k]
+            good = energy <= lane[BASE, k] - 1e-4 * lane[ALPHA, k] * lane[FALL, k]
         if good:
-            lane[0, k], lane[4, k], lane[5, k], lane[6, k], lane[7, k] = 1.0, 1.0, energy, decrement, 1.0
-            if abs(decrement) <= most_trust * scale:
-                lane[3, k], lane[7, k] = 1.0, 2.0
-                result[FORCE, k] = sums[1, k] - dots[1, k]
-                result[SLOPE, k] = sums[2, k] - dots[2, k]
-                result[STORED, k] = energy - 0.5 * decrement
-                result[STATUS, k] = 0.0 if pivot[k] > 0.0 else 3.0
-                result[COUNT, k] = iteration + 1.0
-        elif lane[7, k] == 1.0:
-            lane[1, k] = 1.0
-            lane[4, k] *= 0.5
-        elif iteration == 0 and j > 0:
-            lane[2, k] = 1.0
+            lane[ACCEPT, k], lane[ALPHA, k], lane[MODE, k] = 1.0, 1.0, RUNNING
+            lane[BASE, k], lane[FALL, k] = energy, decrement
+            if abs(decrement) <= tolerance * scale:
+                lane[FINISH, k], lane[MODE, k] = 1.0, DONE
+                out[FORCE, k] = sums[1, k] - dots[1, k]
+                out[SLOPE, k] = sums[2, k] - dots[2, k]
+                out[STORED, k] = energy - 0.5 * decrement
+                out[STATUS, k] = OK if pivot[0, k] > 0.0 else INDEFINITE
+        elif lane[MODE, k] == RUNNING:
+            lane[HALVE, k] = 1.0
+            lane[ALPHA, k] *= 0.5
+        elif first and not last_chance:
+            lane[RESTART, k] = 1.0
         else:
-            lane[7, k] = 3.0
+            lane[MODE, k] = LOST
     return over
 
 
-def follow(p_rows, gd_row, l0_row, grid, q, tables, most, tolerance, with_sens, keep, result, sens, trace):  # type: ignore[no-untyped-def]
-    """Continue one block of films through ascending scaled deflections grid (M, LANES).
+def verdict(out, d, gain_limit, variation_limit):  # type: ignore[no-untyped-def]
+    """Judge the converged lanes of ``out`` (RESULTS, LANES) at d (LANES,): exact, not elliptic or neither."""
+    for k in range(LANES):
+        if out[STATUS, k] == ITERATION_LIMIT:
+            continue
+        # Bubbles judge each on its own; where the film is about to soften without bound they see less than is missing.
+        strict = min(max(out[ELLIPTIC, k], 1e-3), 1.0)
+        fine = out[GAIN, k] <= gain_limit * strict * abs(out[FORCE, k] * d[k])
+        fine = fine and out[VARIATION, k] <= variation_limit
+        if not out[LEAST_P11, k] > 0.0:
+            out[STATUS, k] = NOT_ELLIPTIC
+        elif out[STATUS, k] == OK and not fine:
+            out[STATUS, k] = UNRESOLVED
 
-    p_rows (n_fields, LANES), gd_row, l0_row (1, LANES) : parameters, G d, pre-stretch
-    q (2n, LANES) : unknowns; on entry a start (zeros: the flat film), on exit those of the last deflection
-    tables : see `ritz.basis`
-    most, tolerance : largest number of iterations; Newton decrement, over d I_d, at which a state has converged
-    keep (M,) : False where a deflection only serves the continuation and is not examined
-    result (RESULTS M, LANES) : the rows named FORCE .. SLACK above for each deflection, in scaled units
-    sens (n_fields M, LANES) : dF/dp if with_sens
-    trace (2n M, LANES) or (0, LANES) : the unknowns at every deflection
 
-    A lane that loses the path keeps status 5 from there on.
-    """
+def update(lane, d, d_before, base, step, y, z, old, trial, q, dq):  # type: ignore[no-untyped-def]
+    """Do what `decide` decided: the next trial state, and for lanes that finish the unknowns and their slopes dq/dd."""
+    accept, halve, restart = load(lane, ACCEPT), load(lane, HALVE), load(lane, RESTART)
+    finish, alpha, ratio = load(lane, FINISH), load(lane, ALPHA), d / d_before
+    for i in range(trial.shape[0]):
+        now = load(trial, i)
+        b, s = where(accept, now, load(base, i)), where(accept, load(y, i), load(step, i))
+        store(base, i, b)
+        store(step, i, s)
+        kept = load(old, i)
+        if i % 2 == 1:
+            kept = kept * ratio
+        now = where(accept, now - s, where(halve, b - alpha * s, where(restart, kept, now)))
+        store(trial, i, now)
+        store(q, i, where(finish, now, load(q, i)))
+        store(dq, i, where(finish, -load(z, i), load(dq, i)))
+
+
+def solve_newton(band, low, width, grad, mixed, y, z, dots):  # type: ignore[no-untyped-def]
+    """y = K^-1 g, z = K^-1 K_d, and dots = (g.y, g.z, K_d.z)."""
+    m = low.shape[0]
+    for i in range(m):
+        store(y, i, load(grad, i))
+        store(z, i, load(mixed, i))
+    backsolve(band, low, width, y, z)
+    gy, gz, kz = splat(0.0), splat(0.0), splat(0.0)
+    for i in range(m):
+        g_i, z_i = load(grad, i), load(z, i)
+        gy = gy + g_i * load(y, i)
+        gz = gz + g_i * z_i
+        kz = kz + load(mixed, i) * z_i
+    store(dots, 0, gy)
+    store(dots, 1, gz)
+    store(dots, 2, kz)
+
+
+def spread(rows, films, column):  # type: ignore[no-untyped-def]
+    """Write rows (R, LANES) to films (LANES, at most R, N) at one column."""
+    for k in range(LANES):
+        for r in range(films.shape[1]):
+            films[k, r, column] = rows[r, k]
+
+
+def remember(out, q, everywhere, rough, trace, column):  # type: ignore[no-untyped-def]
+    """Write the unknowns that are wished for to trace (LANES, 2n, N) at one column."""
+    for k in range(LANES):
+        if everywhere or (rough and out[STATUS, k] == UNRESOLVED):
+            for i in range(q.shape[0]):
+                trace[k, i, column] = q[i, k]
+
+
+def follow_block(p_rows, gd, l0, grid, q, tables, limits, keep, wishes, result, trace):  # type: ignore[no-untyped-def]
+    """`follow` for one block; q (2n, LANES) is overwritten."""
     phi, both, slope, beta, growth, weight, first, last, start, stop, low, width, extra = tables
-    n, points, inner = phi.shape[0], phi.shape[1], weight.shape[0]
-    m = 2 * n
-    p, gd, l0 = load_all(p_rows, FIELDS), load(gd_row, 0), load(l0_row, 0)
-    x, c, row, sums = (
-        np.empty((ROWS * points, LANES)),
-        np.empty((9 * inner, LANES)),
-        np.empty((6 * inner, LANES)),
-        np.empty((4, LANES)),
-    )
-    band, y, z, grad, mixed = (
-        np.zeros((m * width, LANES)),
-        np.empty((m, LANES)),
-        np.empty((m, LANES)),
-        np.empty((m, LANES)),
-        np.empty((m, LANES)),
-    )
-    trial, base, step, tangent = q.copy(), q.copy(), np.zeros((m, LANES)), np.zeros((m, LANES))
-    old, dq, dold = q.copy(), np.zeros((m, LANES)), np.zeros((m, LANES))
-    lane, dots, pivot = np.zeros((8, LANES)), np.empty((3, LANES)), np.empty((1, LANES))
+    most, tolerance, gain_limit, variation_limit = limits
+    points, inner, m, p, kept = phi.shape[1], weight.shape[0], 2 * phi.shape[0], load_all(p_rows, FIELDS), 0
+    x, c, row = np.empty((ROWS * points, LANES)), np.empty((9 * inner, LANES)), np.empty((6 * inner, LANES))
+    band, y, z = np.zeros((m * width, LANES)), np.empty((m, LANES)), np.empty((m, LANES))
+    grad, mixed, trial, base = np.empty((m, LANES)), np.empty((m, LANES)), q.copy(), q.copy()
+    step, old, dq, dold = np.zeros((m, LANES)), q.copy(), np.zeros((m, LANES)), np.zeros((m, LANES))
+    lane, sums, dots = np.zeros((8, LANES)), np.empty((4, LANES)), np.empty((3, LANES))
+    pivot, out = np.empty((1, LANES)), np.empty((RESULTS + len(FIELDS), LANES))
     for j in range(grid.shape[0]):
-        d = load(grid, j)
-        if j == 1:
-            predict(q, dq, old, dold, d, load(grid, 0), load(grid, 0), 1, trial)
-        elif j > 1:
-            predict(q, dq, old, dold, d, load(grid, j - 1), load(grid, j - 2), 3, trial)
-        for i in range(m):
-            store(old, i, load(q, i))
-            store(dold, i, load(dq, i))
-        for r in range(RESULTS):
-            store(result, RESULTS * j + r, np.nan)
-        store(result, RESULTS * j + STATUS, 5.0)
-        for k in range(LANES):
-            lane[7, k] = 3.0 if lane[7, k] == 3.0 else 0.0
-        for iteration in range(most):
+        d, before = load(grid, j), load(grid, max(j - 1, 0))
+        if j > 0:
+            predict(q, dq, old, dold, d, before, load(grid, max(j - 2, 0)), trial)
+        begin(q, dq, old, dold, lane, out)
+        count = 0
+        while count < most:
             states(trial, d, l0, p, inner, phi, both, slope, beta, first, last, x)
             assemble(x, c, row, sums, phi, both, slope, beta, weight, start, stop, low, width, grad, mixed, band)
-            store(pivot, 0, factorise(band, low, width))
-            for i in range(m):
-                store(y, i, load(grad, i))
-                store(z, i, load(mixed, i))
-            backsolve(band, low, width, y, z)
-            gy, gz, kz = splat(0.0), splat(0.0), splat(0.0)
-            for i in range(m):
-                g_i, z_i = load(grad, i), load(z, i)
-                gy = gy + g_i * load(y, i)
-                gz = gz + g_i * z_i
-                kz = kz + load(mixed, i) * z_i
-            store(dots, 0, gy)
-            store(dots, 1, gz)
-            store(dots, 2, kz)
-            over = decide(j, iteration, tolerance, grid[j], lane, sums, dots, pivot[0], result[RESULTS * j : RESULTS * (j + 1)])
-            if over == LANES:
+            store(pivot, 0, factorise(band, low, width, y, z))
+            solve_newton(band, low, width, grad, mixed, y, z, dots)
+            count += 1
+            if decide(count == 1, j == 0, tolerance, grid[j], lane, sums, dots, pivot, out) == LANES:
                 break
-            accept, halve, restart, finish, alpha = (
-                load(lane, 0),
-                load(lane, 1),
-                load(lane, 2),
-                load(lane, 3),
-                load(lane, 4),
-            )
-            ratio = d / load(grid, max(j - 1, 0))
-            for i in range(m):
-                now = load(trial, i)
-                b = where(accept, now, load(base, i))
-                s = where(accept, load(y, i), load(step, i))
-                store(base, i, b)
-                store(step, i, s)
-                kept = load(old, i)
-                if i % 2 == 1:
-                    kept = kept * ratio
-                now = where(accept, now - s, where(halve, b - alpha * s, where(restart, kept, now)))
-                store(trial, i, now)
-                store(q, i, where(finish, now, load(q, i)))
-                zi = load(z, i)
-                store(tangent, i, where(finish, zi, load(tangent, i)))
-                store(dq, i, where(finish, -zi, load(dq, i)))
-        for k in range(LANES):
-            if lane[7, k] != 2.0:
-                lane[7, k] = 3.0
+            update(lane, d, before, base, step, y, z, old, trial, q, dq)
+        end(lane)
         if keep[j]:
             states(q, d, l0, p, points, phi, both, slope, beta, first, last, x)
-            examine(x, points, inner, growth, gd, result, RESULTS * j)
-            energy_gain(x, weight, extra, extra.shape[3], result, RESULTS * j)
-            if with_sens:
-                force_sensitivity(
-                    x, p, tangent, inner, phi, both, slope, beta, weight, first, last, sens, len(FIELDS) * j
-                )
-        if trace.shape[0] > 0:
-            for i in range(m):
-                store(trace, m * j + i, load(q, i))
+            examine(x, points, inner, growth, gd, out)
+            energy_gain(x, weight, extra, extra.shape[3], out)
+            if wishes[0]:
+                force_sensitivity(x, p, dq, inner, phi, both, slope, beta, weight, first, last, out)
+            verdict(out, grid[j], gain_limit, variation_limit)
+            store(out, COUNT, float(count))
+            spread(out, result, kept)
+            remember(out, q, wishes[1], wishes[2], trace, kept)
+            kept += 1
+
+
+def begin(q, dq, old, dold, lane, out):  # type: ignore[no-untyped-def]
+    """Make the last state the one before, and wake the lanes that are not lost."""
+    for i in range(q.shape[0]):
+        store(old, i, load(q, i))
+        store(dold, i, load(dq, i))
+    for k in range(LANES):
+        lane[MODE, k] = LOST if lane[MODE, k] == LOST else FRESH
+        out[STATUS, k] = ITERATION_LIMIT
+
+
+def end(lane):  # type: ignore[no-untyped-def]
+    """Whoever has not arrived is lost."""
+    for k in range(LANES):
+        if lane[MODE, k] != DONE:
+            lane[MODE, k] = LOST
+
+
+def follow(p, gd, l0, grid, start, tables, limits, keep, wishes, result, trace):  # type: ignore[no-untyped-def]
+    """Continue B blocks of `LANES` films each through ascending scaled deflections.
+
+    p (B, n_fields, LANES), gd, l0 (B, 1, LANES) : parameters, G d, pre-stretch
+    grid (B, M, LANES) : scaled deflections, of which those with keep (M,) are examined, N of them
+    start (B, 2n, LANES) : unknowns from which the first deflection is tried (zeros: the flat film)
+    tables : see `ritz.basis`
+    limits : most iterations; Newton decrement, over d I_d, of a converged state; and what `verdict` judges by
+    wishes : whether to give sensitivities, all unknowns, or the unknowns of unresolved states
+    result (B, LANES, rows, N) : the rows FORCE .. SLACK, then dF/dp if wished for, in scaled units
+    trace (B, LANES, 2n, N) : the unknowns, if wished for
+
+    A lane that loses the path has status `ITERATION_LIMIT` from there on.
+    """
+    for block in range(grid.shape[0]):
+        follow_block(
+            p[block],
+            load(gd[block], 0),
+            load(l0[block], 0),
+            grid[block],
+            start[block],
+            tables,
+            limits,
+            keep,
+            wishes,
+            result[block],
+            trace[block],
+        )
+
+
+KERNELS = (
+    states,
+    put,
+    assemble,
+    factorise,
+    backsolve,
+    solve_newton,
+    predict,
+    examine,
+    energy_gain,
+    force_sensitivity,
+    decide,
+    verdict,
+    update,
+    spread,
+    remember,
+    begin,
+    end,
+    follow_block,
+    follow,
+)

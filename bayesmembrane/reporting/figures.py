@@ -10,6 +10,7 @@ import base64
 import io
 import logging
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,17 +19,20 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import SymLogNorm, TwoSlopeNorm
+from matplotlib.colors import LinearSegmentedColormap, SymLogNorm, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from numpy.typing import NDArray
 
 from bayesmembrane.parameters import Array
-from bayesmembrane.reporting.style import ALARM, FAINT, INK, MUTED, SHADE, colour, dashes, marker, symbol, title
+from bayesmembrane.reporting.style import ALARM, FAINT, INK, MUTED, SHADE, colour, linestyle, marker, symbol, title
 
 WIDTH = 9.0  # inches: 900 px at 100 dpi
 DPI = 150
+MOST_POINTS = 400  # of a line that is drawn
+_ENSEMBLES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 _RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 11,
@@ -59,6 +63,11 @@ _RC: dict[str, Any] = {
 }
 
 
+def _style(changes: dict[str, Any] | None = None) -> AbstractContextManager[None]:
+    settings: Any = {**_RC, **(changes or {})}
+    return mpl.rc_context(settings)
+
+
 @dataclass(frozen=True)
 class Picture:
     """An encoded picture; ``kind`` is "svg" or "png"."""
@@ -77,7 +86,7 @@ def _encoded(figure: Figure, kind: str) -> Picture:
     """The same figure always gives the same bytes: no date, no random names."""
     out = io.BytesIO()
     metadata = {"Date": None} if kind == "svg" else {"Software": None}
-    with mpl.rc_context(_RC):
+    with _style():
         figure.savefig(out, format=kind, dpi=DPI, metadata=metadata)
     return Picture(out.getvalue(), kind)
 
@@ -88,7 +97,7 @@ def _figure(height: float, width: float = WIDTH) -> Figure:
     return figure
 
 
-# ---- measured curve, bands, residuals ----------------------------------------------------------------------------------
+# ---- measured curve, bands, residuals --------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -111,7 +120,7 @@ class Curve:
     material: str
     deflection: Array
     force: Array
-    beyond: Array
+    beyond: NDArray[np.bool_]
     residual: Array
     label: str = ""
 
@@ -133,7 +142,7 @@ class Look:
 
 def first_look(looks: Sequence[Look], kind: str = "svg") -> Picture:
     """(a) The measured curve, the materials' medians and 90 % bands, extrapolation dashed; the residuals beneath."""
-    with mpl.rc_context(_RC):
+    with _style():
         figure = _figure(6.4)
         grid = figure.subplots(2, len(looks), sharex="col", squeeze=False, height_ratios=(2.3, 1))
         for i, look in enumerate(looks):
@@ -157,8 +166,17 @@ def _look(ax: Axes, look: Look, first: bool) -> None:
     last = max([end, *(1e3 * float(c.deflection[-1]) for c in look.curves)])
     if last > end * (1 + 1e-6):
         ax.axvspan(end, last, color=SHADE, zorder=0)
+        narrow = last - end < 0.3 * last
         ax.text(
-            end + 0.015 * last, 0.985 * top, "extrapolation", color=MUTED, va="top", ha="left", fontsize=9.5, style="italic"
+            last * 0.995 if narrow else end + 0.015 * last,
+            top - 0.015 * (top - lowest),
+            "extrapolation",
+            color=MUTED,
+            ha="right" if narrow else "left",
+            va="top",
+            rotation=90 if narrow else 0,
+            fontsize=9.5,
+            style="italic",
         )
     _errorbars(ax, look.points, filled=True)
     if look.rest is not None and look.rest.deflection.size:
@@ -183,7 +201,9 @@ def _curve(ax: Axes, curve: Curve) -> None:
         ax.plot(x[outside], curve.force[1][outside], color=c, linestyle=(0, (4, 2)), linewidth=1.5, zorder=3)
 
 
-def _band(ax: Axes, x: Array, force: Array, where: Array, c: str, alpha: float, hatch: str | None = None) -> None:
+def _band(
+    ax: Axes, x: Array, force: Array, where: NDArray[np.bool_], c: str, alpha: float, hatch: str | None = None
+) -> None:
     edge = (*mpl.colors.to_rgb(c), 0.45) if hatch else "none"
     ax.fill_between(
         x, force[0], force[2], where=where, facecolor=(*mpl.colors.to_rgb(c), alpha), edgecolor=edge, hatch=hatch, lw=0
@@ -219,8 +239,9 @@ def _look_residuals(ax: Axes, look: Look, first: bool) -> None:
     ax.axhline(0, color=INK, linewidth=0.8)
     for curve in look.curves:
         c = colour(curve.material)
-        marks = {"marker": marker(curve.material), "markersize": 3.5} if n <= 60 else {}
-        ax.plot(x, curve.residual[1], color=c, linewidth=1.1, dashes=dashes(curve.material) or (None, None), **marks)  # type: ignore[arg-type]
+        mark = marker(curve.material) if n <= 60 else "none"
+        line = linestyle(curve.material)
+        ax.plot(x, curve.residual[1], color=c, linewidth=1.1, linestyle=line, marker=mark, markersize=3.5)
     _residual_scale(ax, [c.residual[1] for c in look.curves], look.points.sd)
     ax.set_xlabel("deflection (mm)")
     ax.grid(color=FAINT, linewidth=0.6)
@@ -261,14 +282,14 @@ def _look_legend(looks: Sequence[Look]) -> list[Any]:
             )
         )  # fmt: skip
     for name, c in curves.items():
-        style = {"dashes": dashes(c.material)} if dashes(c.material) else {}
-        handles.append(Line2D([], [], color=colour(c.material), marker=marker(c.material), markersize=4, label=name, **style))  # type: ignore[arg-type]
+        line, mark = linestyle(c.material), marker(c.material)
+        handles.append(Line2D([], [], color=colour(c.material), linestyle=line, marker=mark, markersize=4, label=name))
     return handles
 
 
 def residuals(points: Points, quantiles: Array, material: str, kind: str = "svg") -> Picture:
     """(b) Residuals (3, N) N with their 90 % band, in units of the measurement's own noise; in N if it states none."""
-    with mpl.rc_context(_RC):
+    with _style():
         figure = _figure(3.4)
         ax = figure.subplots()
         scale = points.sd if points.sd is not None else np.ones(points.deflection.size)
@@ -279,7 +300,9 @@ def residuals(points: Points, quantiles: Array, material: str, kind: str = "svg"
         ax.axhline(0, color=INK, linewidth=0.8)
         ax.vlines(x, z[0], z[2], color=c, linewidth=3, alpha=0.4)
         ax.plot(x, z[1], color=c, linewidth=0.8, marker=marker(material), markersize=_marker_size(points) + 0.5)
-        reach = 1.1 * max(float(np.nanmax(np.abs(z))) if np.any(np.isfinite(z)) else 1.0, 3.0 if points.sd is not None else 0)
+        reach = 1.1 * max(
+            float(np.nanmax(np.abs(z))) if np.any(np.isfinite(z)) else 1.0, 3.0 if points.sd is not None else 0
+        )
         ax.set_ylim(-reach, reach)
         ax.set_xlim(left=0)
         ax.set_xlabel("deflection (mm)")
@@ -288,7 +311,7 @@ def residuals(points: Points, quantiles: Array, material: str, kind: str = "svg"
         return _encoded(figure, kind)
 
 
-# ---- draws -------------------------------------------------------------------------------------------------------------
+# ---- draws -----------------------------------------------------------------------------------------------------------
 
 
 def corner_plot(
@@ -303,7 +326,7 @@ def corner_plot(
     m, c = draws.shape[1], colour(material)
     ranges = [_span(draws[:, i]) for i in range(m)]
     size = WIDTH if m > 2 else 6.0
-    with mpl.rc_context({**_RC, "font.size": 10, "axes.labelsize": 10.5, "xtick.labelsize": 8.5, "ytick.labelsize": 8.5}):
+    with _style({"font.size": 10, "axes.labelsize": 10.5, "xtick.labelsize": 8.5, "ytick.labelsize": 8.5}):
         figure = Figure(figsize=(size, size))
         FigureCanvasAgg(figure)
         level = logging.getLogger().level
@@ -321,17 +344,36 @@ def corner_plot(
             plot_datapoints=m <= 3,
             fill_contours=True,
             no_fill_contours=False,
-            max_n_ticks=3 if m > 4 else 4,
-            labelpad=0.12 if m > 4 else 0.05,
             hist_kwargs={"linewidth": 1.3},
         )
         logging.getLogger().setLevel(level)
+        _corner_margins(figure, m, size)
         handles = [Line2D([], [], color=c, label="posterior: 50 % and 90 % regions")]
         for values, shade, mark, label in ((optimum, INK, "x", "our optimum"), (published, ALARM, "+", "paper")):
             if values is not None and _mark(figure, m, values, ranges, shade, mark):
-                handles.append(Line2D([], [], color=shade, marker=mark, linestyle="none", markersize=8, mew=2, label=label))
+                handles.append(
+                    Line2D([], [], color=shade, marker=mark, linestyle="none", markersize=8, mew=2, label=label)
+                )
         figure.legend(handles=handles, loc="upper right", bbox_to_anchor=(0.985, 0.985))
         return _encoded(figure, "png")
+
+
+def _corner_margins(figure: Figure, m: int, size: float) -> None:
+    """Room for ticks and labels in inches, however many panels there are."""
+    left, right, gap = 0.95, 0.1, 0.07
+    figure.subplots_adjust(
+        left=left / size, bottom=left / size, right=1 - right / size, top=1 - right / size, wspace=gap, hspace=gap
+    )
+    panel = (size - left - right) / m
+    for i, ax in enumerate(np.array(figure.axes).reshape(m, m).flat):
+        row, column = divmod(i, m)
+        if row < column:
+            continue
+        ax.xaxis.set_major_locator(MaxNLocator(3, prune="both"))
+        ax.xaxis.set_label_coords(0.5, -0.72 / panel)
+        if row > column:
+            ax.yaxis.set_major_locator(MaxNLocator(3, prune="both"))
+            ax.yaxis.set_label_coords(-0.72 / panel, 0.5)
 
 
 def _span(values: Array) -> tuple[float, float]:
@@ -363,25 +405,25 @@ def traces(
     m = means.shape[2]
     columns = 1 if m <= 2 else 2
     rows = -(-m // columns)
-    shades = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
-    with mpl.rc_context({**_RC, "lines.linewidth": 0.8}):
-        figure = _figure(1.0 + 1.35 * rows)
+    keep = np.unique(np.linspace(0, len(steps) - 1, min(len(steps), MOST_POINTS)).astype(int))
+    with _style({"lines.linewidth": 0.8}):
+        figure = _figure(0.9 + 1.35 * rows)
         grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
-        for k, ax in enumerate(grid.T.flat):
-            if k >= m:
-                ax.set_visible(False)
-                continue
+        panels = list(grid.T.flat)
+        if m < len(panels):  # the free cell is above others, so that every column ends in an axis
+            panels.remove(grid[0, -1])
+            grid[0, -1].set_visible(False)
+        for k, ax in enumerate(panels):
             for e in range(means.shape[0]):
-                ax.plot(steps, means[e, :, k], color=shades[e % len(shades)], label=f"ensemble {e + 1}")
+                ax.plot(steps[keep], means[e, keep, k], color=_ENSEMBLES[e % 6], label=f"ensemble {e + 1}")
             if burn_in > steps[0]:
                 ax.axvspan(float(steps[0]), burn_in, color=FAINT, zorder=0)
             ax.set_ylabel(f"{symbol(names[k])} ({units[k] or '-'})", fontsize=10)
             ax.yaxis.set_major_locator(MaxNLocator(4))
             ax.margins(x=0)
-            if k % rows == rows - 1 or k == m - 1:
-                ax.set_xlabel("step of the ensemble (-)")
-                ax.tick_params(labelbottom=True)
-        handles = grid[0, 0].get_legend_handles_labels()[0]
+        for ax in grid[-1]:
+            ax.set_xlabel("step of the ensemble (-)")
+        handles = panels[0].get_legend_handles_labels()[0]
         if burn_in > steps[0]:
             handles = [*handles, Patch(color=FAINT, label="discarded")]
         figure.legend(handles=handles, loc="outside upper center", ncols=5)
@@ -402,7 +444,7 @@ def prior_posterior(marginals: Sequence[Marginal], material: str, kind: str = "s
     """(h) Prior and posterior of every coordinate, each scaled to its own maximum."""
     columns = min(4, len(marginals))
     rows = -(-len(marginals) // columns)
-    with mpl.rc_context(_RC):
+    with _style():
         figure = _figure(0.7 + 1.9 * rows)
         grid = figure.subplots(rows, columns, squeeze=False)
         for k, ax in enumerate(grid.flat):
@@ -422,9 +464,9 @@ def _marginal(ax: Axes, marginal: Marginal, c: str) -> None:
     own = np.quantile(marginal.posterior, [0.001, 0.999])
     narrow = own[1] - own[0] < 0.15 * (high - low)
     fine = np.linspace(own[0], own[1], 25) if narrow and own[1] > own[0] else edges
-    for values, bins, style in ((marginal.prior, edges, {"color": FAINT}), (marginal.posterior, fine, {"color": c})):
+    for values, bins, shade, alpha in ((marginal.prior, edges, FAINT, 1.0), (marginal.posterior, fine, c, 0.75)):
         counts, _ = np.histogram(values, bins)
-        ax.stairs(counts / max(1, counts.max()), bins, fill=True, alpha=1.0 if style["color"] == FAINT else 0.75, **style)
+        ax.stairs(counts / max(1, counts.max()), bins, fill=True, color=shade, alpha=alpha)
     if narrow:  # a spike of a few pixels must be seen
         ax.axvline(float(np.median(marginal.posterior)), color=c, linewidth=1.5)
     ax.set_xlabel(f"{symbol(marginal.name)} ({marginal.unit or '-'})")
@@ -434,21 +476,26 @@ def _marginal(ax: Axes, marginal: Marginal, c: str) -> None:
     ax.spines["left"].set_visible(False)
 
 
-# ---- the film ----------------------------------------------------------------------------------------------------------
+# ---- the film --------------------------------------------------------------------------------------------------------
+
+
+# Red to blue with the dark ends cut off, so that lines stay visible on it.
+_PALE = LinearSegmentedColormap.from_list("pale", mpl.colormaps["RdBu"](np.linspace(0.14, 0.86, 64)))
 
 
 def convexity_map(
     l1: Array, l2: Array, eigenvalue: Array, deflections: Array, state_1: Array, state_2: Array, material: str
 ) -> Picture:
-    """(e) Least eigenvalue (A, B) of the Hessian over G d at l1 (A,), l2 (B,), and states (D, M) per deflection (D,)."""
-    with mpl.rc_context(_RC):
+    """(e) Least eigenvalue (A, B) of the Hessian over G d at l1 (A,), l2 (B,), and states (D, M) per deflection."""
+    with _style():
         figure = _figure(4.3)
         ax = figure.subplots()
         shown = np.ma.masked_invalid(eigenvalue.T)
         size = max(float(np.quantile(np.abs(shown.compressed()), 0.98)) if shown.count() else 1.0, 2.0)
         norm: Any = SymLogNorm(1.0, vmin=-size, vmax=size, base=10) if size > 20 else TwoSlopeNorm(0.0, -size, size)
         ax.set_facecolor("#b9c0c7")
-        mesh = ax.pcolormesh(l1, l2, shown, cmap="RdBu", norm=norm, shading="gouraud", rasterized=True, alpha=0.75)
+        extent = (float(l1[0]), float(l1[-1]), float(l2[0]), float(l2[-1]))
+        mesh = ax.imshow(shown, cmap=_PALE, norm=norm, origin="lower", extent=extent, aspect="auto")
         if shown.count() and shown.min() < 0 < shown.max():
             ax.contour(l1, l2, shown, levels=[0.0], colors=[ALARM], linewidths=1.6)
         shades = mpl.colormaps["cividis"](np.linspace(0.0, 0.92, max(1, deflections.size)))
@@ -473,32 +520,42 @@ def profiles(
     """(f) Deformed film: radius f and height h, (D, P, M) m, of P draws at D deflections; disc and ring as bars."""
     x, y = 1e3 * radius, 1e3 * height
     c = colour(material)
-    with mpl.rc_context(_RC):
+    with _style():
         top = float(np.nanmax(y)) if np.any(np.isfinite(y)) else 1.0
-        figure = _figure(float(np.clip(1.0 + 7.5 * top / (2.15e3 * outer), 2.6, 9.0)))
+        figure = _figure(float(np.clip(0.9 + 5.3 * 1.14 * top / (2.35e3 * outer), 2.2, 8.0)), width=6.2)
         ax = figure.subplots()
         width = float(np.clip(15 / y.shape[1], 0.3, 1.0))
         for k in range(deflections.size):
             for side in (-1, 1):
                 ax.plot(side * x[k].T, y[k].T, color=c, linewidth=width, alpha=0.35)
-            ax.plot([-1e3 * inner, 1e3 * inner], [1e3 * deflections[k]] * 2, color=INK, linewidth=2.5, solid_capstyle="butt")
-            ax.text(0, 1e3 * deflections[k] + 0.012 * top, f"{1e3 * deflections[k]:.3g} mm", ha="center", va="bottom", fontsize=10)
+            ax.plot(
+                [-1e3 * inner, 1e3 * inner], [1e3 * deflections[k]] * 2, color=INK, linewidth=2.5, solid_capstyle="butt"
+            )
+            ax.text(
+                0,
+                1e3 * deflections[k] + 0.012 * top,
+                f"{1e3 * deflections[k]:.3g} mm",
+                ha="center",
+                va="bottom",
+                fontsize=10,
+            )
         for side in (-1, 1):
             ax.plot([side * 1e3 * outer, side * 1.12e3 * outer], [0, 0], color=INK, linewidth=4, solid_capstyle="butt")
         ax.set_aspect("equal")
         ax.set_xlabel("radius (mm)")
         ax.set_ylabel("height (mm)")
+        ax.set_xlim(-1.17e3 * outer, 1.17e3 * outer)
         ax.set_ylim(-0.04 * top, 1.1 * top)
         ax.grid(color=FAINT, linewidth=0.6)
         return _encoded(figure, kind)
 
 
-# ---- several runs ------------------------------------------------------------------------------------------------------
+# ---- several runs ----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Interval:
-    """One row of an interval plot: label, material, and 5, 50, 95 % (3,); ``note`` replaces what does not exist."""
+    """One row of an interval plot: label, material, and 5, 50, 95 % (3,); ``note`` stands there if they are nan."""
 
     label: str
     material: str
@@ -506,15 +563,17 @@ class Interval:
     note: str = ""
 
 
-def break_points(specimens: Sequence[str], observed: Array, predicted: Sequence[Sequence[Interval]], kind: str = "svg") -> Picture:
+def break_points(
+    specimens: Sequence[str], observed: Array, predicted: Sequence[Sequence[Interval]], kind: str = "svg"
+) -> Picture:
     """(g) Forces (S,) N at which specimens broke, and the predictions of each material for each of them."""
     n = max((len(p) for p in predicted), default=1)
-    with mpl.rc_context(_RC):
+    with _style():
         figure = _figure(1.4 + 0.19 * (n + 1.5) * len(specimens))
         ax = figure.subplots()
         _log_force_axis(ax, observed, predicted)
         low, high = ax.get_xlim()
-        for s, name in enumerate(specimens):
+        for s in range(len(specimens)):
             if s % 2:
                 ax.axhspan(s - 0.5, s + 0.5, color=SHADE, zorder=0, lw=0)
             ax.plot([observed[s]] * 2, [s - 0.42, s + 0.42], color=INK, linewidth=2.2, zorder=4)
@@ -527,9 +586,7 @@ def break_points(specimens: Sequence[str], observed: Array, predicted: Sequence[
         ax.grid(axis="x", which="both", color=FAINT, linewidth=0.5)
         names = {i.material: i for row in predicted for i in row}
         handles = [Line2D([], [], color=INK, linewidth=2.2, label="observed")]
-        handles += [
-            Line2D([], [], color=colour(m), marker=marker(m), markersize=5, label=title(m)) for m in names
-        ]
+        handles += [Line2D([], [], color=colour(m), marker=marker(m), markersize=5, label=title(m)) for m in names]
         figure.legend(handles=handles, loc="outside upper center", ncols=6, columnspacing=1.2, handlelength=1.6)
         return _encoded(figure, kind)
 
@@ -550,17 +607,15 @@ def _log_force_axis(ax: Axes, observed: Array, predicted: Sequence[Sequence[Inte
 def _interval(ax: Axes, interval: Interval, y: float, low: float, high: float) -> None:
     c, q = colour(interval.material), interval.quantiles
     if not np.any(np.isfinite(q)):
-        ax.text(high / 1.03, y, interval.note or "no force", color=c, fontsize=8.5, va="center", ha="right")
+        ax.text(high / 1.03, y, interval.note or "no force", color=c, fontsize=9, va="center", ha="right")
         return
     if q[1] > high or q[1] < low:
-        out = f"{q[1]:.3g} N {'>' if q[1] > high else '<'}"
+        out = f"{q[1]:,.0f} N \u2192" if q[1] > high else f"\u2190 {q[1]:.2g} N"
         edge = high / 1.03 if q[1] > high else low * 1.03
-        ax.text(edge, y, out, color=c, fontsize=8.5, va="center", ha="right" if q[1] > high else "left")
+        ax.text(edge, y, out, color=c, fontsize=9, va="center", ha="right" if q[1] > high else "left")
         return
     ax.plot([q[0], q[2]], [y, y], color=c, linewidth=2.4, solid_capstyle="butt", zorder=3)
     ax.plot([q[1]], [y], marker=marker(interval.material), color=c, markersize=5.5, zorder=3.5)
-    if interval.note:
-        ax.text(min(q[2] * 1.04, high / 1.3), y, interval.note, color=c, fontsize=8.5, va="center", ha="left")
 
 
 def forest(parameters: Mapping[str, Sequence[Interval]], units: Mapping[str, str], kind: str = "svg") -> Picture:
@@ -569,7 +624,7 @@ def forest(parameters: Mapping[str, Sequence[Interval]], units: Mapping[str, str
     columns = min(3, len(names))
     rows = -(-len(names) // columns)
     tallest = max(len(v) for v in parameters.values())
-    with mpl.rc_context(_RC):
+    with _style():
         figure = _figure(0.5 + rows * (0.75 + 0.27 * tallest))
         grid = figure.subplots(rows, columns, squeeze=False)
         for k, ax in enumerate(grid.flat):
@@ -577,7 +632,13 @@ def forest(parameters: Mapping[str, Sequence[Interval]], units: Mapping[str, str
                 ax.set_visible(False)
                 continue
             _forest_panel(ax, parameters[names[k]], f"{symbol(names[k])} ({units.get(names[k]) or '-'})")
+            if k % columns and _same_labels(parameters[names[k]], parameters[names[k - 1]]):
+                ax.tick_params(labelleft=False)
         return _encoded(figure, kind)
+
+
+def _same_labels(a: Sequence[Interval], b: Sequence[Interval]) -> bool:
+    return [i.label for i in a] == [i.label for i in b]
 
 
 def _forest_panel(ax: Axes, intervals: Sequence[Interval], label: str) -> None:
@@ -593,7 +654,7 @@ def _forest_panel(ax: Axes, intervals: Sequence[Interval], label: str) -> None:
     ax.grid(axis="x", color=FAINT, linewidth=0.6)
 
 
-# ---- the reconstruction ------------------------------------------------------------------------------------------------
+# ---- the reconstruction ----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -619,9 +680,10 @@ def reconstruction(ranges: Sequence[Recovered], losses: Sequence[LossBar], kind:
     """(i) The recovered curve, the number of its points, and what it leaves of the printed losses."""
     names = [r.name for r in ranges]
     labels = list(dict.fromkeys(b.label for b in losses))
-    with mpl.rc_context(_RC):
+    with _style():
         figure = _figure(3.6 + 0.5 + 0.23 * len(labels))
-        top, bottom = figure.subfigures(2, 1, height_ratios=(3.6, 0.5 + 0.23 * len(labels)))
+        parts: Any = figure.subfigures(2, 1, height_ratios=(3.6, 0.5 + 0.23 * len(labels)))
+        top, bottom = parts
         left, right = top.subplots(1, 2, width_ratios=(1.7, 1))
         _recovered(left, ranges)
         _counts(right, ranges)
@@ -683,8 +745,8 @@ def _loss_bars(ax: Axes, bars: Sequence[LossBar], labels: Sequence[str], name: s
         if outside or b.suspect:
             side = np.sign(v) or 1.0
             ax.text(
-                0.98 * reach * side if outside else v + 0.03 * reach * side, k, f"{v:.3g} mN", va="center", fontsize=8.5,
-                ha=("right" if side > 0 else "left") if outside else ("left" if side > 0 else "right"),
+                0.98 * reach * side if outside else v + 0.03 * reach * side, k, f"{v:.3g} mN", va="center",
+                fontsize=8.5, ha=("right" if side > 0 else "left") if outside else ("left" if side > 0 else "right"),
                 color="white" if outside else ALARM, fontweight="bold",
             )  # fmt: skip
     ax.set_xlim(-reach, reach)

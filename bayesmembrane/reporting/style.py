@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import re
+from typing import Literal
+
+LineStyle = Literal["-"] | tuple[float, tuple[float, ...]]
 
 # Okabe and Ito's palette, which colour-blind readers can tell apart; the line style says the same again.
 _COLOURS = {
@@ -48,9 +51,10 @@ def colour(material: str) -> str:
     return _COLOURS.get(material) or _OTHERS[_number(material) % len(_OTHERS)]
 
 
-def dashes(material: str) -> tuple[float, ...]:
-    """Lengths of dashes and gaps in points, () for a solid line."""
-    return _DASHES.get(material, (5, 1.5, 1.5, 1.5, 1.5, 1.5))
+def linestyle(material: str) -> LineStyle:
+    """One fixed line style per material: "-", or (offset, lengths of dashes and gaps in points)."""
+    lengths = _DASHES.get(material, (5, 1.5, 1.5, 1.5, 1.5, 1.5))
+    return (0.0, lengths) if lengths else "-"
 
 
 def marker(material: str) -> str:

@@ -1,0 +1,340 @@
+"""What the numbers say, in words. Every function takes numbers and gives sentences; none of them knows files or pages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+P_VALUE = 0.01
+"""Below this the residuals are larger than the measurement's own noise allows."""
+
+LOOSE = 0.7
+"""A posterior at least this wide, relative to its prior, says that the data hardly know the parameter."""
+
+FAILURES = 1e-3
+SAME_FORCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run in the few numbers that the answer needs. Lengths in m, forces in N, quantiles 5, 50, 95 %.
+
+    Attributes
+    ----------
+    name : of the material and the effects
+    end : largest deflection that was fitted
+    rmse : root mean square of the residual
+    own_noise : root mean square of the noise that the measurement states, None if it states none
+    extra_noise : median of the inferred noise, None if none was inferred
+    dominated : more than half of the posterior has an inferred noise above the stated one
+    p_value : of the residuals under the stated noise, None if unknown
+    modulus : quantiles of G d, N/m
+    thickness : of the film
+    status : how sampling ended: "converged", or why it stopped
+    ess, wanted : effective draws of the worst coordinate, and how many were asked for
+    r_hat : the largest
+    failed : share of all evaluations that failed numerically
+    last : largest deflection that is predicted
+    last_force : quantiles of the force there, nan where most draws have none
+    lost : share of the draws without a force there, by reason
+    loose : parameters that the data hardly determine, with posterior over prior width
+    """
+
+    name: str
+    end: float
+    rmse: float
+    own_noise: float | None
+    extra_noise: float | None
+    dominated: bool
+    p_value: float | None
+    modulus: tuple[float, float, float]
+    thickness: float
+    status: str
+    ess: float
+    wanted: float
+    r_hat: float
+    failed: float
+    last: float
+    last_force: tuple[float, float, float]
+    lost: Mapping[str, float]
+    loose: Mapping[str, float]
+
+    @property
+    def verdict(self) -> str:
+        """``adequate``, ``strained`` (small misfit, yet more than the noise), ``misses``, or ``unknown`` (no noise)."""
+        if self.own_noise is None:
+            return "unknown"
+        if self.dominated:
+            return "misses"
+        return "strained" if self.p_value is not None and self.p_value < P_VALUE else "adequate"
+
+    @property
+    def converged(self) -> bool:
+        """Whether sampling reached its goals."""
+        return self.status == "converged"
+
+
+# ---- numbers in words ------------------------------------------------------------------------------------------------
+
+
+def newtons(value: float) -> str:
+    """A force with three digits: mN below 0.1 N."""
+    if not math.isfinite(value):
+        return "no force"
+    if abs(value) < 0.0995:
+        return f"{_digits(1e3 * value)} mN"
+    return f"{_digits(value)} N" if abs(value) < 1e4 else f"{value:.2g} N"
+
+
+def millimetres(value: float) -> str:
+    """A length in mm with three digits."""
+    return f"{1e3 * value:.4g} mm"
+
+
+def percent(share: float) -> str:
+    """A share in per cent; never 0 or 100 unless it is."""
+    if 0 < share < 0.001:
+        return "less than 0.1 %"
+    if 0.999 < share < 1:
+        return "more than 99.9 %"
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.4g} %"
+
+
+def interval(low: float, middle: float, high: float, unit: str) -> str:
+    """``17.7 N/m (90 %: 17.2 to 18.1)``, with as many digits as the width deserves."""
+    width = high - low
+    if not math.isfinite(width):
+        return "unknown"
+    if width <= 0:
+        return f"{middle:.6g} {unit}".strip()
+    decimals = max(0, 1 - math.floor(math.log10(width)))
+    if decimals > 9 or abs(middle) >= 1e6:
+        return f"{middle:.4g} {unit} (90 %: {low:.4g} to {high:.4g})".replace("  ", " ")
+    own = f"{middle:.{decimals}f}{' ' + unit if unit else ''}"
+    return f"{own} (90 %: {low:.{decimals}f} to {high:.{decimals}f})"
+
+
+def listed(words: Iterable[str]) -> str:
+    """``a, b and c``."""
+    found = list(words)
+    return found[0] if len(found) == 1 else ", ".join(found[:-1]) + f" and {found[-1]}" if found else ""
+
+
+def _digits(value: float) -> str:
+    """Three significant digits without an exponent."""
+    if value == 0:
+        return "0"
+    decimals = max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:.{min(decimals, 6)}f}"
+
+
+# ---- the answer ------------------------------------------------------------------------------------------------------
+
+
+def answer(cases: Sequence[Case]) -> list[str]:
+    """Two to five sentences for each fitted range, the shortest range first; then how far sampling can be trusted."""
+    sentences = []
+    for end in sorted({c.end for c in cases}):
+        group = [c for c in cases if c.end == end]
+        sentences += [describes(group), stiffness(group), unknown(group), extrapolation(group)]
+    sentences.append(convergence(cases))
+    return [s for s in sentences if s]
+
+
+def describes(group: Sequence[Case]) -> str:
+    """Which materials describe the curve of one range."""
+    end = millimetres(group[0].end)
+    by = {v: [c for c in group if c.verdict == v] for v in ("adequate", "strained", "misses", "unknown")}
+    if by["unknown"]:
+        best = sorted(group, key=lambda c: c.rmse)
+        tail = f"; the others: {_named(best[1:])}" if best[1:] else ""
+        return (
+            f"Up to {end} the measurement states no noise, so that no material can be called adequate or not; "
+            f"the smallest root mean square residual has {_named(best[:1])}{tail}."
+        )
+    noise = newtons(group[0].own_noise or 0.0)
+    parts = []
+    if by["adequate"]:
+        verb = "describes" if len(by["adequate"]) == 1 else "describe"
+        parts.append(f"{_named(by['adequate'])} {verb} the curve within its noise of {noise}")
+    if by["strained"]:
+        verb, possessive = ("follows", "its") if len(by["strained"]) == 1 else ("follow", "their")
+        own = "" if by["adequate"] else f" of {noise}"
+        parts.append(
+            f"{_named(by['strained'])} {verb} the curve closely, but {possessive} residuals are larger than the "
+            f"noise{own} allows"
+        )
+    if by["misses"]:
+        parts.append(_missed(by["misses"], bool(parts), noise))
+    return f"Up to {end}, {'; '.join(parts)}."
+
+
+def _missed(cases: Sequence[Case], others: bool, noise: str) -> str:
+    one = len(cases) == 1
+    misfit = f"{'its' if one else 'their'} misfit exceeds the noise{'' if others else f' of {noise}'} and is counted as extra noise"
+    conclusion = f"{'it misses' if one else 'they miss'} something that the film does"
+    if others:
+        return f"{_named(cases)} {'does' if one else 'do'} not: {misfit}, which means that {conclusion}"
+    if one:
+        return f"{_named(cases)} does not describe the curve: {misfit}, which means that {conclusion}"
+    best = min(cases, key=lambda c: c.rmse)
+    rest = [c for c in cases if c is not best]
+    return (
+        f"no material describes the curve: {misfit}, which means that {conclusion}; the nearest is {_named([best])}, "
+        f"then {_named(sorted(rest, key=lambda c: c.rmse))}"
+    )
+
+
+def _named(cases: Sequence[Case]) -> str:
+    """Names with residuals; the first says what the number is."""
+    first = "rms residual "
+    return listed(f"{c.name} ({first if i == 0 else ''}{newtons(c.rmse)})" for i, c in enumerate(cases))
+
+
+def stiffness(group: Sequence[Case]) -> str:
+    """The initial stiffness by the materials that describe the curve, or by the nearest one."""
+    good = [c for c in group if c.verdict in ("adequate", "strained")] or [min(group, key=lambda c: c.rmse)]
+    told = [f"{interval(*c.modulus, 'N/m')} by {c.name}" for c in good]
+    modulus = [1e-6 * c.modulus[1] / c.thickness for c in good]
+    span = f"{min(modulus):.3g}" if len({f"{m:.3g}" for m in modulus}) == 1 else f"{min(modulus):.3g} to {max(modulus):.3g}"
+    return f"The initial shear modulus times thickness is {listed(told)}, that is a shear modulus of {span} MPa."
+
+
+def unknown(group: Sequence[Case]) -> str:
+    """What the data leave open: parameters whose posterior is about as wide as the prior."""
+    loose = [
+        f"{listed(c.loose)} of {c.name} (posterior {listed(percent(w) for w in c.loose.values())} as wide as the prior)"
+        for c in group
+        if c.loose
+    ]
+    return f"The data hardly determine {'; '.join(loose)}." if loose else ""
+
+
+def extrapolation(group: Sequence[Case]) -> str:
+    """What is predicted beyond the fitted range, by the materials that describe the curve, and where nothing can be."""
+    good = [c for c in group if c.verdict in ("adequate", "strained")] or list(group)
+    beyond = [c for c in good if c.last > 1.001 * c.end]
+    if not beyond:
+        return ""
+    there = [c for c in beyond if all(math.isfinite(v) for v in c.last_force)]
+    gone = [c for c in beyond if c not in there]
+    at = f"at {millimetres(beyond[0].last)}, beyond the fitted range,"
+    parts = []
+    if there:
+        told = listed(f"{_span(c)} ({c.name})" for c in there)
+        parts.append(f"{at} the force would be {told}")
+    if gone:
+        told = listed(f"{c.name} ({reasons(c.lost)})" for c in gone)
+        parts.append(f"{at if not there else 'there'} nothing can be said by {told}")
+    some = [c for c in there if sum(c.lost.values()) >= 0.01]
+    if some:
+        told = listed(f"{percent(sum(c.lost.values()))} of the draws of {c.name}" for c in some)
+        parts.append(f"{told} have no force there")
+    if not parts:
+        return ""
+    sentence = "; ".join(parts)
+    warning = " This is an extrapolation: only the form of the energy and the priors speak there."
+    return sentence[0].upper() + sentence[1:] + "." + warning
+
+
+def _span(case: Case) -> str:
+    low, _, high = case.last_force
+    return f"{newtons(low)} to {newtons(high)}"
+
+
+def reasons(lost: Mapping[str, float]) -> str:
+    """``locked for 40 %, not elliptic for 12 % of the draws``."""
+    told = [f"{name} for {percent(share)}" for name, share in sorted(lost.items(), key=lambda i: -i[1]) if share > 0]
+    return ", ".join(told) + " of the draws" if told else "no draw has a force"
+
+
+def convergence(cases: Sequence[Case]) -> str:
+    """Whether the sampling can be trusted."""
+    worst, r_hat = min(c.ess for c in cases), max(c.r_hat for c in cases)
+    told = f"worst effective sample size {worst:.0f}, worst R-hat {r_hat:.3f}"
+    good = sum(c.converged for c in cases)
+    if good == len(cases):
+        return f"Sampling converged{'' if good == 1 else f' in all {good} runs'} ({told})."
+    if len(cases) == 1:
+        return f"Sampling did not converge ({told}): take every number here as provisional."
+    return f"Sampling converged in {good} of {len(cases)} runs ({told}); the others are provisional, see the box above."
+
+
+# ---- warnings ----------------------------------------------------------------------------------------------------------
+
+
+def warnings(cases: Sequence[Case]) -> list[str]:
+    """What must be seen before anything else; empty if all is well."""
+    return [s for c in cases for s in (not_converged(c), failures(c)) if s]
+
+
+def not_converged(case: Case) -> str:
+    """Why a run is provisional, or ""."""
+    if case.converged:
+        return ""
+    faults = []
+    if case.ess < case.wanted:
+        faults.append(f"the effective sample size is {case.ess:.0f}, and {case.wanted:.0f} were asked for")
+    if case.r_hat > 1.01:
+        faults.append(f"R-hat is {case.r_hat:.3f}, and at most 1.01 says that the ensembles agree")
+    if not faults:
+        faults.append("the chains are shorter than 50 autocorrelation times")
+    return f"{case.name} up to {millimetres(case.end)}: sampling stopped early ({case.status}); {listed(faults)}."
+
+
+def failures(case: Case) -> str:
+    """That too many films could not be computed, or ""."""
+    if case.failed <= FAILURES:
+        return ""
+    return (
+        f"{case.name} up to {millimetres(case.end)}: {percent(case.failed)} of the films could not be computed to 1e-6 "
+        "and count as impossible; if they lie near the posterior, it is narrower than it should be."
+    )
+
+
+def disagreement(name: str, end: float, largest: float) -> str:
+    """That two solvers differ, or ""."""
+    if not largest > SAME_FORCE:
+        return ""
+    return (
+        f"{name} up to {millimetres(end)}: the two solvers disagree by up to {largest:.1e} of the force, more than 1e-6."
+    )
+
+
+# ---- losses ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class LossPair:
+    """Ours and the paper's loss of one material over one range, N, on the same curve."""
+
+    name: str
+    range: str
+    ours: float
+    paper: float | None
+
+
+def losses(pairs: Sequence[LossPair]) -> str:
+    """How our optima compare with the paper's parameters on the same curve."""
+    known = [(p, p.paper) for p in pairs if p.paper is not None]
+    if not known:
+        return ""
+    above = [p for p, paper in known if p.ours > paper * (1 + 1e-6)]
+    far = [(p, paper) for p, paper in known if p.ours < 0.5 * paper]
+    if above:
+        told = listed(f"{p.name} over {p.range}" for p in above)
+        return f"Our optimum has a larger loss than the paper's parameters for {told}: the search missed a minimum."
+    sentence = "No loss of ours lies above that of the paper's parameters on the same curve."
+    if far:
+        told = listed(f"{p.name} over {p.range} ({newtons(p.ours)} against {newtons(paper)})" for p, paper in far)
+        sentence += f" Ours is less than half of it for {told}."
+    return sentence
+
+
+def break_points(name: str, end: float, observed: Sequence[float], low: Sequence[float], high: Sequence[float]) -> str:
+    """How many observed breaks lie in the predicted 90 % intervals."""
+    inside = sum(a <= o <= b for o, a, b in zip(observed, low, high, strict=True))
+    none = sum(not math.isfinite(a) for a in low)
+    missing = f"; for {none} no force can be predicted" if none else ""
+    return f"{name} fitted up to {millimetres(end)}: {inside} of {len(observed)} inside the 90 % interval{missing}."

@@ -1,0 +1,141 @@
+"""A run as a report shows it: what was stored, and the few numbers that sentences need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from bayesmembrane.hypothesis import Hypothesis
+from bayesmembrane.inference.digest import Digest
+from bayesmembrane.inference.posterior import FAILURES
+from bayesmembrane.parameters import Array
+from bayesmembrane.reporting.sentences import LOOSE, Case
+from bayesmembrane.reporting.style import short, title
+
+
+@dataclass(frozen=True, eq=False)
+class Sampling:
+    """How a run was sampled.
+
+    status : "converged", or why it stopped
+    ess, r_hat, tau : (k,) of the coordinates; tau in steps
+    wanted : effective draws that were asked for
+    means : (E, T, k) means over the walkers of each ensemble at ``steps_at`` (T,), burn-in included
+    """
+
+    status: str
+    ess: Array
+    wanted: float
+    r_hat: Array
+    tau: Array
+    acceptance: float
+    ensembles: int
+    walkers: int
+    steps: int
+    burn: int
+    evaluations: int
+    seconds: float
+    means: Array
+    steps_at: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Specimen:
+    """Film, rig and origin in words."""
+
+    name: str
+    thickness: float
+    rig: str
+    inner_radius: float
+    outer_radius: float
+    origin: str
+    files: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """One run: x (S, k) are posterior draws, ``prior`` (P, k) draws of the truncated prior, both in coordinates.
+
+    ``masses`` maps convexity modes to (mass, standard error); ``outcomes`` counts what became of all evaluations.
+    ``facts`` are settings, versions and the like, ``cache`` its tally, ``crosscheck`` what the second solver found.
+    """
+
+    folder: str
+    hypothesis: Hypothesis
+    specimen: Specimen
+    data_hash: str
+    digest: Digest
+    x: Array
+    natural: Array
+    prior: Array
+    sampling: Sampling
+    outcomes: Mapping[str, int]
+    masses: Mapping[str, tuple[float, float]]
+    cache: Mapping[str, Any]
+    crosscheck: Mapping[str, Any]
+    facts: Mapping[str, Any]
+
+    @property
+    def material(self) -> str:
+        """Name of the material."""
+        return self.hypothesis.material.name
+
+    @property
+    def name(self) -> str:
+        """Material and effects, for people."""
+        effects = [getattr(e, "title", e.name.replace("_", " ")) for e in self.hypothesis.effects]
+        return " + ".join([self.hypothesis.material.title or title(self.material), *effects])
+
+    @property
+    def key(self) -> str:
+        """A word for anchors and JSON: material, effects, range."""
+        return f"{self.hypothesis.label()}-{1e3 * self.digest.end:.4g}mm".replace("+", "-").replace(".", "_")
+
+    @cached_property
+    def case(self) -> Case:
+        """The numbers that the answer needs."""
+        d, noise = self.digest, self._extra_noise()
+        own = d.fit["own_noise_N"]
+        gd = np.asarray(self.hypothesis.material.shear_modulus(self.hypothesis.films(self.x).T), dtype=float)
+        failed = sum(self.outcomes.get(o.label, 0) for o in FAILURES) / max(1, sum(self.outcomes.values()))
+        low, middle, high = np.quantile(gd, (0.05, 0.5, 0.95)).tolist()
+        force = d.curve[:, -1].tolist()
+        return Case(
+            name=self.name,
+            end=d.end,
+            rmse=float(d.fit["rmse_N"] or 0.0),
+            own_noise=own,
+            extra_noise=None if noise is None else float(np.median(noise)),
+            dominated=own is not None and noise is not None and bool(np.mean(noise > own) > 0.5),
+            p_value=d.fit["p_value"],
+            modulus=(low, middle, high),
+            thickness=self.specimen.thickness,
+            status=self.sampling.status,
+            ess=float(np.min(self.sampling.ess)),
+            wanted=self.sampling.wanted,
+            r_hat=float(np.max(self.sampling.r_hat)),
+            failed=failed,
+            last=float(d.deflection[-1]),
+            last_force=(force[0], force[1], force[2]),
+            lost={r: float(d.lost[i, -1]) for i, r in enumerate(d.reasons) if d.lost[i, -1] > 0},
+            loose=self._loose(),
+        )
+
+    def _extra_noise(self) -> Array | None:
+        names = self.hypothesis.natural_names
+        return self.natural[:, names.index("noise.sd")] if "noise.sd" in names else None
+
+    def _loose(self) -> dict[str, float]:
+        """Coordinates of the curve whose posterior is nearly as wide as the prior, with the ratio of the widths."""
+        found = {}
+        for i, p in enumerate(self.hypothesis.parameters[: self.hypothesis.curve_size]):
+            wide = float(np.subtract(*np.quantile(self.prior[:, i], (0.95, 0.05))))
+            ratio = float(np.subtract(*np.quantile(self.x[:, i], (0.95, 0.05)))) / wide if wide > 0 else 0.0
+            if ratio >= LOOSE:
+                found[short(p.name)] = ratio
+        return found
