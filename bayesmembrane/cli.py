@@ -5,14 +5,22 @@ The library is imported inside the verbs: numba and arviz take seconds that ``--
 
 from __future__ import annotations
 
+import shlex
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bayesmembrane.errors import BayesmembraneError, SettingsError
 from bayesmembrane.terminal import answer, log, numbers, out, table
+
+if TYPE_CHECKING:
+    from bayesmembrane.hypothesis import Hypothesis
+    from bayesmembrane.inference.sampling import Progress
+    from bayesmembrane.measurement import Measurement
 
 app = typer.Typer(
     add_completion=False,
@@ -28,6 +36,12 @@ Parameters = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on stdout; logs go to stderr.")]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of every random number.")]
+Curve = Annotated[Path, typer.Argument(help="The measured curve: CSV whose header names carry units.", metavar="CURVE")]
+SpecimenFile = Annotated[Path, typer.Option("--specimen", help="TOML with film, rig and noise.")]
+Effects = Annotated[str, typer.Option("--effects", help="Physical effects beside the material, by commas.")]
+MaxDeflection = Annotated[float | None, typer.Option("--max-deflection-mm", help="Use the curve up to here only, mm.")]
+Convexity = Annotated[str, typer.Option("--convexity", help="Convexity prior: reached, box, elliptic or none.")]
+Noise = Annotated[str, typer.Option("--noise", help="Noise model: white or ar1.")]
 
 
 @app.command()
@@ -137,6 +151,203 @@ def import_(
         f"complete {written.specimen} with the film and the rig before using them."
     )
     answer(document, as_json, lambda: out.print(sentence))
+
+
+@app.command()
+def reconstruct(
+    out_folder: Annotated[
+        Path | None, typer.Option("--out", help="Also write curve, TOML and covariance here.")
+    ] = None,
+    as_json: AsJson = False,
+    seed: Seed = 0,
+) -> None:
+    """The measured curve behind the paper's published losses, and which printed numbers contradict the others."""
+    from bayesmembrane.inference.reconstruction import reconstruct as run
+    from bayesmembrane.inference.reconstruction_files import write_reconstruction
+    from bayesmembrane.inference.reconstruction_table import read_published_table
+
+    printed = read_published_table()
+    with log.status("Locating the curve from 30 losses"):
+        found = run(printed, seed=seed)
+    document = found.to_json_dict()
+    if out_folder is not None:
+        document["files"] = [str(f) for f in write_reconstruction(found, printed, out_folder)]
+
+    def show() -> None:
+        for name in ("OP1", "OP2"):
+            part = document[name]
+            rows = zip(part["deflection_mm"], part["force_N"], part["sd_N"], strict=True)
+            cells = [[f"{d:.2f}", f"{f:.4f}", f"{s:.4f}"] for d, f, s in rows]
+            first, counts = part["first_mm"], part["n_points"]
+            likely = max(counts, key=counts.get)
+            title = (
+                f"{name}: {likely} points (probability {counts[likely]:.3f}), "
+                f"the first at {first['mean']:.2f} +- {first['sd']:.2f} mm"
+            )
+            table(title, ["deflection, mm", "force, N", "sd, N"], cells)
+        for row in document["suspect_rows"]:
+            changes = "; ".join(f"{c['entry']}: {c['printed']} -> {c['consistent']}" for c in row["corrections"])
+            out.print(f"{row['material']}, {row['column']}: {row['reason']} Consistent would be {changes}.")
+
+    answer(document, as_json, show)
+
+
+@app.command()
+def fit(
+    curve: Curve,
+    specimen: SpecimenFile,
+    material: Material,
+    effects: Effects = "",
+    max_deflection_mm: MaxDeflection = None,
+    loss: Annotated[str, typer.Option(help="euclidean (N) or weighted (by the measurement's noise).")] = "euclidean",
+    convexity: Convexity = "reached",
+    noise: Noise = "white",
+    as_json: AsJson = False,
+    seed: Seed = 0,
+) -> None:
+    """The least-squares parameters with their standard deviations."""
+    from bayesmembrane.inference.optimum import fit as run
+
+    measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
+    with log.status(f"Fitting {claim.label()}"):
+        found = run(measurement, claim, loss=loss, seed=seed)
+
+    def show() -> None:
+        rows = [
+            [name, f"{e.value:.6g}", "-" if e.sd is None else f"{e.sd:.2g}", e.unit]
+            for name, e in found.parameters.items()
+        ]
+        table(f"{claim.material.title} on {curve}", ["parameter", "value", "sd", "unit"], rows)
+        out.print(f"Loss {found.loss_N:.5g} N, rms residual {found.rmse_N:.4g} N, largest {found.max_N:.4g} N.")
+        out.print(f"The energy is {'' if found.convex else 'not '}convex where the film goes. Status: {found.status}.")
+        if found.at_bound:
+            out.print(
+                f"No optimum inside the bounds for {', '.join(found.at_bound)}: the loss falls, or is flat, up to there."
+            )
+        if found.constrained is not None and found.constrained is not found:
+            out.print(f"Among films that meet the convexity prior the least loss is {found.constrained.loss_N:.5g} N.")
+
+    answer(found.summary(), as_json, show)
+
+
+@app.command()
+def sample(
+    curve: Curve,
+    specimen: SpecimenFile,
+    material: Material,
+    effects: Effects = "",
+    max_deflection_mm: MaxDeflection = None,
+    convexity: Convexity = "reached",
+    noise: Noise = "white",
+    ess: Annotated[float, typer.Option(help="Wanted effective sample size of the worst parameter.")] = 1000.0,
+    out_folder: Annotated[Path, typer.Option("--out", help="Folder of the runs.")] = Path("chains"),
+    as_json: AsJson = False,
+    seed: Seed = 0,
+) -> None:
+    """The posterior, stored as a run; the same command continues a run that was interrupted."""
+    from bayesmembrane.cache import CachedSolver
+    from bayesmembrane.inference.digest import digest
+    from bayesmembrane.inference.run import sample as run
+
+    measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
+    cache = CachedSolver(out_folder / "curves")
+    with _bar(claim.label()) as tell:
+        done = run(measurement, claim, seed=seed, out=out_folder, ess=ess, progress=tell, solve=cache)
+    if done.interrupted:
+        log.print(f"Interrupted; the run is stored in {done.path}. The same command resumes it: {_command()}")
+        raise typer.Exit(130)
+    rest = None
+    if max_deflection_mm is not None and measurement.full_range > measurement.deflection.max():
+        whole = _measurement(curve, specimen)
+        rest = whole.select(whole.deflection > measurement.deflection.max())
+    digest(done, rest=rest, solve=cache)
+
+    def show() -> None:
+        rows = [
+            [name, f"{v['mean']:.5g}", f"{v['sd']:.2g}", f"{v['hdi_94'][0]:.5g} to {v['hdi_94'][1]:.5g}"]
+            for name, v in done.status["posterior"].items()
+        ]
+        table(f"{claim.material.title} on {curve}", ["parameter", "mean", "sd", "94 % interval"], rows)
+        s = done.status
+        out.print(f"ESS {s['ess_bulk']:.0f}, R-hat {s['r_hat']:.3f}, {s['evaluations']} curves, {s['seconds']:.0f} s.")
+        for sentence in s["sentences"]:
+            out.print(sentence)
+        out.print(f"Stored in {done.path}; bayesmembrane report {done.path} shows it.")
+
+    answer(done.summary(), as_json, show)
+
+
+@app.command()
+def report(
+    folders: Annotated[list[Path], typer.Argument(help="Run folders.", metavar="DIR...")],
+    out_folder: Annotated[Path, typer.Option("--out", help="Folder of the page.")] = Path("reports/report"),
+    title: Annotated[str | None, typer.Option(help="Title of the page.")] = None,
+    as_json: AsJson = False,
+    seed: Seed = 0,
+) -> None:
+    """One self-contained HTML page about one run or several."""
+    from bayesmembrane.inference.digest import digest
+    from bayesmembrane.inference.run import load_run
+    from bayesmembrane.reporting.page import write_report
+
+    runs = [load_run(folder) for folder in folders]
+    for run in runs:
+        digest(run)
+    page = write_report(runs, out_folder, title=title)
+    document = {"report": str(page), "runs": [str(f) for f in folders]}
+    answer(document, as_json, lambda: out.print(f"The report lies in {page}"))
+
+
+@app.command()
+def demo(
+    out_folder: Annotated[Path, typer.Option("--out", help="Folder of the page.")] = Path("reports/demo"),
+    chains: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("chains"),
+    ess: Annotated[float, typer.Option(help="Wanted effective sample size of the worst parameter.")] = 1000.0,
+    as_json: AsJson = False,
+    seed: Seed = 0,
+) -> None:
+    """Reconstruct, fit and sample five materials on both ranges of the data that ship, and report."""
+    from bayesmembrane.demo import demo as run
+
+    log.print("Five materials on two ranges; the first run compiles the solvers, which takes about a minute.")
+    document = run(out_folder, chains, seed=seed, ess=ess)
+    answer(document, as_json, lambda: out.print(f"The report lies in {document['report']}"))
+
+
+def _measurement(curve: Path, specimen: Path) -> Measurement:
+    from bayesmembrane.measurement import read_measurement
+
+    return read_measurement(curve, specimen)
+
+
+def _asked(
+    curve: Path, specimen: Path, material: str, effects: str, max_mm: float | None, convexity: str, noise: str
+) -> tuple[Measurement, Hypothesis]:
+    """The measurement, cut if asked for, and the hypothesis."""
+    from bayesmembrane.hypothesis import hypothesis
+
+    names = [name.strip() for name in effects.split(",") if name.strip()]
+    claim = hypothesis(material, names, noise, convexity)
+    measurement = _measurement(curve, specimen)
+    return measurement if max_mm is None else measurement.up_to(max_mm * 1e-3), claim
+
+
+@contextmanager
+def _bar(label: str) -> Iterator[Callable[[Progress], None]]:
+    """A progress bar on stderr for one run."""
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    from bayesmembrane.demo import share, told
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
+    with Bars(*columns, console=log) as bars:
+        task = bars.add_task(label, total=1.0, text="finding starts")
+        yield lambda p: bars.update(task, completed=share(p), text=told(p))
+
+
+def _command() -> str:
+    return shlex.join(["bayesmembrane", *sys.argv[1:]])
 
 
 def main() -> None:

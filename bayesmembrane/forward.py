@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -170,7 +171,7 @@ def beyond(deflection: Array, full_range: float) -> Array:
     """Deflections that, with those given, leave no gap larger than ``full_range / GAPS`` from 0 to ``full_range``."""
     ends = np.concatenate([[0.0], np.unique(np.abs(deflection)), [full_range]])
     extra = []
-    for low, high in zip(ends[:-1], ends[1:], strict=True):
+    for low, high in pairwise(ends):
         parts = int(np.ceil((high - low) / (full_range / GAPS) - 1e-9))
         extra += [low + (high - low) * i / parts for i in range(1, parts)]
     return np.array([*extra, full_range] if full_range > ends[-2] * (1 + 1e-12) else extra)

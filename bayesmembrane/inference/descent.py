@@ -52,7 +52,12 @@ def descend(
         take = rows[better]
         gain = (size[take] - new_size[better]) / np.maximum(size[take], 1e-300)
         slow[take] = np.where(gain < SLOW, slow[take] + 1, 0)
-        x[take], r[take], jacobian[take], size[take] = trial[better], new_r[better], new_jacobian[better], new_size[better]
+        x[take], r[take], jacobian[take], size[take] = (
+            trial[better],
+            new_r[better],
+            new_jacobian[better],
+            new_size[better],
+        )
         damping[rows] *= np.where(better, EASIER, HARDER)
         damping = np.maximum(damping, 1e-12)
         going[rows] = (damping[rows] < HOPELESS) & (slow[rows] < PATIENCE)

@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 from bayesmembrane.errors import StorageError
 from bayesmembrane.forward import Forward, Solve, annulus
 from bayesmembrane.hypothesis import CONVEXITY, Hypothesis
-from bayesmembrane.inference.goodness import goodness
 from bayesmembrane.inference.published import BreakPoint
+from bayesmembrane.inference.run import Run
 from bayesmembrane.materials.base import Material
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.mechanics import api
@@ -55,8 +55,6 @@ class Digest:
     lost : (L, G) share of the draws without a force, one row per reason in ``reasons``
     residual, rest_residual : (Q, N), (Q, R) N, measured minus computed
     curves_at : (Q, N) N, computed curve at the fitted points
-    fit : `Goodness` of the draw whose curve is nearest to the median one, as plain values: rmse_N, loss_N, max_N,
-        reduced_chi2, p_value, own_noise_N; None for the last three if the measurement states no noise
     film : (n,) membrane parameters of the draw whose curve is nearest to the median one
     convex : by convexity mode, the share of draws that meet it
     shape_at : (D,) m, deflections of what follows
@@ -85,7 +83,6 @@ class Digest:
     residual: Array
     rest_residual: Array
     curves_at: Array
-    fit: dict[str, float | None]
     film: Array
     convex: dict[str, float]
     shape_at: Array
@@ -126,6 +123,59 @@ _DIMS = {
     "break_at": "specimen", "break_thickness": "specimen", "break_force": "specimen",
     "break_predicted": "quantile specimen", "break_lost": "specimen",
 }  # fmt: skip
+
+
+def digest(
+    run: Run,
+    *,
+    up_to: float | None = None,
+    rest: Measurement | None = None,
+    breaks: Sequence[BreakPoint] = (),
+    draws: int = DRAWS,
+    solve: Solve = api.solve,
+) -> Digest:
+    """The digest of a run, stored in its folder as ``digest.nc``; arguments as in `digest_draws`.
+
+    A stored digest of the same draws is read back if it was made with the same arguments, or if none are given.
+    Raises `StorageError` if the folder cannot be written.
+    """
+    seed = int(run.settings["seed"])
+    asked = {"up_to": up_to, "rest": rest.data_hash if rest else None, "draws": draws, "breaks": repr(tuple(breaks))}
+    plain = up_to is None and rest is None and not breaks
+    stored = load_digest(run, None if plain else asked)
+    if stored is not None:
+        return stored
+    found = digest_draws(
+        run.hypothesis,
+        run.measurement,
+        run.draws(),
+        up_to=up_to,
+        rest=rest,
+        breaks=breaks,
+        draws=draws,
+        seed=seed,
+        solve=solve,
+    )
+    if run.path is not None:
+        _store(found, run.path, {"draws_of": _state(run), "asked": asked})
+    return found
+
+
+def load_digest(run: Run, asked: Mapping[str, Any] | None = None) -> Digest | None:
+    """The digest stored with a run; None if there is none, or it is of other draws or not what was ``asked``.
+
+    Raises `StorageError` if it is damaged.
+    """
+    if run.path is None or not (run.path / FILE).is_file():
+        return None
+    found, made = _read(run.path / FILE)
+    same = made.get("draws_of") == _state(run) and (asked is None or made.get("asked") == dict(asked))
+    return found if same else None
+
+
+def _state(run: Run) -> str:
+    """What tells one set of draws from another: an interrupted run that went on has more evaluations."""
+    return f"{run.settings['fingerprint']} {run.status['evaluations']}"
 
 
 def digest_draws(
@@ -194,7 +244,6 @@ def digest_draws(
         residual=_band(measurement.force - here.force),
         rest_residual=_band(unused.force - rest_force),
         curves_at=_band(here.force),
-        fit=goodness(measurement, here.force[chosen], hypothesis.curve_size).summary(),
         film=films[chosen],
         convex={m: float(np.mean(_meets(here.margin(m, hypothesis), m))) for m in CONVEXITY if m != "none"},
         shape_at=shape_at,
@@ -311,42 +360,40 @@ def _map(film: Material, states: Array) -> tuple[Array, Array, Array]:
 # ---- storage ---------------------------------------------------------------------------------------------------------
 
 
-def save_digest(found: Digest, folder: Path) -> Path:
-    """Write ``digest.nc`` into a run folder, whole or not at all; raises `StorageError` if that cannot be."""
+def _store(found: Digest, folder: Path, made: Mapping[str, Any]) -> None:
+    """Write ``digest.nc``, whole or not at all; raises `StorageError` if that cannot be."""
     path = folder / FILE
     try:
-        handle, name = tempfile.mkstemp(dir=folder, suffix=".part")
+        handle, name = tempfile.mkstemp(dir=folder, prefix=f".{FILE}.")
         os.close(handle)
-        _write(found, Path(name))
-        os.replace(name, path)
+        try:
+            _write(found, Path(name), made)
+            os.chmod(name, 0o644)
+            os.replace(name, path)
+        finally:
+            Path(name).unlink(missing_ok=True)
     except OSError as error:
-        raise StorageError(
-            f"the digest cannot be written ({error.strerror})", str(path), "free space or choose --out"
-        ) from None
-    return path
+        reason = error.strerror or error
+        raise StorageError(f"the digest cannot be written ({reason})", str(path), "free some space") from None
 
 
-def load_digest(folder: Path) -> Digest | None:
-    """The digest in a run folder; None if there is none. Raises `StorageError` if it is damaged."""
-    path = folder / FILE
-    if not path.is_file():
-        return None
+def _read(path: Path) -> tuple[Digest, dict[str, Any]]:
     try:
         with h5netcdf.File(path, "r") as file:
             arrays = {name: np.asarray(file.variables[name][...]) for name in _DIMS}
-            rest = json.loads(file.attrs["values"])
+            values: dict[str, Any] = json.loads(file.attrs["values"])
+            made = json.loads(file.attrs["made"])
+        values |= arrays
+        values["beyond"] = arrays["beyond"].astype(bool)
+        for name in ("reasons", "specimens"):
+            values[name] = tuple(values[name])
+        return Digest(**values), made
     except (OSError, KeyError, ValueError, TypeError) as error:
-        raise StorageError(
-            f"the digest cannot be read ({type(error).__name__})", str(path), "remove it and sample again"
-        ) from None
-    values: dict[str, Any] = {**rest, **arrays}
-    values["beyond"] = arrays["beyond"].astype(bool)
-    for name in ("reasons", "specimens"):
-        values[name] = tuple(rest[name])
-    return Digest(**values)
+        reason = type(error).__name__
+        raise StorageError(f"the digest is damaged ({reason})", str(path), "remove the file and report again") from None
 
 
-def _write(found: Digest, path: Path) -> None:
+def _write(found: Digest, path: Path, made: Mapping[str, Any]) -> None:
     values: Mapping[str, Any] = {f.name: getattr(found, f.name) for f in fields(found)}
     with h5netcdf.File(path, "w") as file:
         for name, dims in _DIMS.items():
@@ -357,3 +404,4 @@ def _write(found: Digest, path: Path) -> None:
                     file.dimensions[dimension] = size
             file.create_variable(name, tuple(dims.split()), data=array)
         file.attrs["values"] = json.dumps({k: v for k, v in values.items() if k not in _DIMS})
+        file.attrs["made"] = json.dumps(made)

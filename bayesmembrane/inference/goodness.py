@@ -25,12 +25,12 @@ class Goodness:
     own_noise_N : root mean square of the stated standard deviation, N; None likewise
     """
 
-    rmse_N: float
-    max_N: float
-    loss_N: float
+    rmse_N: float  # noqa: N815 - the unit is part of the name that users read
+    max_N: float  # noqa: N815
+    loss_N: float  # noqa: N815
     reduced_chi2: float | None
     p_value: float | None
-    own_noise_N: float | None
+    own_noise_N: float | None  # noqa: N815
 
     def summary(self) -> dict[str, Any]:
         return asdict(self)

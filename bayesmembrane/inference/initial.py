@@ -8,7 +8,7 @@ import numpy as np
 
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.inference.descent import descend
-from bayesmembrane.inference.optimum import Objective, apart
+from bayesmembrane.inference.objective import Objective, apart
 from bayesmembrane.inference.posterior import Posterior, tally
 from bayesmembrane.parameters import Array
 
@@ -111,7 +111,7 @@ def _around_valleys(objective: Objective, pool: Array, rms: float, rng: np.rando
     which = rng.integers(np.count_nonzero(likely), size=CLOSE)
     root = np.linalg.cholesky(np.linalg.inv(np.einsum("mnk,mnl->mkl", jacobian, jacobian)))
     z = rng.standard_normal((CLOSE, k)) * np.sqrt(DEGREES / rng.chisquare(DEGREES, (CLOSE, 1)))
-    return np.clip(x[likely][which] + WIDER * np.einsum("mkl,ml->mk", root[which], z), low, high)
+    return np.asarray(np.clip(x[likely][which] + WIDER * np.einsum("mkl,ml->mk", root[which], z), low, high))
 
 
 def _tempered(lp: Array, worth: float, count: int, rng: np.random.Generator) -> Array:
@@ -134,4 +134,4 @@ def _evolved(parents: Array, rng: np.random.Generator) -> Array:
     a, b = rng.integers(n, size=(2, n))
     g = 1.2 / np.sqrt(2 * k) * np.exp(0.3 * rng.standard_normal((n, 1)))
     jitter = 1e-3 * np.std(parents, axis=0) * rng.standard_normal((n, k))
-    return parents + g * (parents[a] - parents[b]) + jitter
+    return np.asarray(parents + g * (parents[a] - parents[b]) + jitter)

@@ -131,16 +131,20 @@ class Posterior:
 
 def _outcome(status: NDArray[np.int8], inside: NDArray[np.bool_]) -> NDArray[np.int8]:
     """(B,) from statuses (B, N): what physics or the prior rules out is no failure of the numbers."""
+    outcome = np.where(inside, Outcome.OK, Outcome.NOT_CONVEX).astype(np.int8)
+    bad = status != Status.OK
+    if not np.any(bad):
+        return outcome
     physical = np.isin(status, PHYSICAL)
     first = np.min(np.where(physical, status, np.iinfo(np.int8).max), axis=1)
-    outcome = np.where(inside, np.max(status, axis=1), Outcome.NOT_CONVEX)
+    outcome = np.where(inside, np.max(status, axis=1), outcome)
     return np.where(np.any(physical, axis=1), first, outcome).astype(np.int8)
 
 
 def tally(outcome: NDArray[np.int8]) -> Counter[str]:
     """How many draws met each outcome, by label."""
-    codes, counts = np.unique(outcome, return_counts=True)
-    return Counter({Outcome(int(c)).label: int(n) for c, n in zip(codes, counts, strict=True)})
+    counts = np.bincount(outcome, minlength=len(Outcome))
+    return Counter({o.label: int(counts[o]) for o in Outcome if counts[o]})
 
 
 def failure_sentence(counts: Mapping[str, int]) -> str:
@@ -158,6 +162,6 @@ def enough_points(hypothesis: Hypothesis, measurement: Measurement) -> None:
     """Raise `SettingsError` if the curve has more parameters than the measurement has points."""
     if len(measurement) < hypothesis.curve_size:
         raise SettingsError(
-            f"{len(measurement)} points cannot determine the {hypothesis.curve_size} parameters of {hypothesis.label()}",
+            f"{len(measurement)} points cannot fix the {hypothesis.curve_size} parameters of {hypothesis.label()}",
             remedy="use a longer range or a simpler material",
         )

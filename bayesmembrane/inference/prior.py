@@ -1,4 +1,4 @@
-"""The joint prior: independent coordinates, cut to energies that are convex enough, and the mass that the cut leaves."""
+"""The joint prior: independent coordinates, cut to energies that are convex enough, and the mass this leaves."""
 
 from __future__ import annotations
 

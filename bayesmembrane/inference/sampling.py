@@ -43,7 +43,9 @@ class Settings:
 
     def __post_init__(self) -> None:
         if not self.ess > 0 or self.ensembles < 2 or self.chunk < 10 or self.most_steps < self.chunk:
-            raise SettingsError("sampling needs a positive ESS, two ensembles, and a limit of at least one chunk of steps")
+            raise SettingsError(
+                "sampling needs a positive ESS, two ensembles, and a limit of at least one chunk of steps"
+            )
 
 
 @dataclass(frozen=True)
@@ -203,7 +205,7 @@ def _r_hat(flat: Array) -> float:
     """Rank-normalised R-hat of (E, draws) in order of time: arviz splits each ensemble into halves itself."""
     if flat.shape[1] < 4 or np.ptp(flat) == 0:
         return np.inf
-    return float(arviz.rhat(flat, method="rank"))
+    return float(arviz.rhat(flat, method="rank"))  # type: ignore[no-untyped-call]
 
 
 def _tau(x: Array) -> Array:
@@ -218,7 +220,9 @@ def _next_look(steps: int, found: Convergence, settings: Settings) -> int:
     tau = float(np.max(found.tau))
     needed = max(LEAST_TAUS * tau, (steps - found.burn) * settings.ess / float(np.min(found.ess)))
     guess = int(np.ceil(needed * 1.02)) + found.burn
-    return int(min(max(guess, steps + settings.chunk // 2, int(1.1 * steps)), max(int(GROWTH * steps), 2 * settings.chunk)))
+    return int(
+        min(max(guess, steps + settings.chunk // 2, int(1.1 * steps)), max(int(GROWTH * steps), 2 * settings.chunk))
+    )
 
 
 def _progress(chains: Chains, found: Convergence, settings: Settings) -> Progress:
@@ -264,7 +268,7 @@ def _start(posterior: Posterior, settings: Settings, seed: int, counts: Counter[
 
 
 def _walk(samplers: list[Any], chains: Chains, target: int, counts: Counter[str], began: float) -> Chains:
-    """Advance every ensemble to ``target`` steps; what an interruption cuts is dropped, so that all are equally long."""
+    """Advance every ensemble to ``target`` steps; what an interruption cuts is dropped: all stay equally long."""
     more = target - chains.steps
     if more <= 0:
         return chains

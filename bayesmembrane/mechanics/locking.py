@@ -82,7 +82,7 @@ def locking_deflection(extensibility: ArrayLike, prestretch: ArrayLike, ratio: f
     jm, l0 = np.broadcast_arrays(np.asarray(extensibility, dtype=float), np.asarray(prestretch, dtype=float))
     shape = jm.shape
     jm, l0 = jm.ravel(), l0.ravel()
-    if jm.size > 16 and np.all(l0 == l0[0]):
+    if jm.size and np.all(l0 == l0[0]):
         return np.asarray(_interpolate(jm, float(l0[0]), float(ratio))).reshape(shape)
     return np.asarray(_lock_all(jm, l0, np.log(ratio)), dtype=float).reshape(shape)
 

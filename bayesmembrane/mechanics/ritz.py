@@ -23,7 +23,7 @@ from bayesmembrane.parameters import Array
 LEVELS = ((1, 6), (2, 6), (4, 7), (8, 8), (24, 8))
 # A force is exact to 1e-6 while the next bubbles would release less than this part of F delta (measured: the error is
 # at most a hundred times the gain, over draws from the priors of all materials), and the first integral is even.
-GAIN_LIMIT = 2e-9
+GAIN_LIMIT = 2e-10
 VARIATION_LIMIT = 5e-4
 TOLERANCE = 1e-11
 MOST_ITERATIONS = 40
@@ -245,9 +245,8 @@ def solve(problem: Problem, sensitivities: bool = False) -> Curves:
         d = np.where(locked, np.where(reach > 0, reach, 1e-3), d)
     search = _Search(problem, d, ~locked, sensitivities)
     for level in range(1, len(LEVELS)):
-        if search.settled:
+        if not search.improve(level):
             break
-        search.improve(level)
     _pass_on(search.status)
     search.status[locked] = Status.LOCKED
     return _curves(problem, search, back)
@@ -277,22 +276,20 @@ class _Search:
         film, column = np.nonzero((self.status == Status.UNRESOLVED) & wanted)
         self.rough: _Rough = film, column, unknowns[film, :, column]
 
-    @property
-    def settled(self) -> bool:
-        """True if a finer basis has nothing to do."""
-        return not np.any(self.wanted & (self.status != Status.OK))
-
-    def improve(self, level: int) -> None:
-        """One level up: refine the rough states, and follow again the films whose path was lost."""
-        doubtful = self.status == Status.ITERATION_LIMIT
+    def improve(self, level: int) -> bool:
+        """One level up: refine the rough states, and follow again the films whose path was lost. False if none is."""
         if level == 1:
             # The loss of stability is believed when a finer basis confirms it.
-            doubtful |= (self.status == Status.NOT_ELLIPTIC) | (self.status == Status.INDEFINITE)
-        doubtful &= self.wanted
+            self.status[np.isin(self.status, (Status.NOT_ELLIPTIC, Status.INDEFINITE))] = Status.ITERATION_LIMIT
+        rough = self._refine(level)
+        doubtful = (self.status == Status.ITERATION_LIMIT) & self.wanted
         films = np.flatnonzero(np.any(doubtful, axis=1))
-        parts = [self._refine(level), self._follow(level, films, doubtful[films])]
-        film, column, unknowns = (np.concatenate(v) for v in zip(*parts, strict=True))
+        if not films.size and not rough[0].size:
+            return False
+        parts = zip(rough, self._follow(level, films, doubtful[films]), strict=True)
+        film, column, unknowns = (np.concatenate(v) for v in parts)
         self.rough = film, column, unknowns
+        return True
 
     def _refine(self, level: int) -> _Rough:
         """Each rough state from its own solution, all side by side; returns those that are still rough."""
@@ -303,8 +300,10 @@ class _Search:
         start = np.kron(_prolongation(ratio, level - 1), np.eye(2)) @ unknowns.T
         result, unknowns = _run(_films(self.problem, film), d[None], np.ones(1, np.bool_), start.T, level, self.wishes)
         verdict = result[:, kernels.STATUS, 0].astype(np.int8)
-        self.result[film, :, column], self.status[film, column] = result[..., 0], verdict
         still = verdict == Status.UNRESOLVED
+        # A rough state that leads to no stable one lay astray: its film is followed again.
+        verdict[(verdict != Status.OK) & ~still] = Status.ITERATION_LIMIT
+        self.result[film, :, column], self.status[film, column] = result[..., 0], verdict
         return film[still], column[still], unknowns[still, :, 0]
 
     def _follow(self, level: int, films: NDArray[np.intp], doubtful: NDArray[np.bool_]) -> _Rough:
@@ -314,8 +313,6 @@ class _Search:
         result, unknowns = follow(_films(self.problem, films), self.d[films], level, self.wishes)
         verdict = result[:, kernels.STATUS].astype(np.int8)
         self._explain(films, verdict, level)
-        # A reason is not given up for a numerical failure.
-        doubtful = doubtful & ~(_named(self.status[films]) & (verdict == Status.ITERATION_LIMIT))
         at, column = np.nonzero(doubtful)
         self.result[films[at], :, column] = result[at, :, column]
         self.status[films[at], column] = verdict[at, column]
@@ -347,17 +344,13 @@ class _Search:
             verdict[some[i], lost[some[i]]] = reason[i]
 
 
-def _named(status: NDArray[np.int8]) -> NDArray[np.bool_]:
-    return np.isin(status, (Status.NOT_ELLIPTIC, Status.INDEFINITE, Status.LOCKED))
-
-
 def _pass_on(status: NDArray[np.int8]) -> None:
-    """What could not be solved beyond a loss of stability, in ascending deflection (B, N), is given that reason."""
-    if not np.any(status):
-        return
-    for reason in (Status.NOT_ELLIPTIC, Status.INDEFINITE):
-        passed = np.logical_or.accumulate(status == reason, axis=1)
-        status[passed & np.isin(status, (Status.UNRESOLVED, Status.ITERATION_LIMIT))] = reason
+    """What has no state beyond a loss of stability, in ascending deflection (B, N), is given the first such reason."""
+    named = (status == Status.NOT_ELLIPTIC) | (status == Status.INDEFINITE)
+    films = np.flatnonzero(np.any(named, axis=1))
+    first = status[films, np.argmax(named[films], axis=1)]
+    passed = np.logical_or.accumulate(named[films], axis=1) & (status[films] != Status.OK)
+    status[films] = np.where(passed, first[:, None], status[films])
 
 
 def _path_end(problem: Problem, low: Array, high: Array, level: int) -> tuple[Array, NDArray[np.bool_]]:

@@ -100,4 +100,4 @@ def _gaps(measurement: Measurement) -> Array:
     gap = np.abs(np.diff(place))
     if gap.size == 0 or np.median(gap) == 0:
         return np.ones(gap.size)
-    return np.maximum(gap / np.median(gap), SHORTEST)
+    return np.asarray(np.maximum(gap / np.median(gap), SHORTEST))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import io
 import logging
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -30,8 +31,8 @@ from bayesmembrane.parameters import Array
 from bayesmembrane.reporting.style import ALARM, FAINT, INK, MUTED, SHADE, colour, linestyle, marker, symbol, title
 
 WIDTH = 9.0  # inches: 900 px at 100 dpi
-DPI = 150
-MOST_POINTS = 400  # of a line that is drawn
+DPI = 120
+MOST_POINTS = 300  # of a line that is drawn
 _ENSEMBLES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 _RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -88,7 +89,17 @@ def _encoded(figure: Figure, kind: str) -> Picture:
     metadata = {"Date": None} if kind == "svg" else {"Software": None}
     with _style():
         figure.savefig(out, format=kind, dpi=DPI, metadata=metadata)
-    return Picture(out.getvalue(), kind)
+    data = out.getvalue()
+    return Picture(_PATH.sub(_rounded, data) if kind == "svg" else data, kind)
+
+
+_PATH = re.compile(rb' d="[^"]*"')
+_LONG = re.compile(rb"(\.\d\d)\d+")
+
+
+def _rounded(path: re.Match[bytes]) -> bytes:
+    """Coordinates with two decimals: a hundredth of a point is not seen, and halves the file."""
+    return _LONG.sub(rb"\1", path[0])
 
 
 def _figure(height: float, width: float = WIDTH) -> Figure:
@@ -515,7 +526,7 @@ def convexity_map(
 
 
 def profiles(
-    deflections: Array, radius: Array, height: Array, inner: float, outer: float, material: str, kind: str = "svg"
+    deflections: Array, radius: Array, height: Array, inner: float, outer: float, material: str, kind: str = "png"
 ) -> Picture:
     """(f) Deformed film: radius f and height h, (D, P, M) m, of P draws at D deflections; disc and ring as bars."""
     x, y = 1e3 * radius, 1e3 * height

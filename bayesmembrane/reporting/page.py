@@ -6,7 +6,7 @@ import json
 import os
 import tempfile
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from typing import Any
 import jinja2
 import numpy as np
 
+from bayesmembrane.cache import Tally
 from bayesmembrane.errors import SettingsError, StorageError
 from bayesmembrane.inference.published import Compared
 from bayesmembrane.inference.reconstruction_result import Reconstruction
@@ -21,7 +22,8 @@ from bayesmembrane.inference.run import Run
 from bayesmembrane.reporting import figures, sentences, tables
 from bayesmembrane.reporting.figures import Picture
 from bayesmembrane.reporting.reading import read
-from bayesmembrane.reporting.style import short, title as material_title
+from bayesmembrane.reporting.style import spoken
+from bayesmembrane.reporting.style import title as material_title
 from bayesmembrane.reporting.tables import Table
 from bayesmembrane.reporting.view import Shown
 
@@ -58,6 +60,7 @@ def write_report(
     reconstruction: Reconstruction | None = None,
     fits: Sequence[Compared] | None = None,
     title: str | None = None,
+    cache: Tally | None = None,
 ) -> Path:
     """Write ``out/index.html`` and ``out/report.json`` about one run or several, and return the page's path.
 
@@ -67,7 +70,8 @@ def write_report(
     out : folder; made if it is missing
     reconstruction : shown in a section of its own
     fits : our optima beside the paper's, from `inference.published.compare_with_paper`
-    title : of the page; the specimens' names unless given
+    title : of the page; made of the specimens' names unless given
+    cache : what the curve cache did while all this was computed
 
     A report of an earlier time is replaced, any other file is not: `StorageError`. The same error, or `DataError`,
     names a folder that holds no run; `SettingsError` says that there is none at all.
@@ -77,7 +81,7 @@ def write_report(
     for name in (PAGE, TWIN):
         _refuse_foreign(out / name)
     shown = [read(run) for run in runs]
-    return write_shown(shown, out, reconstruction, fits or (), title)
+    return write_shown(shown, out, reconstruction, fits or (), title, cache)
 
 
 def write_shown(
@@ -86,6 +90,7 @@ def write_shown(
     reconstruction: Reconstruction | None = None,
     compared: Sequence[Compared] = (),
     title: str | None = None,
+    cache: Tally | None = None,
 ) -> Path:
     """As `write_report`, of runs that have been read."""
     shown = sorted(shown, key=lambda s: (s.digest.end, s.data_hash))
@@ -93,12 +98,12 @@ def write_shown(
     title = title or f"What the force curve of {sentences.listed(names)} says"
     cases = [s.case for s in shown]
     warnings = [*sentences.warnings(cases), *_solver_warnings(shown)]
-    told = [*sentences.answer(cases), *_loss_sentence(compared), *_reconstruction_sentences(reconstruction)]
-    parts = [_data(shown), _curves(shown), _comparison(shown, compared)]
+    told = sentences.answer(cases)
+    parts = [_data(shown, reconstruction), _curves(shown), _comparison(shown, compared)]
     parts += [_break_points(shown)] if shown[0].digest.specimens else []
     parts += [_reconstruction(reconstruction)] if reconstruction is not None else []
     parts += [_run(s, _of(s, compared)) for s in shown]
-    parts += [_checks(shown), _made(shown)]
+    parts += [_checks(shown), _made(shown, cache)]
     twin = {
         "generator": GENERATOR,
         "title": title,
@@ -106,14 +111,19 @@ def write_shown(
         "warnings": warnings,
         "tables": {b.table.name: b.table.records() for p in parts for b in p.blocks if b.table is not None},
     }
-    page = _environment().get_template("report.html.j2").render(
-        generator=GENERATOR,
-        title=title,
-        subtitle=_subtitle(shown),
-        answer=told,
-        warnings=warnings,
-        sections=parts,
-        footer="Bands hold what data and priors leave open if the material is right. Forces in N or mN, lengths in mm.",
+    page = (
+        _environment()
+        .get_template("report.html.j2")
+        .render(
+            generator=GENERATOR,
+            title=title,
+            subtitle=_subtitle(shown),
+            answer=told,
+            warnings=warnings,
+            sections=parts,
+            footer="Bands hold what data and priors leave open if the material is right. Forces in N or mN, lengths "
+            "in mm.",
+        )
     )
     _write(out / TWIN, json.dumps(twin, indent=1, allow_nan=False, ensure_ascii=False))
     _write(out / PAGE, page)
@@ -143,8 +153,8 @@ def _subtitle(shown: Sequence[Shown]) -> str:
 # ---- sections --------------------------------------------------------------------------------------------------------
 
 
-def _data(shown: Sequence[Shown]) -> Section:
-    blocks = []
+def _data(shown: Sequence[Shown], reconstruction: Reconstruction | None) -> Section:
+    blocks = [Block("text", s) for s in _reconstruction_sentences(reconstruction)]
     for group in _groups(shown):
         s = group[0]
         d, film = s.digest, s.specimen
@@ -181,8 +191,10 @@ def _curves(shown: Sequence[Shown]) -> Section:
                 "figure",
                 picture=figures.first_look([look]),
                 alt=f"Measured force against deflection up to {end} with the curves of {names}, and their residuals",
-                caption=f"Force (N) against deflection (mm), fitted up to {end}: median curves and 90 % bands of {names}. "
-                "Beyond the fitted range curves are dashed and bands hatched: there only the form of the energy and the "
+                caption=f"Force (N) against deflection (mm), fitted up to {end}: median curves and 90 % bands of "
+                f"{names}. "
+                "Beyond the fitted range curves are dashed and bands hatched: there only the form of the energy and "
+                "the "
                 "priors speak. Below: measured minus median force (N); the grey band is two standard deviations of the "
                 "stated noise. The vertical axis of the residuals is logarithmic away from zero where it has to be.",
             )
@@ -219,13 +231,16 @@ def _held_out(s: Shown) -> str:
     worst = sentences.newtons(float(np.nanmax(np.abs(r[1]))))
     missing = f", and {n - int(known.sum())} points have no prediction" if not np.all(known) else ""
     return (
-        f"{s.name}: of the {n} points beyond the fitted range {inside} lie in the 90 % band; the median misses them by up "
+        f"{s.name}: of the {n} points beyond the fitted range {inside} lie in the 90 % band; the median misses them "
+        f"by up "
         f"to {worst}{missing}."
     )
 
 
 def _comparison(shown: Sequence[Shown], compared: Sequence[Compared]) -> Section:
-    blocks = [_table(tables.fits_table(shown))]
+    more = sentences.details([s.case for s in shown])
+    blocks = [Block("list", lines=tuple(more))] if more else []
+    blocks.append(_table(tables.fits_table(shown)))
     if compared:
         blocks += [Block("text", s) for s in _loss_sentence(compared)]
         blocks.append(_table(tables.losses_table(compared)))
@@ -249,7 +264,7 @@ def _forest(runs: Sequence[Shown], label: str) -> Block:
     }
     units = dict(zip(first.hypothesis.natural_names, first.hypothesis.natural_units, strict=True))
     ends = sentences.listed(f"{1e3 * s.digest.end:.4g}" for s in runs)
-    listed = sentences.listed(f"{short(n)} ({units[n]})" for n in parameters)
+    listed = sentences.listed(f"{spoken(n)} ({units[n]})" for n in parameters)
     return Block(
         "figure",
         picture=figures.forest(parameters, units),
@@ -276,8 +291,10 @@ def _break_points(shown: Sequence[Shown]) -> Section:
             Block(
                 "figure",
                 picture=figures.break_points(names, d.break_force, rows),
-                alt=f"Forces at the break points of {len(names)} specimens, observed and predicted from fits up to {end}",
-                caption=f"Force (N) at the deflections at which {len(names)} specimens broke: observed, and predicted by "
+                alt=f"Forces at the break points of {len(names)} specimens, observed and predicted from fits up to "
+                f"{end}",
+                caption=f"Force (N) at the deflections at which {len(names)} specimens broke: observed, and predicted "
+                f"by "
                 f"films fitted up to {end}, scaled with the thickness (median, 90 % interval). The specimens had been "
                 "cycled before they broke, and the fitted curve is a first loading.",
             )
@@ -323,9 +340,7 @@ def _reconstruction(found: Reconstruction) -> Section:
     if found.suspects:
         blocks.append(Block("heading", "Printed entries that contradict the rest"))
         blocks.append(Block("list", lines=tuple(_suspect_line(s) for s in found.suspects)))
-    influence = {
-        name: f"{1e3 * float(np.max(np.abs(force - found.force))):.3g} mN" for name, force in found.influence.items()
-    }
+    influence = {i.changed: f"{1e3 * float(np.max(np.abs(i.force - found.force))):.3g} mN" for i in found.influence}
     if influence:
         caption = "Largest change of any recovered force (mN) when one assumption of the reconstruction is changed."
         blocks.append(_table(tables.facts_table("reconstruction influence", caption, influence)))
@@ -360,7 +375,8 @@ def _residuals(s: Shown) -> Block:
         picture=figures.residuals(_points(s), s.digest.residual, s.material),
         alt=f"Residuals of {s.name} against deflection {unit}",
         caption=f"{s.name}: measured minus computed force {unit} against deflection (mm), with the 90 % band of the "
-        "posterior. The grey bands are one and two standard deviations. Residuals that follow each other with one sign say "
+        "posterior. The grey bands are one and two standard deviations. Residuals that follow each other with one "
+        "sign say "
         "that the curve has another shape, or that the errors of the points depend on each other.",
     )
 
@@ -375,13 +391,16 @@ def _corner(s: Shown, compared: Compared | None) -> Block:
         own = [n.partition(".")[2] if n.startswith(f"{s.material}.") else "" for n in h.natural_names]
         optimum = [held.get(n) for n in own]
         published = [compared.published.get(n) for n in own] if compared.published else None
-        marked = " Crosses: our least-squares optimum under the convexity prior, and the paper's, where they lie inside."
-    names = sentences.listed(f"{short(n)} ({u})" for n, u in zip(h.natural_names, h.natural_units, strict=True))
+        marked = (
+            " Crosses: our least-squares optimum under the convexity prior, and the paper's, where they lie inside."
+        )
+    names = sentences.listed(f"{spoken(n)} ({u})" for n, u in zip(h.natural_names, h.natural_units, strict=True))
     return Block(
         "figure",
         picture=figures.corner_plot(thin, h.natural_names, h.natural_units, s.material, optimum, published),
         alt=f"Corner plot of the parameters of {s.name}",
-        caption=f"{s.name}: posterior of {names}, one by one and in pairs (regions that hold 50 % and 90 %; dashed: 5, 50 "
+        caption=f"{s.name}: posterior of {names}, one by one and in pairs (regions that hold 50 % and 90 %; dashed: "
+        f"5, 50 "
         f"and 95 %).{marked}",
     )
 
@@ -389,7 +408,7 @@ def _corner(s: Shown, compared: Compared | None) -> Block:
 def _priors(s: Shown) -> Block:
     parameters = s.hypothesis.parameters
     marginals = [figures.Marginal(p.name, p.unit, s.prior[:, i], s.x[:, i]) for i, p in enumerate(parameters)]
-    names = sentences.listed(f"{short(p.name)} ({p.unit})" for p in parameters)
+    names = sentences.listed(f"{spoken(p.name)} ({p.unit})" for p in parameters)
     return Block(
         "figure",
         picture=figures.prior_posterior(marginals, s.material),
@@ -401,12 +420,13 @@ def _priors(s: Shown) -> Block:
 def _traces(s: Shown) -> Block:
     parameters = s.hypothesis.parameters
     names, units = [p.name for p in parameters], [p.unit for p in parameters]
-    listed = sentences.listed(f"{short(n)} ({u})" for n, u in zip(names, units, strict=True))
+    listed = sentences.listed(f"{spoken(n)} ({u})" for n, u in zip(names, units, strict=True))
     return Block(
         "figure",
         picture=figures.traces(s.sampling.means, s.sampling.steps_at, s.sampling.burn, names, units),
         alt=f"Means of the ensembles of {s.name} against the step",
-        caption=f"{s.name}: mean over the walkers of each ensemble against the step (-), for {listed}. What is shaded was "
+        caption=f"{s.name}: mean over the walkers of each ensemble against the step (-), for {listed}. What is shaded "
+        f"was "
         "discarded. Ensembles that stay apart, or drift, have not converged.",
     )
 
@@ -418,8 +438,10 @@ def _map(s: Shown) -> Block:
         "figure",
         picture=figures.convexity_map(d.map_1, d.map_2, d.eigenvalue, d.shape_at, d.state_1, d.state_2, s.material),
         alt=f"Map of the convexity of {s.name} over the stretches, with the states that the film reaches",
-        caption=f"{s.name}: least eigenvalue of the Hessian of the energy over G d (-) in the plane of the stretches (-), for "
-        "the draw nearest to the median curve, and the states that its film passes from the ring to the disc at several "
+        caption=f"{s.name}: least eigenvalue of the Hessian of the energy over G d (-) in the plane of the stretches "
+        f"(-), for "
+        "the draw nearest to the median curve, and the states that its film passes from the ring to the disc at "
+        "several "
         f"deflections (mm). Convexity prior: {s.hypothesis.convexity}; posterior draws that meet each mode: {shares}.",
     )
 
@@ -433,7 +455,8 @@ def _profiles(s: Shown) -> Block:
             d.shape_at, d.shape_radius, d.shape_height, film.inner_radius, film.outer_radius, s.material
         ),
         alt=f"Deformed film of {s.name} at {at} mm",
-        caption=f"{s.name}: the deformed film, height (mm) against radius (mm), at deflections of {at} mm; one thin line for "
+        caption=f"{s.name}: the deformed film, height (mm) against radius (mm), at deflections of {at} mm; one thin "
+        f"line for "
         f"each of {d.shape_radius.shape[1]} posterior draws.",
     )
 
@@ -442,7 +465,8 @@ def _checks(shown: Sequence[Shown]) -> Section:
     blocks = [
         Block(
             "text",
-            "Every run computes a sample of its posterior draws a second time with the other solver, which works by another "
+            "Every run computes a sample of its posterior draws a second time with the other solver, which works by "
+            "another "
             "principle (shooting against energy minimisation), and reports the largest disagreement.",
         )
     ]
@@ -458,9 +482,11 @@ def _checks(shown: Sequence[Shown]) -> Section:
     return Section("checks", "Cross-checks", tuple(blocks))
 
 
-def _made(shown: Sequence[Shown]) -> Section:
+def _made(shown: Sequence[Shown], cache: Tally | None) -> Section:
     blocks = [_table(tables.sampling_table(shown))]
     caches = {f"{s.name}, {1e3 * s.digest.end:.4g} mm": dict(s.cache) for s in shown if s.cache}
+    if cache is not None:
+        caches["all together"] = {**asdict(cache), "seconds_saved": cache.seconds_saved}
     if caches:
         caption = "The curve cache: films found, solved, and passed by because their draws never repeat; times in s."
         blocks.append(_table(tables.facts_table("cache", caption, caches)))
@@ -517,7 +543,7 @@ def _reconstruction_sentences(found: Reconstruction | None) -> list[str]:
 def _solver_warnings(shown: Sequence[Shown]) -> list[str]:
     found = []
     for s in shown:
-        largest = s.crosscheck.get("largest_relative_difference")
+        largest = s.crosscheck.get("largest")
         if isinstance(largest, float):
             found.append(sentences.disagreement(s.name, s.digest.end, largest))
     return [f for f in found if f]
@@ -545,7 +571,9 @@ def _write(path: Path, text: str) -> None:
             file.write(text)
         os.replace(file.name, path)
     except OSError as error:
-        raise StorageError(f"the report cannot be written ({error.strerror})", str(path), "choose another folder") from None
+        raise StorageError(
+            f"the report cannot be written ({error.strerror})", str(path), "choose another folder"
+        ) from None
 
 
 __all__ = ["look_of", "write_report", "write_shown"]

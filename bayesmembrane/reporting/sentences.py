@@ -1,4 +1,6 @@
-"""What the numbers say, in words. Every function takes numbers and gives sentences; none of them knows files or pages."""
+"""What the numbers say, in words. Every function takes numbers and gives sentences; none of them knows files or
+pages.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +14,7 @@ P_VALUE = 0.01
 LOOSE = 0.7
 """A posterior at least this wide, relative to its prior, says that the data hardly know the parameter."""
 
+GOOD = ("adequate", "strained")
 FAILURES = 1e-3
 SAME_FORCE = 1e-6
 
@@ -108,9 +111,8 @@ def interval(low: float, middle: float, high: float, unit: str) -> str:
         return "unknown"
     if width <= 0:
         return f"{middle:.6g} {unit}".strip()
-    decimals = max(0, 1 - math.floor(math.log10(width)))
-    if decimals > 9 or abs(middle) >= 1e6:
-        return f"{middle:.4g} {unit} (90 %: {low:.4g} to {high:.4g})".replace("  ", " ")
+    half = max(min(high - middle, middle - low), width / 50)  # a long tail must not hide how sharp the other side is
+    decimals = min(9, max(0, 1 - math.floor(math.log10(2 * half))))
     own = f"{middle:.{decimals}f}{' ' + unit if unit else ''}"
     return f"{own} (90 %: {low:.{decimals}f} to {high:.{decimals}f})"
 
@@ -133,13 +135,22 @@ def _digits(value: float) -> str:
 
 
 def answer(cases: Sequence[Case]) -> list[str]:
-    """Two to five sentences for each fitted range, the shortest range first; then how far sampling can be trusted."""
-    sentences = []
-    for end in sorted({c.end for c in cases}):
-        group = [c for c in cases if c.end == end]
-        sentences += [describes(group), stiffness(group), unknown(group), extrapolation(group)]
-    sentences.append(convergence(cases))
-    return [s for s in sentences if s]
+    """What to read if one reads nothing else: what describes each range, how stiff, what lies beyond, what to trust."""
+    groups = _by_range(cases)
+    telling = next((g for g in groups if any(c.verdict in GOOD for c in g)), groups[-1])
+    told = [*(describes(g) for g in groups), stiffness(telling), extrapolation(telling), convergence(cases)]
+    return [t for t in told if t]
+
+
+def details(cases: Sequence[Case]) -> list[str]:
+    """The other ranges' stiffness and extrapolation, and what the data leave open."""
+    said = answer(cases)
+    told = [f(g) for g in _by_range(cases) for f in (unknown, stiffness, extrapolation)]
+    return [t for t in told if t and t not in said]
+
+
+def _by_range(cases: Sequence[Case]) -> list[list[Case]]:
+    return [[c for c in cases if c.end == end] for end in sorted({c.end for c in cases})]
 
 
 def describes(group: Sequence[Case]) -> str:
@@ -172,32 +183,35 @@ def describes(group: Sequence[Case]) -> str:
 
 def _missed(cases: Sequence[Case], others: bool, noise: str) -> str:
     one = len(cases) == 1
-    misfit = f"{'its' if one else 'their'} misfit exceeds the noise{'' if others else f' of {noise}'} and is counted as extra noise"
-    conclusion = f"{'it misses' if one else 'they miss'} something that the film does"
+    limit = "the noise" if others else f"the noise of {noise}"
+    misfit = f"{'its' if one else 'their'} misfit exceeds {limit} and is counted as extra noise"
+    conclusion = f"so {'it misses' if one else 'each misses'} something that the film does"
     if others:
-        return f"{_named(cases)} {'does' if one else 'do'} not: {misfit}, which means that {conclusion}"
+        return f"{_named(cases)} {'does' if one else 'do'} not: {misfit}, {conclusion}"
     if one:
-        return f"{_named(cases)} does not describe the curve: {misfit}, which means that {conclusion}"
-    best = min(cases, key=lambda c: c.rmse)
-    rest = [c for c in cases if c is not best]
+        return f"{_named(cases)} does not describe the curve: {misfit}, {conclusion}"
+    ordered = sorted(cases, key=lambda c: c.rmse)
     return (
-        f"no material describes the curve: {misfit}, which means that {conclusion}; the nearest is {_named([best])}, "
-        f"then {_named(sorted(rest, key=lambda c: c.rmse))}"
+        f"no material describes the curve: {misfit}, {conclusion}; the nearest is {_named(ordered[:1])}, "
+        f"then {_named(ordered[1:])}"
     )
 
 
 def _named(cases: Sequence[Case]) -> str:
     """Names with residuals; the first says what the number is."""
-    first = "rms residual "
-    return listed(f"{c.name} ({first if i == 0 else ''}{newtons(c.rmse)})" for i, c in enumerate(cases))
+    return listed(f"{c.name} ({'rms residual ' if i == 0 else ''}{newtons(c.rmse)})" for i, c in enumerate(cases))
 
 
 def stiffness(group: Sequence[Case]) -> str:
     """The initial stiffness by the materials that describe the curve, or by the nearest one."""
-    good = [c for c in group if c.verdict in ("adequate", "strained")] or [min(group, key=lambda c: c.rmse)]
+    good = [c for c in group if c.verdict in GOOD] or [min(group, key=lambda c: c.rmse)]
     told = [f"{interval(*c.modulus, 'N/m')} by {c.name}" for c in good]
     modulus = [1e-6 * c.modulus[1] / c.thickness for c in good]
-    span = f"{min(modulus):.3g}" if len({f"{m:.3g}" for m in modulus}) == 1 else f"{min(modulus):.3g} to {max(modulus):.3g}"
+    span = (
+        f"{min(modulus):.3g}"
+        if len({f"{m:.3g}" for m in modulus}) == 1
+        else f"{min(modulus):.3g} to {max(modulus):.3g}"
+    )
     return f"The initial shear modulus times thickness is {listed(told)}, that is a shear modulus of {span} MPa."
 
 
@@ -213,7 +227,7 @@ def unknown(group: Sequence[Case]) -> str:
 
 def extrapolation(group: Sequence[Case]) -> str:
     """What is predicted beyond the fitted range, by the materials that describe the curve, and where nothing can be."""
-    good = [c for c in group if c.verdict in ("adequate", "strained")] or list(group)
+    good = [c for c in group if c.verdict in GOOD] or list(group)
     beyond = [c for c in good if c.last > 1.001 * c.end]
     if not beyond:
         return ""
@@ -261,7 +275,7 @@ def convergence(cases: Sequence[Case]) -> str:
     return f"Sampling converged in {good} of {len(cases)} runs ({told}); the others are provisional, see the box above."
 
 
-# ---- warnings ----------------------------------------------------------------------------------------------------------
+# ---- warnings --------------------------------------------------------------------------------------------------------
 
 
 def warnings(cases: Sequence[Case]) -> list[str]:
@@ -275,9 +289,9 @@ def not_converged(case: Case) -> str:
         return ""
     faults = []
     if case.ess < case.wanted:
-        faults.append(f"the effective sample size is {case.ess:.0f}, and {case.wanted:.0f} were asked for")
+        faults.append(f"the effective sample size is {case.ess:.0f} instead of {case.wanted:.0f}")
     if case.r_hat > 1.01:
-        faults.append(f"R-hat is {case.r_hat:.3f}, and at most 1.01 says that the ensembles agree")
+        faults.append(f"R-hat is {case.r_hat:.3f} instead of at most 1.01, so that the ensembles disagree")
     if not faults:
         faults.append("the chains are shorter than 50 autocorrelation times")
     return f"{case.name} up to {millimetres(case.end)}: sampling stopped early ({case.status}); {listed(faults)}."
@@ -297,12 +311,11 @@ def disagreement(name: str, end: float, largest: float) -> str:
     """That two solvers differ, or ""."""
     if not largest > SAME_FORCE:
         return ""
-    return (
-        f"{name} up to {millimetres(end)}: the two solvers disagree by up to {largest:.1e} of the force, more than 1e-6."
-    )
+    size = f"{largest:.1e} of the force, more than 1e-6"
+    return f"{name} up to {millimetres(end)}: the two solvers disagree by up to {size}."
 
 
-# ---- losses ------------------------------------------------------------------------------------------------------------
+# ---- losses ----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

@@ -93,3 +93,14 @@ def symbol(name: str) -> str:
 def with_unit(name: str, unit: str) -> str:
     """Symbol and unit for an axis; a pure number carries ``(-)``."""
     return f"{symbol(name)} ({unit or '-'})"
+
+
+def spoken(name: str) -> str:
+    """The name of a parameter in running text: ``gent.ln_jm`` -> ``ln Jm``, ``yeoh.c2_c1`` -> ``c2/c1``."""
+    own = short(name)
+    ratio = re.fullmatch(r"([a-z]\d+)_([a-z]\d+)", own)
+    if ratio:
+        return f"{ratio[1]}/{ratio[2]}"
+    for raw, shown in (("ln_gd", "ln Gd"), ("ln_jm", "ln Jm"), ("ln_", "ln ")):
+        own = own.replace(raw, shown)
+    return own.replace("_", " ")

@@ -12,7 +12,7 @@ import numpy as np
 from bayesmembrane.inference.published import Compared
 from bayesmembrane.parameters import Array
 from bayesmembrane.reporting.sentences import percent
-from bayesmembrane.reporting.style import short, title
+from bayesmembrane.reporting.style import spoken, title
 from bayesmembrane.reporting.view import Shown
 
 Value = str | float | int | bool | None
@@ -34,12 +34,18 @@ class Column:
             return "yes" if value else "no"
         if isinstance(value, str):
             return value
-        return percent(float(value)) if self.form == "%" else _plain(f"{value:{self.form}}")
+        if self.form == "%":
+            return percent(float(value))
+        if self.form == "p" and value < 1e-4:
+            return "< 0.0001"
+        return _plain(f"{value:{'.2g' if self.form == 'p' else self.form}}")
 
 
 def _plain(text: str) -> str:
-    """A number with a true minus sign."""
-    return text.replace("-", "\u2212", 1) if text.startswith("-") else text
+    """A number without an exponent where that is short, and with a true minus sign."""
+    if "e" in text and abs(float(text)) < 1e7 and abs(float(text)) >= 1e-4:
+        text = f"{float(text):,.0f}" if abs(float(text)) >= 1 else f"{float(text):.6f}".rstrip("0")
+    return "\u2212" + text[1:] if text.startswith("-") else text
 
 
 @dataclass(frozen=True)
@@ -68,7 +74,7 @@ def _finite(value: Value) -> Value:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _number(value: Any) -> float | None:
+def _number(value: float | None) -> float | None:
     return None if value is None else float(value)
 
 
@@ -85,13 +91,13 @@ def fits_table(shown: Sequence[Shown]) -> Table:
         Column("own_noise_mN", "stated noise (mN)", ".3g"),
         Column("extra_noise_mN", "inferred extra noise (mN)", ".3g"),
         Column("reduced_chi2", "reduced chi-square", ".3g"),
-        Column("p_value", "p-value", ".2g"),
+        Column("p_value", "p-value", "p"),
         Column("verdict", "verdict"),
     )
     words = {"adequate": "describes the curve", "strained": "close, not within noise", "misses": "misses something"}
     rows = []
     for s in shown:
-        fit, case = s.digest.fit, s.case
+        fit, case = s.goodness, s.case
         rows.append(
             (
                 s.name,
@@ -110,8 +116,8 @@ def fits_table(shown: Sequence[Shown]) -> Table:
         )
     return Table(
         "fits",
-        "Residuals of the median curve of each run: forces in N and mN, deflections in mm. Chi-square and p-value use the "
-        "noise that the measurement states, never the inferred one.",
+        "Residuals of the most probable draw of each run: forces in N and mN, deflections in mm. Chi-square and p-value "
+        "use the noise that the measurement states, never the inferred one.",
         columns,
         tuple(rows),
     )
@@ -184,7 +190,7 @@ def parameters_table(s: Shown, compared: Compared | None = None) -> Table:
         low, high = hdi(values)
         rows.append(
             (
-                short(name),
+                spoken(name),
                 unit,
                 float(np.mean(values)),
                 float(np.std(values)),
@@ -206,19 +212,17 @@ def coordinates_table(s: Shown) -> Table:
         Column("prior", "prior"),
         Column("mean", "posterior mean", ".5g"),
         Column("sd", "posterior sd", ".2g"),
-        Column("ess", "ESS (-)", ".0f"),
-        Column("r_hat", "R-hat (-)", ".4f"),
+        Column("tau", "autocorrelation (steps)", ".0f"),
     )
     rows = tuple(
         (
-            short(p.name),
+            spoken(p.name),
             p.unit,
             p.meaning,
             str(p.prior),
             float(np.mean(s.x[:, i])),
             float(np.std(s.x[:, i])),
-            float(s.sampling.ess[i]),
-            float(s.sampling.r_hat[i]),
+            float(s.sampling.tau[i]),
         )
         for i, p in enumerate(s.hypothesis.parameters)
     )
@@ -246,7 +250,7 @@ def losses_table(compared: Sequence[Compared]) -> Table:
             c.printed,
             c.evaluated,
             c.ours / c.evaluated if c.evaluated else None,
-            ", ".join(short(n) for n in c.at_bound) or None,
+            ", ".join(spoken(n) for n in c.at_bound) or None,
         )
         for c in compared
     )
@@ -288,7 +292,8 @@ def _interval(q: Array, lost: float) -> str:
     gone = f"; {percent(lost)} none" if lost >= 0.005 else ""
     if not np.all(np.isfinite(q)):
         return f"no force ({percent(lost)} of the draws)"
-    return f"{q[1]:.3g} ({q[0]:.3g} to {q[2]:.3g}){gone}"
+    low, middle, high = (_plain(f"{v:.3g}") for v in q)
+    return f"{middle} ({low} to {high}){gone}"
 
 
 def masses_table(shown: Sequence[Shown]) -> Table:
@@ -311,7 +316,8 @@ def masses_table(shown: Sequence[Shown]) -> Table:
         for s in shown
     )
     caption = (
-        "Convexity, shares in %: part of the untruncated prior that each mode leaves, and part of the posterior draws that "
+        "Convexity, shares in %: part of the untruncated prior that each mode leaves, and part of the posterior draws "
+        "that "
         "meet it. reached: the Hessian is positive semidefinite on the states that the film reaches; box: on [1, 8]^2; "
         "elliptic: P11 > 0 and P22 > 0 on the reached states."
     )

@@ -14,7 +14,7 @@ from bayesmembrane.inference.digest import Digest
 from bayesmembrane.inference.posterior import FAILURES
 from bayesmembrane.parameters import Array
 from bayesmembrane.reporting.sentences import LOOSE, Case
-from bayesmembrane.reporting.style import short, title
+from bayesmembrane.reporting.style import spoken, title
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,15 +22,16 @@ class Sampling:
     """How a run was sampled.
 
     status : "converged", or why it stopped
-    ess, r_hat, tau : (k,) of the coordinates; tau in steps
+    ess, r_hat : of the worst coordinate
     wanted : effective draws that were asked for
+    tau : (k,) autocorrelation times of the coordinates, steps
     means : (E, T, k) means over the walkers of each ensemble at ``steps_at`` (T,), burn-in included
     """
 
     status: str
-    ess: Array
+    ess: float
     wanted: float
-    r_hat: Array
+    r_hat: float
     tau: Array
     acceptance: float
     ensembles: int
@@ -61,8 +62,12 @@ class Specimen:
 class Shown:
     """One run: x (S, k) are posterior draws, ``prior`` (P, k) draws of the truncated prior, both in coordinates.
 
-    ``masses`` maps convexity modes to (mass, standard error); ``outcomes`` counts what became of all evaluations.
-    ``facts`` are settings, versions and the like, ``cache`` its tally, ``crosscheck`` what the second solver found.
+    goodness : of the draw with the largest posterior density (`inference.goodness`)
+    dominated : the inferred noise exceeds the stated one
+    masses : (mass of the prior, standard error) by convexity mode
+    outcomes : what became of all evaluations
+    cache, crosscheck : tally of the curve cache; what the second solver found
+    facts : settings, versions and the like
     """
 
     folder: str
@@ -74,6 +79,8 @@ class Shown:
     natural: Array
     prior: Array
     sampling: Sampling
+    goodness: Mapping[str, float | None]
+    dominated: bool
     outcomes: Mapping[str, int]
     masses: Mapping[str, tuple[float, float]]
     cache: Mapping[str, Any]
@@ -100,7 +107,7 @@ class Shown:
     def case(self) -> Case:
         """The numbers that the answer needs."""
         d, noise = self.digest, self._extra_noise()
-        own = d.fit["own_noise_N"]
+        fit = self.goodness
         gd = np.asarray(self.hypothesis.material.shear_modulus(self.hypothesis.films(self.x).T), dtype=float)
         failed = sum(self.outcomes.get(o.label, 0) for o in FAILURES) / max(1, sum(self.outcomes.values()))
         low, middle, high = np.quantile(gd, (0.05, 0.5, 0.95)).tolist()
@@ -108,17 +115,17 @@ class Shown:
         return Case(
             name=self.name,
             end=d.end,
-            rmse=float(d.fit["rmse_N"] or 0.0),
-            own_noise=own,
+            rmse=float(fit["rmse_N"] or 0.0),
+            own_noise=fit["own_noise_N"],
             extra_noise=None if noise is None else float(np.median(noise)),
-            dominated=own is not None and noise is not None and bool(np.mean(noise > own) > 0.5),
-            p_value=d.fit["p_value"],
+            dominated=self.dominated,
+            p_value=fit["p_value"],
             modulus=(low, middle, high),
             thickness=self.specimen.thickness,
             status=self.sampling.status,
-            ess=float(np.min(self.sampling.ess)),
+            ess=self.sampling.ess,
             wanted=self.sampling.wanted,
-            r_hat=float(np.max(self.sampling.r_hat)),
+            r_hat=self.sampling.r_hat,
             failed=failed,
             last=float(d.deflection[-1]),
             last_force=(force[0], force[1], force[2]),
@@ -137,5 +144,5 @@ class Shown:
             wide = float(np.subtract(*np.quantile(self.prior[:, i], (0.95, 0.05))))
             ratio = float(np.subtract(*np.quantile(self.x[:, i], (0.95, 0.05)))) / wide if wide > 0 else 0.0
             if ratio >= LOOSE:
-                found[short(p.name)] = ratio
+                found[spoken(p.name)] = ratio
         return found

@@ -1,0 +1,205 @@
+"""Everything on the data that ship: reconstruct, fit and sample five materials on both ranges, report."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from queue import Empty
+from threading import Thread
+from typing import Any
+
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as Bars
+
+from bayesmembrane.cache import CachedSolver, Tally
+from bayesmembrane.hypothesis import hypothesis
+from bayesmembrane.inference.digest import digest
+from bayesmembrane.inference.optimum import fit
+from bayesmembrane.inference.published import Compared, compare_with_paper, paper_break_points
+from bayesmembrane.inference.reconstruction import reconstruct
+from bayesmembrane.inference.reconstruction_result import Reconstruction
+from bayesmembrane.inference.reconstruction_table import read_published_table
+from bayesmembrane.inference.run import sample
+from bayesmembrane.inference.sampling import Progress
+from bayesmembrane.measurement import Measurement, read_measurement
+from bayesmembrane.registry import materials
+from bayesmembrane.reporting.page import write_report
+from bayesmembrane.shipped import shipped
+from bayesmembrane.terminal import log
+
+RANGES = ("OP1", "OP2")
+# The slowest first: the others fill the gaps of the second core.
+ORDER = ("ogden", "yeoh", "mooney_rivlin", "gent", "neo_hookean")
+TITLE = "What the published force curve of a 50 um silicone film says about five materials"
+
+
+@dataclass(frozen=True)
+class Done:
+    """One material on both ranges: run folders, our optima beside the paper's, what the cache did."""
+
+    runs: tuple[Path, ...]
+    compared: tuple[Compared, ...]
+    tally: Tally
+
+
+def shipped_measurement(range_name: str) -> Measurement:
+    """The reconstructed curve of one range of the paper; the film was tested to the end of the longer one."""
+    both = [_read(name) for name in RANGES]
+    chosen = both[RANGES.index(range_name)]
+    return replace(chosen, full_range=max(float(m.deflection.max()) for m in both))
+
+
+def _read(range_name: str) -> Measurement:
+    stem = f"elastosil_50um_{range_name.lower()}"
+    return read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
+
+
+def one_material(name: str, chains: Path, seed: int, ess: float, tell: Callable[[str, Progress | None], None]) -> Done:
+    """Fit and sample one material on both ranges, stored under ``chains``."""
+    cache, runs, compared = CachedSolver(chains / "curves"), [], []
+    published = [row.values for row in read_published_table().rows if row.material == name]
+    claim = hypothesis(name)
+    for i, range_name in enumerate(RANGES):
+        label = f"{name}, {range_name}"
+        tell(label, None)
+        measurement = shipped_measurement(range_name)
+        found = fit(measurement, claim, seed=seed, starts=published, solve=cache)
+        compared += compare_with_paper(measurement, [found], range_name, solve=cache)
+        run = sample(
+            measurement,
+            claim,
+            seed=seed,
+            out=chains,
+            name=f"elastosil_50um_{range_name.lower()}_{name}",
+            ess=ess,
+            progress=lambda p, label=label: tell(label, p),
+            solve=cache,
+        )
+        if run.interrupted:
+            raise KeyboardInterrupt
+        last = i + 1 == len(RANGES)
+        rest = None if last else shipped_measurement(RANGES[-1])
+        unused = rest and rest.select(rest.deflection > measurement.deflection.max())
+        digest(run, rest=unused, breaks=paper_break_points() if last else (), solve=cache)
+        if run.path is not None:
+            runs.append(run.path)
+    return Done(tuple(runs), tuple(compared), cache.tally)
+
+
+def demo(out: Path, chains: Path, seed: int = 0, ess: float = 1000.0) -> dict[str, Any]:
+    """Run it all on the cores there are, show progress on stderr, and write the report to ``out``.
+
+    Returns the JSON answer: where the report lies, the runs, and the seconds it took. Runs of an earlier demo with the
+    same data, settings and code are read back. Raises `StorageError` if a folder cannot be written.
+    """
+    began = time.perf_counter()
+    names = [n for n in ORDER if n in materials()]
+    done: dict[str, Done] = {}
+    found: Reconstruction | None = None
+    with _workers() as (pool, queue), _progress(queue):
+        jobs: dict[Future[Any], str] = {pool.submit(_in_worker, n, chains, seed, ess, queue): n for n in names}
+        other = pool.submit(_reconstruct_in_worker, seed, queue)
+        for job in as_completed([*jobs, other]):
+            if job is other:
+                found = job.result()
+            else:
+                done[jobs[job]] = job.result()
+    ordered = [done[n] for n in materials() if n in done]
+    tally = _sum([d.tally for d in ordered])
+    page = write_report(
+        [run for d in ordered for run in d.runs],
+        out,
+        reconstruction=found,
+        fits=[c for d in ordered for c in d.compared],
+        title=TITLE,
+        cache=tally,
+    )
+    return {
+        "report": str(page),
+        "runs": [str(run) for d in ordered for run in d.runs],
+        "suspect_rows": found.to_json_dict()["suspect_rows"] if found is not None else [],
+        "seconds": time.perf_counter() - began,
+    }
+
+
+@contextmanager
+def _workers() -> Iterator[tuple[ProcessPoolExecutor, Any]]:
+    """Fresh processes, one for each core, and a queue on which they tell how far they are."""
+    context = multiprocessing.get_context("spawn")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    with context.Manager() as manager, ProcessPoolExecutor(cores, mp_context=context) as pool:
+        try:
+            yield pool, manager.Queue()
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def _in_worker(name: str, chains: Path, seed: int, ess: float, queue: Any) -> Done:
+    return one_material(name, chains, seed, ess, lambda label, progress: queue.put((label, progress)))
+
+
+def _reconstruct_in_worker(seed: int, queue: Any) -> Reconstruction:
+    queue.put(("reconstruct", None))
+    return reconstruct(seed=seed)
+
+
+@contextmanager
+def _progress(queue: Any) -> Iterator[None]:
+    """A line per job: what it does and, while it samples, ESS and the time left."""
+    columns = (
+        TextColumn("{task.description:<22}"),
+        BarColumn(),
+        TextColumn("{task.fields[text]}"),
+        TimeElapsedColumn(),
+    )
+    with Bars(*columns, console=log) as bars:
+        stop: list[bool] = []
+        thread = Thread(target=_listen, args=(queue, bars, stop), daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            stop.append(True)
+            thread.join(timeout=2)
+
+
+def _listen(queue: Any, bars: Bars, stop: list[bool]) -> None:
+    tasks: dict[str, Any] = {}
+    while not stop:
+        try:
+            label, progress = queue.get(timeout=0.2)
+        except Empty:
+            continue
+        except (EOFError, OSError):
+            return
+        if label not in tasks:
+            tasks[label] = bars.add_task(label, total=1.0, text="fitting" if "," in label else "")
+        if progress is not None:
+            bars.update(tasks[label], completed=share(progress), text=told(progress))
+
+
+def share(progress: Progress) -> float:
+    """How much of a run is done, from 0 to 1: the worse of ESS and time."""
+    left = progress.seconds_left
+    if progress.steps_per_second > 0 and left == left:
+        spent = progress.steps / progress.steps_per_second
+        return float(spent / (spent + left)) if spent + left > 0 else 1.0
+    return float(min(progress.ess / progress.wanted, 1.0))
+
+
+def told(progress: Progress) -> str:
+    """ESS and time left in words."""
+    left = progress.seconds_left
+    rest = f", {left:.0f} s left" if left == left else ""
+    return f"ESS {progress.ess:.0f} of {progress.wanted:.0f}, R-hat {progress.r_hat:.3f}{rest}"
+
+
+def _sum(tallies: list[Tally]) -> Tally:
+    return Tally(**{f.name: sum(getattr(t, f.name) for t in tallies) for f in fields(Tally)})
