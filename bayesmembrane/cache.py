@@ -11,6 +11,7 @@ from collections import OrderedDict
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -81,6 +82,7 @@ class CachedSolver:
         prestretch: ArrayLike = 1.0,
         sensitivities: bool = False,
         solver: str = "ritz",
+        only: str = "all",
     ) -> Curves:
         """As `mechanics.solve`; raises what that raises, and `StorageError` if the folder cannot be written."""
         asked = problem(material, parameters, deflection, inner_radius, outer_radius, prestretch)
@@ -88,7 +90,7 @@ class CachedSolver:
         shapes = len(material.field_names()) > 1
         if (shapes and gd.size > SMALL_BATCH) or not np.all(gd > 0):
             self.tally.bypassed += gd.size
-            return _direct(asked, sensitivities, solver)
+            return _direct(asked, sensitivities, solver, only)
         begun = time.perf_counter()
         keys = _keys(asked, gd, sensitivities, solver)
         entries = {key: self._find(key) for key in dict.fromkeys(keys)}
@@ -141,7 +143,7 @@ class CachedSolver:
         try:
             with np.load(path, allow_pickle=False) as stored:
                 entry = {name: stored[name] for name in stored.files}
-            if entry.pop("key").tobytes() == key and _FIELDS <= entry.keys():
+            if entry.pop("key").tobytes() == key and entry.keys() >= _FIELDS:
                 return entry
         except _DAMAGED:
             pass
@@ -168,7 +170,7 @@ class CachedSolver:
 _FIELDS = {f.name for f in fields(Curves)} - {"deflection", "sensitivity"}
 
 
-def _direct(asked: Problem, sensitivities: bool, solver: str) -> Curves:
+def _direct(asked: Problem, sensitivities: bool, solver: str, only: str = "all") -> Curves:
     return api.solve(
         asked.material,
         asked.parameters,
@@ -178,6 +180,7 @@ def _direct(asked: Problem, sensitivities: bool, solver: str) -> Curves:
         prestretch=asked.prestretch,
         sensitivities=sensitivities,
         solver=solver,
+        only=only,
     )
 
 
@@ -218,7 +221,7 @@ def _scaled(curves: Curves, asked: Problem, gd: float) -> Entry:
 
 
 def _rescale(asked: Problem, gd: Array, entries: list[Entry]) -> Curves:
-    values = {name: np.stack([e[name] for e in entries]) * _factor(name, asked, gd) for name in _FIELDS}
+    values: dict[str, Any] = {name: np.stack([e[name] for e in entries]) * _factor(name, asked, gd) for name in _FIELDS}
     for name in ("status", "note"):
         values[name] = values[name].astype(np.int8)
     sensitivity = None

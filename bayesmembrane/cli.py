@@ -5,6 +5,7 @@ The library is imported inside the verbs: numba and arviz take seconds that ``--
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from collections.abc import Callable, Iterator
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     from bayesmembrane.hypothesis import Hypothesis
     from bayesmembrane.inference.sampling import Progress
     from bayesmembrane.measurement import Measurement
+
+# The matrices are small: threads inside BLAS only get into each other's way. Set before NumPy is imported.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
 
 app = typer.Typer(
     add_completion=False,

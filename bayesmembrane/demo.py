@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from queue import Empty
 from threading import Thread
@@ -62,14 +63,16 @@ def _read(range_name: str) -> Measurement:
 
 def one_material(name: str, chains: Path, seed: int, ess: float, tell: Callable[[str, Progress | None], None]) -> Done:
     """Fit and sample one material on both ranges, stored under ``chains``."""
-    cache, runs, compared = CachedSolver(chains / "curves"), [], []
+    cache = CachedSolver(chains / "curves")
+    runs: list[Path] = []
+    compared: list[Compared] = []
     published = [row.values for row in read_published_table().rows if row.material == name]
     claim = hypothesis(name)
     for i, range_name in enumerate(RANGES):
         label = f"{name}, {range_name}"
         tell(label, None)
         measurement = shipped_measurement(range_name)
-        found = fit(measurement, claim, seed=seed, starts=published, solve=cache)
+        found = fit(measurement, claim, seed=seed, starts=published)
         compared += compare_with_paper(measurement, [found], range_name, solve=cache)
         run = sample(
             measurement,
@@ -78,7 +81,7 @@ def one_material(name: str, chains: Path, seed: int, ess: float, tell: Callable[
             out=chains,
             name=f"elastosil_50um_{range_name.lower()}_{name}",
             ess=ess,
-            progress=lambda p, label=label: tell(label, p),
+            progress=partial(tell, label),
             solve=cache,
         )
         if run.interrupted:

@@ -41,7 +41,8 @@ class Prediction:
     status : (B, N) `Status` codes
     films : (B, n) membrane parameters
     sensitivity : (B, N, k) dF/dx in the coordinates that shape the curve, or None if not asked for
-    convexity, ellipticity : (B,) margins over all states reached up to the end of the whole measured range
+    convexity, ellipticity : (B,) margins over all states reached up to the end of the whole measured range; -inf where
+        ellipticity was lost, or the film's energy became indefinite, on the way
     convexity_at, ellipticity_at : (B, M) the same, deflection by deflection; nan where there is no state
     """
 
@@ -98,10 +99,16 @@ class Forward:
         return self.curves(one, self.deflection, True), self.curves(one, self._all, True)
 
     def __call__(
-        self, coordinates: ArrayLike, sensitivities: bool = False, reached: bool = True, solver: str = "ritz"
+        self,
+        coordinates: ArrayLike,
+        sensitivities: bool = False,
+        reached: bool = True,
+        solver: str = "ritz",
+        only: str = "all",
     ) -> Prediction:
         """Curves of x (B, k); k may leave out the noise.
 
+        ``only`` "convex" or "elliptic" saves effort on films that turn out not to be so, and leaves them unexplained.
         ``reached`` False saves the solutions beyond ``deflection``, and the margins are those up to there.
         """
         x = np.atleast_2d(np.asarray(coordinates, dtype=float))
@@ -109,19 +116,30 @@ class Forward:
         if self.hypothesis.material.scales == (1,) and solver == "ritz":
             curves = _scaled(self._unit[int(reached)], films)
         else:
-            curves = self.curves(films, self._all if reached else self.deflection, sensitivities, solver)
+            curves = self.curves(films, self._all if reached else self.deflection, sensitivities, solver, only)
         n, chained = self.deflection.size, None
         if sensitivities and curves.sensitivity is not None:
             chained = np.einsum("bni,bik->bnk", curves.sensitivity[:, :n], self.jacobian(x))
-        margins = reached_convexity(curves), reached_ellipticity(curves), curves.convexity, curves.ellipticity
+        # A convex energy with tensions that pull makes the film's energy convex: an indefinite state refutes it.
+        lost = np.any(curves.status == Status.INDEFINITE, axis=1)
+        whole = (np.where(lost, -np.inf, m) for m in (reached_convexity(curves), reached_ellipticity(curves)))
+        margins = *whole, curves.convexity, curves.ellipticity
         return Prediction(self.deflection, curves.force[:, :n], curves.status[:, :n], films, chained, *margins)
 
-    def curves(self, films: Array, deflection: Array, sensitivities: bool = False, solver: str = "ritz") -> Curves:
+    def curves(
+        self, films: Array, deflection: Array, sensitivities: bool = False, solver: str = "ritz", only: str = "all"
+    ) -> Curves:
         """Curves of ``films`` (B, n) at ``deflection`` (N,) m on the rig of the measurement."""
         rig = annulus(self.measurement)
         options: dict[str, Any] = {"inner_radius": rig.inner_radius, "outer_radius": rig.outer_radius}
         return self.solve(
-            self.hypothesis.material, films, deflection, sensitivities=sensitivities, solver=solver, **options
+            self.hypothesis.material,
+            films,
+            deflection,
+            sensitivities=sensitivities,
+            solver=solver,
+            only=only,
+            **options,
         )
 
     def jacobian(self, x: Array) -> Array:

@@ -29,7 +29,7 @@ def constrained_optimum(objective: Objective, pool: Array, free: Array) -> Array
     starts = [*apart(feasible, objective.spread, STARTS - 1), _pulled(objective, free, anchor)]
     found = [_pulled(objective, _constrained_search(objective, s), anchor) for s in starts]
     sizes = objective.many(objective.forward(np.array(found), reached=False))
-    return found[int(np.argmin(sizes))]
+    return np.asarray(found[int(np.argmin(sizes))])
 
 
 def _constrained_search(objective: Objective, start: Array) -> Array:
@@ -45,7 +45,7 @@ def _constrained_search(objective: Objective, start: Array) -> Array:
         return np.asarray(np.nan_to_num(2 * r @ jacobian / scale, posinf=0.0, neginf=0.0))
 
     def margins(x: Array) -> Array:
-        return _margins(objective, x[None, :])[0]
+        return np.asarray(_margins(objective, x[None, :])[0])
 
     def margin_slopes(x: Array) -> Array:
         h = 1e-5 * objective.spread

@@ -53,7 +53,8 @@ class Digest:
     deflection, beyond : (G,) m, and True outside the fitted range
     curve, repeat : (Q, G) N, noiseless curve, and a new measurement of it
     lost : (L, G) share of the draws without a force, one row per reason in ``reasons``
-    residual, rest_residual : (Q, N), (Q, R) N, measured minus computed
+    residual : (Q, N) N, measured minus computed
+    rest_residual : (Q, R) N, measured minus predicted measurement: the noise is in the prediction
     curves_at : (Q, N) N, computed curve at the fitted points
     film : (n,) membrane parameters of the draw whose curve is nearest to the median one
     convex : by convexity mode, the share of draws that meet it
@@ -216,9 +217,12 @@ def digest_draws(
     shape_at = _shape_deflections(end, max(end, min(last, measurement.full_range)))
     film = hypothesis.material.from_vector(films[chosen])
     states = _profiles(film, shape_at, measurement)
-    own_sd = _given_sd(measurement)
+    own_sd = measurement.force_sd
     unused = _Points.of(rest)
     rest_force = force(unused.at)[0] if unused.at.size else np.empty((len(x), 0))
+    rest_force = rest_force + _total_sd(hypothesis, measurement, x, np.nan_to_num(unused.sd)) * rng.standard_normal(
+        rest_force.shape
+    )
     broken = np.array([b.deflection for b in breaks])
     at_break = force(broken)[0] if broken.size else np.empty((len(x), 0))
     thickness = np.array([b.thickness for b in breaks])
@@ -276,14 +280,10 @@ class _Points:
     def of(measurement: Measurement | None) -> _Points:
         if measurement is None:
             return _Points(*(np.empty(0) for _ in range(3)))
-        sd = _given_sd(measurement)
+        sd = measurement.force_sd
         return _Points(
             measurement.deflection, measurement.force, sd if sd is not None else np.full(len(measurement), np.nan)
         )
-
-
-def _given_sd(measurement: Measurement) -> Array | None:
-    return measurement.force_sd
 
 
 def _subset(x: Array, draws: int, seed: int) -> Array:
@@ -322,14 +322,19 @@ def _representative(force: Array) -> int:
 
 def _noise_sd(hypothesis: Hypothesis, measurement: Measurement, x: Array, at: Array) -> Array:
     """(B, G) N: the measurement's own noise, carried on between and beyond its points, and the inferred one."""
-    own = _given_sd(measurement)
+    own = measurement.force_sd
     order = np.argsort(measurement.deflection)
-    given = 0.0 if own is None else np.interp(at, measurement.deflection[order], own[order])
+    given = np.zeros(at.size) if own is None else np.interp(at, measurement.deflection[order], own[order])
+    return _total_sd(hypothesis, measurement, x, given)
+
+
+def _total_sd(hypothesis: Hypothesis, measurement: Measurement, x: Array, given: Array) -> Array:
+    """(B, G) N: the given noise (G,) and the inferred one of each draw."""
     names = hypothesis.natural_names
     inferred = np.zeros(len(x))
     if "noise.sd" in names:
         inferred = hypothesis.natural(x, measurement)[:, names.index("noise.sd")]
-    return np.sqrt(given**2 + inferred[:, None] ** 2) * np.ones(at.size)
+    return np.sqrt(given**2 + inferred[:, None] ** 2)
 
 
 def _meets(margin: Array, mode: str) -> NDArray[np.bool_]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
 from bayesmembrane.errors import SettingsError, unknown_name
-from bayesmembrane.forward import Forward, Prediction, Solve
+from bayesmembrane.forward import Forward, Prediction, Solve, annulus
 from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.inference.prior import JointPrior
 from bayesmembrane.measurement import Measurement
@@ -19,6 +20,7 @@ LOSSES = ("euclidean", "weighted")
 SCREENED, INFLATED = 768, 256
 INFLATION = 2.5
 MOST = 300  # evaluations of one search
+ON_THE_WAY = 24  # states at which a film is looked at before it is solved
 
 
 class Objective:
@@ -91,7 +93,8 @@ class Objective:
         prior[SCREENED:] = self.centre + INFLATION * (prior[SCREENED:] - self.centre)
         anywhere = rng.uniform(self.low, self.high, prior.shape)
         for candidates in (np.clip(prior, self.low, self.high), anywhere):
-            start, size = self.rescaled(self.hypothesis.films(candidates))
+            films = self.hypothesis.films(candidates)
+            start, size = self.rescaled(films[self._likely(films)])
             if len(start):
                 # Draws of the effects are independent of those of the material: any of them will do.
                 start = np.concatenate([start, candidates[: len(start), n:]], axis=1)
@@ -102,6 +105,20 @@ class Objective:
             f"{1e3 * np.max(self.measurement.deflection):g} mm",
             remedy="use a shorter range or another material, and check the units of the deflection",
         )
+
+    def _likely(self, films: Array) -> NDArray[np.bool_]:
+        """(B,) True where P1 > 0 and P11 > 0 on l2 = 1 up to the mean meridional stretch at the largest deflection.
+
+        Films without are told late, and hardly ever reach the data: they are not worth a solution in a search.
+        """
+        rig = annulus(self.measurement)
+        rise = np.max(np.abs(self.measurement.deflection)) / (rig.outer_radius - rig.inner_radius)
+        stretch = np.linspace(1.0, np.sqrt(1.0 + rise * rise), ON_THE_WAY + 1)[1:, None]
+        with np.errstate(all="ignore"):
+            _, p1, _, p11, _, _ = self.hypothesis.material.derivatives(
+                films.T[:, None, :], stretch, np.ones_like(stretch)
+            )
+        return np.asarray(np.all((p1 > 0) & (p11 > 0), axis=0))
 
     @cached_property
     def centre(self) -> Array:

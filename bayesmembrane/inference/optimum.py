@@ -131,8 +131,8 @@ def fit(
     free = _result(objective, x, status)
     if hypothesis.convexity == "none" or free.convex:
         return replace(free, constrained=free)
-    x = constrained_optimum(objective, pool, free.coordinates)
-    held = None if x is None else _result(objective, x, "converged")
+    y = constrained_optimum(objective, pool, free.coordinates)
+    held = None if y is None else _result(objective, y, "converged")
     if held is not None and held.objective < free.objective:
         # The constraint led to a better valley: it is open without the constraint too.
         x, _, status = objective.polish(held.coordinates)
@@ -159,7 +159,7 @@ def _size(found: tuple[Array, float, str]) -> float:
     return found[1]
 
 
-# ---- what is said of it -------------------------------------------------------------------------------------------------
+# ---- what is said of it ----------------------------------------------------------------------------------------------
 
 
 def _result(objective: Objective, x: Array, status: str) -> Fit:

@@ -103,7 +103,8 @@ class Posterior:
         """Prior, likelihood, force and outcome of x (B, k), from one batched solution."""
         x = np.atleast_2d(np.asarray(x, dtype=float))
         mode = self.hypothesis.convexity
-        prediction = self.forward(x, reached=mode in ("reached", "elliptic"))
+        only = {"reached": "convex", "elliptic": "elliptic"}.get(mode, "all")
+        prediction = self.forward(x, reached=mode in ("reached", "elliptic"), only=only)
         inside = self.prior.inside(prediction)
         ok = prediction.ok
         log_likelihood = np.full(len(x), -np.inf)

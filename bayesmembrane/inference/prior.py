@@ -7,15 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bayesmembrane.errors import SettingsError
 from bayesmembrane.forward import Forward, Prediction, Solve
 from bayesmembrane.hypothesis import CONVEXITY, Hypothesis
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.mechanics import api
 from bayesmembrane.parameters import Array
 
-DRAWS = 4096
-MOST_ROUNDS = 200
+DRAWS = 2048
 
 
 @dataclass(frozen=True)
@@ -53,37 +51,24 @@ class JointPrior:
         margin = prediction.margin(mode, self.hypothesis)
         return np.asarray(margin > 0 if mode == "elliptic" else margin >= 0)
 
-    def draw_truncated(
-        self, measurement: Measurement, rng: np.random.Generator, size: int, solve: Solve = api.solve
-    ) -> Array:
-        """Draws from the truncated prior, shape (size, k), by rejection.
+    def survey(
+        self, measurement: Measurement, seed: int = 0, draws: int = DRAWS, solve: Solve = api.solve
+    ) -> tuple[dict[str, Mass], Array]:
+        """The mass of every convexity mode, and the draws that the hypothesis' own mode leaves, shape (M, k).
 
-        Raises `SettingsError` if the convexity prior leaves next to nothing.
+        From ``draws`` draws of p0, of which k are inside, the mass is m = k/n with sd sqrt(m (1 - m) / n); none inside
+        is reported as half a hit, whose logarithm exists, and all of them as 1.
         """
-        forward = Forward(self.hypothesis, measurement, measurement.deflection, solve)
-        kept: list[Array] = []
-        found = 0
-        for _ in range(MOST_ROUNDS):
-            x = self.draw(rng, max(256, size // 2))
-            kept.append(x[self.inside(forward(x))])
-            found += len(kept[-1])
-            if found >= size:
-                return np.concatenate(kept)[:size]
-        raise SettingsError(
-            f'the convexity prior "{self.hypothesis.convexity}" leaves less than one in a thousand draws of the prior',
-            remedy='choose another one: "reached", "elliptic" or "none"',
-        )
+        x = self.draw(np.random.default_rng(seed), draws)
+        prediction = Forward(self.hypothesis, measurement, measurement.deflection, solve)(x)
+        masses = {mode: _mass(int(np.sum(self.inside(prediction, mode))), draws) for mode in CONVEXITY}
+        return masses, x[self.inside(prediction)]
 
     def masses(
         self, measurement: Measurement, seed: int = 0, draws: int = DRAWS, solve: Solve = api.solve
     ) -> dict[str, Mass]:
-        """The mass of every mode, m = k/n with sd sqrt(m (1 - m) / n), from the same ``draws`` of p0.
-
-        Zero or all hits are reported as (k + 1/2)/(n + 1), whose logarithm exists.
-        """
-        x = self.draw(np.random.default_rng(seed), draws)
-        prediction = Forward(self.hypothesis, measurement, measurement.deflection, solve)(x)
-        return {mode: _mass(int(np.sum(self.inside(prediction, mode))), draws) for mode in CONVEXITY}
+        """The first part of `survey`."""
+        return self.survey(measurement, seed, draws, solve)[0]
 
 
 def _mass(hits: int, draws: int) -> Mass:

@@ -30,7 +30,6 @@ from bayesmembrane.parameters import Array
 
 MOST_DRAWS, LONG, DRAWS_IF_LONG = 4000, 100, 1000
 PRIOR_DRAWS = 500
-MASS_DRAWS = 2048
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +133,8 @@ def _assemble(
     evaluation = posterior.evaluate(flat)
     rng = np.random.default_rng([seed, 1])
     noise = posterior.noise.draw(hypothesis.noise_coordinates(flat), rng)
-    prior = posterior.prior.draw_truncated(measurement, rng, PRIOR_DRAWS, posterior.solve)
+    masses, prior = posterior.prior.survey(measurement, seed, solve=posterior.solve)
+    prior = prior[:PRIOR_DRAWS]
     shape = x.shape[:2]
 
     def folded(values: Array) -> Array:
@@ -143,12 +143,11 @@ def _assemble(
     data = storage.inference_data(
         measurement,
         posterior=named(hypothesis, measurement, flat, shape),
-        prior=named(hypothesis, measurement, prior, (1, len(prior))),
+        prior=named(hypothesis, measurement, prior, (1, len(prior))) if len(prior) else None,
         log_likelihood={"force": folded(posterior.pointwise(flat, evaluation.force))},
         posterior_predictive={"force": folded(evaluation.force + noise), "curve": folded(evaluation.force)},
         sample_stats={"lp": lp, "log_prior": evaluation.log_prior.reshape(shape)},
     )
-    masses = posterior.prior.masses(measurement, seed, MASS_DRAWS, posterior.solve)
     status = {
         **_answer(hypothesis, data, sampled, settings),
         "prior_mass": {mode: {"value": m.value, "sd": m.sd} for mode, m in masses.items()},

@@ -11,10 +11,18 @@ from bayesmembrane.mechanics.problem import Problem
 from bayesmembrane.mechanics.solution import Curves, Status
 
 
-def solve(problem: Problem, sensitivities: bool = False) -> Curves:
-    """Curves by the Ritz method; deflections left `UNRESOLVED`, `INDEFINITE` or at the `ITERATION_LIMIT` are shot."""
-    curves = ritz.solve(problem, sensitivities)
+def solve(problem: Problem, sensitivities: bool = False, only: str = "all") -> Curves:
+    """Curves by the Ritz method; deflections left `UNRESOLVED` or at the `ITERATION_LIMIT` are shot.
+
+    So are those of a film that was clamped slack: its flat state is not stable, and no path leads on from there.
+    ``only`` "convex" or "elliptic" leaves films as they are of which a resolved state shows that they are not so.
+    """
+    curves = ritz.solve(problem, sensitivities, only)
     failed = np.isin(curves.status, (Status.UNRESOLVED, Status.ITERATION_LIMIT))
+    failed |= (problem.prestretch < 1)[:, None] & (curves.status == Status.INDEFINITE)
+    if only != "all":
+        margin = curves.convexity if only == "convex" else curves.ellipticity
+        failed &= ~np.any(margin < -ritz.RULED_OUT, axis=1)[:, None]
     films = np.flatnonzero(np.any(failed, axis=1))
     if films.size == 0:
         return curves

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from bayesmembrane.parameters import Array
 
-STEPS = 60
+STEPS = 60  # per factor 3.5 of R2/R1
 TABLE = np.linspace(np.log(1e-3), np.log(1e6), 400)
 
 
@@ -30,10 +30,14 @@ def _rates(l2, th, jm):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, error_model="numpy")
 def _shoot(th, jm, l0, span):  # type: ignore[no-untyped-def]
-    """(l2(T), d) of the fully stretched film that leaves the disc at angle th: Runge-Kutta 4 in t."""
-    l2, h, step = l0, 0.0, span / STEPS
-    for i in range(STEPS):
-        t = i * step
+    """(l2(T), d) of the fully stretched film that leaves the disc at angle th: Runge-Kutta 4 in t.
+
+    A film that ends before the ring has l2 = inf if it grew too wide for its chains, -inf if it collapsed.
+    """
+    steps = int(np.ceil(STEPS * max(span / 1.25, 1.0)))
+    l2, h, step = l0, 0.0, span / steps
+    for i in range(steps):
+        t, before = i * step, l2
         a1, b1, c1 = _rates(l2, th, jm)
         a2, b2, c2 = _rates(l2 + 0.5 * step * a1, th + 0.5 * step * b1, jm)
         a3, b3, c3 = _rates(l2 + 0.5 * step * a2, th + 0.5 * step * b2, jm)
@@ -42,23 +46,37 @@ def _shoot(th, jm, l0, span):  # type: ignore[no-untyped-def]
         l2 += step / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
         th += step / 6.0 * (b1 + 2.0 * b2 + 2.0 * b3 + b4)
         h += step / 6.0 * (e0 * c1 + 2.0 * e1 * c2 + 2.0 * e1 * c3 + e2 * c4)
+        # Steps that are long for a film that collapses may throw it anywhere.
+        if not l2 > 0.8 * before or l2 < 0.1 * l0:
+            return (np.inf if a1 > 0.0 else -np.inf), np.nan
     return l2, h
 
 
 @numba.njit(cache=True, error_model="numpy")
 def _lock(jm, l0, span):  # type: ignore[no-untyped-def]
+    """Find th with l2(T) = l0: it falls from inf (too flat) to -inf (too steep). Bisection, then false position."""
     if l0 * l0 * 2.0 + 1.0 / (l0 * l0 * l0 * l0) - 3.0 >= jm:
         return 0.0
-    low, high = 0.0, np.pi
-    for _ in range(60):
+    low, high, above, below, deflection, side = 0.0, np.pi, np.inf, -np.inf, 0.0, 0
+    for _ in range(200):
         th = 0.5 * (low + high)
-        l2, _h = _shoot(th, jm, l0, span)
-        # A film that starts too steep comes in too narrow, or collapses (nan).
+        if np.isfinite(above) and np.isfinite(below):
+            th = (low * below - high * above) / (below - above)
+        l2, d = _shoot(th, jm, l0, span)
+        if np.isfinite(d):
+            deflection = d
+        if abs(l2 - l0) < 1e-13 * l0 or high - low < 1e-15:
+            break
+        # The end that stays twice counts half (Illinois).
         if l2 > l0:
-            low = th
+            low, above = th, l2 - l0
+            below *= 0.5 if side == 1 else 1.0
+            side = 1
         else:
-            high = th
-    return _shoot(low, jm, l0, span)[1]
+            high, below = th, l2 - l0
+            above *= 0.5 if side == -1 else 1.0
+            side = -1
+    return deflection
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
 from scipy.optimize import root
@@ -25,22 +27,26 @@ def force_curve(
     inner_radius: float,
     outer_radius: float,
     rtol: float = 1e-10,
-    method: str = "DOP853",
+    method: Literal["DOP853", "RK45", "LSODA", "Radau"] = "DOP853",
 ) -> Array:
     """Forces (N,) in N at ascending deflections (N,) in m of a film without pre-stretch; nan from where it fails.
 
     ``scipy.integrate.solve_ivp`` from the disc and ``scipy.optimize.root`` on (l2 - 1, h - delta) at the ring, each
     point started from an extrapolation of the two before. Slow, and without safeguards: for comparison only.
     """
-    span, known, forces = np.log(outer_radius / inner_radius), [], np.full(len(deflection), np.nan)
+    span, forces = float(np.log(outer_radius / inner_radius)), np.full(len(deflection), np.nan)
+    known: list[tuple[float, Array]] = []
     grid = np.asarray(deflection, dtype=float) / inner_radius
     lead = np.geomspace(min(0.3, grid[0]), grid[0], max(1, int(np.ceil(grid[0] / 0.4))))
     path = np.unique(np.concatenate([lead, grid]))
 
+    def across(t: float, y: Array) -> Array:
+        return rates(t, y, material)
+
     def miss(x: Array, d: float) -> Array:
-        start = [1.0, 1.0 + x[0] * d * d / (1 + d), x[1], 0.0]
+        start = np.array([1.0, 1.0 + x[0] * d * d / (1 + d), x[1], 0.0])
         with np.errstate(all="ignore"):
-            end = solve_ivp(rates, (0.0, span), start, method=method, rtol=rtol, atol=rtol * 1e-3, args=(material,))
+            end = solve_ivp(across, (0.0, span), start, method=method, rtol=rtol, atol=rtol * 1e-3)
         y = end.y[:, -1] if end.success else np.full(4, 1e3)
         return np.array([(y[0] - 1) / min(1.0, d * d), y[3] / d - 1])
 
@@ -51,7 +57,7 @@ def force_curve(
             (d0, x0), (d1, x1) = known[-2:]
             guess = x1 + (x1 - x0) * (d - d1) / (d1 - d0)
         found = root(miss, guess, args=(d,), tol=rtol * 10)
-        if np.max(np.abs(miss(found.x, d))) > 1e3 * rtol:
+        if np.max(np.abs(found.fun)) > 1e3 * rtol:
             break
         known.append((d, found.x))
         at = np.flatnonzero(grid == d)
@@ -69,16 +75,17 @@ def force_curve_bvp(
     span, forces = np.log(outer_radius / inner_radius), np.full(len(deflection), np.nan)
     t = np.linspace(0, span, 21)
     y = np.stack([np.ones_like(t), 1.05 + 0.0 * t, 0.3 + 0.0 * t, 0.3 * np.expm1(t)])
+
+    def across(t: Array, y: Array) -> Array:
+        return rates(t, y, material)
+
     for i, d in enumerate(np.asarray(deflection, dtype=float) / inner_radius):
+
+        def edges(a: Array, b: Array, d: float = d) -> Array:
+            return np.array([a[0] - 1, b[0] - 1, a[3], b[3] - d])
+
         with np.errstate(all="ignore"):
-            found = solve_bvp(
-                lambda t, y: rates(t, y, material),
-                lambda a, b, d=d: np.array([a[0] - 1, b[0] - 1, a[3], b[3] - d]),
-                t,
-                y,
-                tol=tol,
-                max_nodes=20000,
-            )
+            found = solve_bvp(across, edges, t, y, tol=tol, max_nodes=20000)
         if not found.success:
             break
         t, y = found.x, found.y

@@ -38,6 +38,9 @@ SEARCH = 16
 SAME_END = 0.02
 # A path that ends with less than this of P11 / (G d) ends because ellipticity is about to be lost there.
 NEARLY_BENT = 0.1
+# A margin of convexity or ellipticity below minus this rules a film out, whatever finer bases would say.
+RULED_OUT = 1e-6
+RULED_OUT_ON_THE_WAY = 1e-3
 
 
 @dataclass(frozen=True)
@@ -225,7 +228,7 @@ def _films(problem: Problem, films: NDArray[np.intp]) -> Problem:
     return replace(problem, parameters=problem.parameters[films], prestretch=problem.prestretch[films])
 
 
-def solve(problem: Problem, sensitivities: bool = False) -> Curves:
+def solve(problem: Problem, sensitivities: bool = False, only: str = "all") -> Curves:
     """Force curves from the minimum of the stored energy,
 
         F = dE/d(delta),  E(delta) = min over the deformation of 2 pi int R^2 W dt.
@@ -234,6 +237,9 @@ def solve(problem: Problem, sensitivities: bool = False) -> Curves:
     release energy are refined, each from its own solution, with more and shorter elements; films whose path was lost
     are followed again with these and with shorter steps. A path that ends at the same deflection for two bases ends
     physically, and is given its reason; what is left is flagged.
+
+    ``only`` "convex" or "elliptic" spares this to films that a resolved state shows not to be so (a prior rules them
+    out whatever their other forces are): what is not resolved at first stays flagged.
     """
     d, back = _ascending(np.where(problem.deflection == 0, SMALLEST, problem.scaled))
     bound = extensibility(problem)
@@ -243,13 +249,22 @@ def solve(problem: Problem, sensitivities: bool = False) -> Curves:
         # A locked deflection is replaced by the last one that can be reached; its answer is not used.
         reach = np.max(np.where(locked, 0.0, d), axis=1, keepdims=True)
         d = np.where(locked, np.where(reach > 0, reach, 1e-3), d)
-    search = _Search(problem, d, ~locked, sensitivities)
-    for level in range(1, len(LEVELS)):
-        if not search.improve(level):
-            break
-    _pass_on(search.status)
-    search.status[locked] = Status.LOCKED
+    search = _Search(problem, d, ~locked, sensitivities, only)
+    if np.any(search.status) or np.any(locked):
+        for level in range(1, len(LEVELS)):
+            if not search.improve(level):
+                break
+        _pass_on(search.status)
+        search.status[locked] = Status.LOCKED
     return _curves(problem, search, back)
+
+
+def _ruled_out(problem: Problem, result: Array, status: NDArray[np.int8], only: str) -> NDArray[np.bool_]:
+    """(B,) True for films with a resolved state that is not ``only``: "convex", "elliptic" or "all" (never)."""
+    if only == "all":
+        return np.zeros(len(result), np.bool_)
+    margin = result[:, kernels.CONVEX if only == "convex" else kernels.ELLIPTIC]
+    return np.asarray(np.any((status == Status.OK) & (margin < -RULED_OUT), axis=1))
 
 
 _Rough = tuple[NDArray[np.intp], NDArray[np.intp], Array]
@@ -266,21 +281,31 @@ class _Search:
     ends : (B,) scaled deflection at which the path was lost with the last basis, nan if it was not
     """
 
-    def __init__(self, problem: Problem, d: Array, wanted: NDArray[np.bool_], sensitivities: bool) -> None:
-        self.problem, self.d, self.wanted = problem, d, wanted
+    def __init__(
+        self, problem: Problem, d: Array, wanted: NDArray[np.bool_], sensitivities: bool, only: str = "all"
+    ) -> None:
+        self.problem, self.d = problem, d
+        self.only = only
         self.wishes = sensitivities, False, True
         self.result, unknowns = follow(problem, d, 0, self.wishes)
         self.status = self.result[:, kernels.STATUS].astype(np.int8)
+        self.wanted = wanted & ~_ruled_out(problem, self.result, self.status, only)[:, None]
         self.ends = np.full(len(d), np.nan)
-        self._explain(np.arange(len(d)), self.status, 0)
-        film, column = np.nonzero((self.status == Status.UNRESOLVED) & wanted)
-        self.rough: _Rough = film, column, unknowns[film, :, column]
+        self.rough: _Rough = self._nothing(0)
+        if np.any(self.status):
+            films = np.flatnonzero(np.any(self.wanted, axis=1))
+            verdict = self.status[films]
+            self._explain(films, verdict, 0)
+            self.status[films] = verdict
+            film, column = np.nonzero((self.status == Status.UNRESOLVED) & self.wanted)
+            self.rough = film, column, unknowns[film, :, column]
 
     def improve(self, level: int) -> bool:
         """One level up: refine the rough states, and follow again the films whose path was lost. False if none is."""
         if level == 1:
             # The loss of stability is believed when a finer basis confirms it.
-            self.status[np.isin(self.status, (Status.NOT_ELLIPTIC, Status.INDEFINITE))] = Status.ITERATION_LIMIT
+            lost = (self.status == Status.NOT_ELLIPTIC) | (self.status == Status.INDEFINITE)
+            self.status[lost & self.wanted] = Status.ITERATION_LIMIT
         rough = self._refine(level)
         doubtful = (self.status == Status.ITERATION_LIMIT) & self.wanted
         films = np.flatnonzero(np.any(doubtful, axis=1))
@@ -297,8 +322,8 @@ class _Search:
         if not film.size:
             return self._nothing(level)
         ratio, d = self.problem.ratio, self.d[film, column]
-        start = np.kron(_prolongation(ratio, level - 1), np.eye(2)) @ unknowns.T
-        result, unknowns = _run(_films(self.problem, film), d[None], np.ones(1, np.bool_), start.T, level, self.wishes)
+        start = (_prolongation(ratio, level - 1) @ unknowns.reshape(film.size, -1, 2)).reshape(film.size, -1)
+        result, unknowns = _run(_films(self.problem, film), d[None], np.ones(1, np.bool_), start, level, self.wishes)
         verdict = result[:, kernels.STATUS, 0].astype(np.int8)
         still = verdict == Status.UNRESOLVED
         # A rough state that leads to no stable one lay astray: its film is followed again.
@@ -324,7 +349,7 @@ class _Search:
         return none, none, np.empty((0, 2 * basis(self.problem.ratio, *LEVELS[level]).functions))
 
     def _explain(self, films: NDArray[np.intp], verdict: NDArray[np.int8], level: int) -> None:
-        """Name the reason, in ``verdict`` (K, N) of K films, of paths that end where they ended with the basis before."""
+        """Name the reason, in ``verdict`` (K, N) of K films, of paths that end where they did with the basis before."""
         lost = verdict == Status.ITERATION_LIMIT
         some = np.flatnonzero(np.any(lost, axis=1))
         before = self.ends[films[some]]
@@ -335,11 +360,15 @@ class _Search:
         first, rows = np.argmax(lost[some], axis=1), np.arange(some.size)
         high = d[rows, first]
         low = np.where(first > 0, d[rows, np.maximum(first - 1, 0)], high * 0.01)
-        ends, bent = _path_end(problem, low, high, level)
+        ends, bent, convex, elliptic = _path_end(problem, low, high, level)
         self.ends[films[some]] = ends
         # Chains that lock end the path by stiffening: that is no loss of stability.
         same = (np.abs(ends - before) < SAME_END * ends) & np.isinf(extensibility(problem))
         reason = np.where(bent, Status.NOT_ELLIPTIC, Status.INDEFINITE).astype(np.int8)
+        if self.only != "all" and level > 0:
+            # What lies beyond is reached, if at all, through states that rule the film out.
+            passed = (convex if self.only == "convex" else elliptic) < -RULED_OUT_ON_THE_WAY
+            same, reason = same | passed, np.where(passed, Status.NOT_ELLIPTIC, reason)
         for i in np.flatnonzero(same):
             verdict[some[i], lost[some[i]]] = reason[i]
 
@@ -353,23 +382,27 @@ def _pass_on(status: NDArray[np.int8]) -> None:
     status[films] = np.where(passed, first[:, None], status[films])
 
 
-def _path_end(problem: Problem, low: Array, high: Array, level: int) -> tuple[Array, NDArray[np.bool_]]:
+def _path_end(problem: Problem, low: Array, high: Array, level: int) -> tuple[Array, NDArray[np.bool_], Array, Array]:
     """Where between the scaled deflections low and high (B,) the path ends, and whether P11 falls to zero there.
 
     P11 then goes like the root of the distance: over the last sweep it falls by more than half, or is small already.
+    Returned as well: the least margins of convexity and ellipticity of the states met, whether resolved or not.
     """
     rows, bent = np.arange(low.size), np.zeros(low.size, np.bool_)
+    margins = np.full((2, low.size), np.inf)
     for _ in range(2):
         fine = low[:, None] + (high - low)[:, None] * np.arange(SEARCH) / (SEARCH - 1)
         result, _ = follow(problem, fine, level)
         found = result[:, kernels.STATUS] != Status.ITERATION_LIMIT
         last = np.sum(np.logical_and.accumulate(found, axis=1), axis=1) - 1
         good, at = last >= 0, np.maximum(last, 0)
+        met = np.where(found[:, None], result[:, (kernels.CONVEX, kernels.ELLIPTIC)], np.inf)
+        margins = np.minimum(margins, np.min(met, axis=2).T)
         p11 = result[rows, kernels.LEAST_P11, at]
         bent |= good & ((p11 < NEARLY_BENT * _shear_modulus(problem)) | (p11 < 0.5 * result[:, kernels.LEAST_P11, 0]))
         high = np.where(good, fine[rows, np.minimum(last + 1, SEARCH - 1)], high)
         low = np.where(good, fine[rows, at], low)
-    return low, bent
+    return low, bent, margins[0], margins[1]
 
 
 def _ascending(d: Array) -> tuple[Array, NDArray[np.intp] | None]:

@@ -44,7 +44,7 @@ FRESH, RUNNING, DONE, LOST = 0.0, 1.0, 2.0, 3.0
 OK, NOT_ELLIPTIC, INDEFINITE, UNRESOLVED, ITERATION_LIMIT = 0.0, 2.0, 3.0, 4.0, 5.0
 
 
-def states(q, d, l0, p, points, phi, both, slope, beta, first, last, x):  # type: ignore[no-untyped-def]
+def states(q, d, l0, p, points, phi, both, slope, beta, first, last, x):
     """Local quantities x (ROWS G, LANES) at the first ``points`` points, from the unknowns q (2n, LANES)."""
     for g in range(points):
         u, s, w = l0, l0, d * beta[g]
@@ -68,7 +68,7 @@ def states(q, d, l0, p, points, phi, both, slope, beta, first, last, x):  # type
         store(x, r + ENERGY, e)
 
 
-def put(band, i, j, width, aa, ab, ba, bb):  # type: ignore[no-untyped-def]
+def put(band, i, j, width, aa, ab, ba, bb):
     """The four entries of K that couple functions i and j <= i."""
     o = 2 * i * width + 2 * (i - j)
     store(band, o, aa)
@@ -78,7 +78,7 @@ def put(band, i, j, width, aa, ab, ba, bb):  # type: ignore[no-untyped-def]
         store(band, o - 1, ab)
 
 
-def assemble(x, c, row, sums, phi, both, slope, beta, weight, start, stop, low, width, grad, mixed, band):  # type: ignore[no-untyped-def]
+def assemble(x, c, row, sums, phi, both, slope, beta, weight, start, stop, low, width, grad, mixed, band):
     """Banded Hessian, gradient and mixed derivative (2n, LANES), and sums = (I, I_d, I_dd, least l2)."""
     zero = splat(0.0)
     energy, force, stiff, lowest = zero, zero, zero, splat(np.inf)
@@ -146,7 +146,7 @@ def assemble(x, c, row, sums, phi, both, slope, beta, weight, start, stop, low, 
             put(band, i, k, width, cc, cd, dc, dd)
 
 
-def factorise(band, low, width, scaled, pivots):  # type: ignore[no-untyped-def]
+def factorise(band, low, width, scaled, pivots):
     """K = L D L^T in place, column by column: L_ij for low[i] <= j < i, and 1/D_i; returns the least pivot.
 
     A pivot that is not positive is replaced by its magnitude, so that the Newton step still descends.
@@ -177,7 +177,7 @@ def factorise(band, low, width, scaled, pivots):  # type: ignore[no-untyped-def]
     return smallest
 
 
-def backsolve(band, low, width, y, z):  # type: ignore[no-untyped-def]
+def backsolve(band, low, width, y, z):
     """Overwrite y and z (2n, LANES) with K^-1 y and K^-1 z."""
     m = low.shape[0]
     for i in range(m):
@@ -200,7 +200,7 @@ def backsolve(band, low, width, y, z):  # type: ignore[no-untyped-def]
             store(z, j, load(z, j) - v * b)
 
 
-def predict(q, dq, old, dold, d_new, d, d_old, guess):  # type: ignore[no-untyped-def]
+def predict(q, dq, old, dold, d_new, d, d_old, guess):
     """Extrapolate the unknowns to d_new: Hermite cubic through two states, or the tangent if they are the same.
 
     For small d the hoop coefficients grow like d^2 and then saturate, the height's grow like d: divided by
@@ -226,7 +226,7 @@ def predict(q, dq, old, dold, d_new, d, d_old, guess):  # type: ignore[no-untype
         store(guess, i, (y + ahead * (m + ahead * (c2 + (ahead + span) * c3))) * back)
 
 
-def examine(x, points, inner, growth, gd, out):  # type: ignore[no-untyped-def]
+def examine(x, points, inner, growth, gd, out):
     """Diagnostics of a converged state, into rows VARIATION .. SLACK of ``out`` (RESULTS, LANES).
 
     rms variation of R P1 sin(theta) over its mean; largest stretch; least of P11, P22 and least eigenvalue of the
@@ -260,7 +260,7 @@ def examine(x, points, inner, growth, gd, out):  # type: ignore[no-untyped-def]
     store(out, SLACK, slack)
 
 
-def energy_gain(x, weight, extra, elements, out):  # type: ignore[no-untyped-def]
+def energy_gain(x, weight, extra, elements, out):
     """How much energy the next two bubbles of every element would release, sum of g^2 / (2 K_ii), into row GAIN.
 
     extra (3, 2, points per element, elements) : phi + phi', phi and slope of these bubbles, as in the tables.
@@ -284,7 +284,7 @@ def energy_gain(x, weight, extra, elements, out):  # type: ignore[no-untyped-def
     store(out, GAIN, gain)
 
 
-def force_sensitivity(x, p, dq, inner, phi, both, slope, beta, weight, first, last, out):  # type: ignore[no-untyped-def]
+def force_sensitivity(x, p, dq, inner, phi, both, slope, beta, weight, first, last, out):
     """dF/dp_m = dI_d/dp_m + dq/dd.dg/dp_m, into rows RESULTS + m of ``out``."""
     for m in range(len(FIELDS)):
         store(out, RESULTS + m, 0.0)
@@ -303,7 +303,7 @@ def force_sensitivity(x, p, dq, inner, phi, both, slope, beta, weight, first, la
             store(out, RESULTS + m, load(out, RESULTS + m) + add)
 
 
-def decide(first, last_chance, tolerance, d, lane, sums, dots, pivot, out):  # type: ignore[no-untyped-def]
+def decide(first, last_chance, tolerance, d, lane, sums, dots, pivot, out):
     """Per lane: accept the trial state, halve the step, restart or finish. Scalar code, a few operations per lane.
 
     lane (8, LANES), kept between iterations: accept, halve, restart, finish (masks), alpha, base energy, fall, mode.
@@ -343,7 +343,7 @@ def decide(first, last_chance, tolerance, d, lane, sums, dots, pivot, out):  # t
     return over
 
 
-def verdict(out, d, gain_limit, variation_limit):  # type: ignore[no-untyped-def]
+def verdict(out, d, gain_limit, variation_limit):
     """Judge the converged lanes of ``out`` (RESULTS, LANES) at d (LANES,): exact, not elliptic or neither."""
     for k in range(LANES):
         if out[STATUS, k] == ITERATION_LIMIT:
@@ -358,7 +358,7 @@ def verdict(out, d, gain_limit, variation_limit):  # type: ignore[no-untyped-def
             out[STATUS, k] = UNRESOLVED
 
 
-def update(lane, d, d_before, base, step, y, z, old, trial, q, dq):  # type: ignore[no-untyped-def]
+def update(lane, d, d_before, base, step, y, z, old, trial, q, dq):
     """Do what `decide` decided: the next trial state, and for lanes that finish the unknowns and their slopes dq/dd."""
     accept, halve, restart = load(lane, ACCEPT), load(lane, HALVE), load(lane, RESTART)
     finish, alpha, ratio = load(lane, FINISH), load(lane, ALPHA), d / d_before
@@ -376,7 +376,7 @@ def update(lane, d, d_before, base, step, y, z, old, trial, q, dq):  # type: ign
         store(dq, i, where(finish, -load(z, i), load(dq, i)))
 
 
-def solve_newton(band, low, width, grad, mixed, y, z, dots):  # type: ignore[no-untyped-def]
+def solve_newton(band, low, width, grad, mixed, y, z, dots):
     """y = K^-1 g, z = K^-1 K_d, and dots = (g.y, g.z, K_d.z)."""
     m = low.shape[0]
     for i in range(m):
@@ -394,14 +394,14 @@ def solve_newton(band, low, width, grad, mixed, y, z, dots):  # type: ignore[no-
     store(dots, 2, kz)
 
 
-def spread(rows, films, column):  # type: ignore[no-untyped-def]
+def spread(rows, films, column):
     """Write rows (R, LANES) to films (LANES, at most R, N) at one column."""
     for k in range(LANES):
         for r in range(films.shape[1]):
             films[k, r, column] = rows[r, k]
 
 
-def remember(out, q, everywhere, rough, trace, column):  # type: ignore[no-untyped-def]
+def remember(out, q, everywhere, rough, trace, column):
     """Write the unknowns that are wished for to trace (LANES, 2n, N) at one column."""
     for k in range(LANES):
         if everywhere or (rough and out[STATUS, k] == UNRESOLVED):
@@ -409,7 +409,7 @@ def remember(out, q, everywhere, rough, trace, column):  # type: ignore[no-untyp
                 trace[k, i, column] = q[i, k]
 
 
-def follow_block(p_rows, gd, l0, grid, q, tables, limits, keep, wishes, result, trace):  # type: ignore[no-untyped-def]
+def follow_block(p_rows, gd, l0, grid, q, tables, limits, keep, wishes, result, trace):
     """`follow` for one block; q (2n, LANES) is overwritten."""
     phi, both, slope, beta, growth, weight, first, last, start, stop, low, width, extra = tables
     most, tolerance, gain_limit, variation_limit = limits
@@ -449,7 +449,7 @@ def follow_block(p_rows, gd, l0, grid, q, tables, limits, keep, wishes, result, 
             kept += 1
 
 
-def begin(q, dq, old, dold, lane, out):  # type: ignore[no-untyped-def]
+def begin(q, dq, old, dold, lane, out):
     """Make the last state the one before, and wake the lanes that are not lost."""
     for i in range(q.shape[0]):
         store(old, i, load(q, i))
@@ -459,14 +459,14 @@ def begin(q, dq, old, dold, lane, out):  # type: ignore[no-untyped-def]
         out[STATUS, k] = ITERATION_LIMIT
 
 
-def end(lane):  # type: ignore[no-untyped-def]
+def end(lane):
     """Whoever has not arrived is lost."""
     for k in range(LANES):
         if lane[MODE, k] != DONE:
             lane[MODE, k] = LOST
 
 
-def follow(p, gd, l0, grid, start, tables, limits, keep, wishes, result, trace):  # type: ignore[no-untyped-def]
+def follow(p, gd, l0, grid, start, tables, limits, keep, wishes, result, trace):
     """Continue B blocks of `LANES` films each through ascending scaled deflections.
 
     p (B, n_fields, LANES), gd, l0 (B, 1, LANES) : parameters, G d, pre-stretch

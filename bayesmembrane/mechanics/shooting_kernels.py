@@ -33,13 +33,13 @@ MOST_STEPS = 400
 # Continuation in ln d: longest step, the step below which the path has ended, and how many solutions it may take.
 LONGEST, SHORTEST, MOST_SOLVES = 0.5, 2e-4, 3000
 # Intervals of equal length in ln R after which the film is looked at.
-LOOKS = 12
+LOOKS = 8
 # Rows of what `survey` sees.
 FORCE, SLOPE, VARIATION, MISS_1, MISS_2, STORED, STRETCH, LEAST_P11, ELLIPTIC, CONVEX, LEAST_P2, SLACK = range(12)
 SEEN = 12
 
 
-def rates(t, y, l0, ha, hb, p, out):  # type: ignore[no-untyped-def]
+def rates(t, y, l0, ha, hb, p, out):
     """Right-hand side at y = (l2 - l0, l1 - l0, th, h, then (dl2, dV, dh) for each unknown, then the energy over 2 pi).
 
     ha, hb : dH for each unknown, constant over the film. False where the film cannot be continued.
@@ -67,7 +67,7 @@ def rates(t, y, l0, ha, hb, p, out):  # type: ignore[no-untyped-def]
     return True
 
 
-def launch(l1, th, l0, p, y):  # type: ignore[no-untyped-def]
+def launch(l1, th, l0, p, y):
     """Fill y with the state at the disc; returns dH for each unknown, nan if the film cannot start so."""
     _, p1, _, p11, _, _ = derivatives(p, l1, l0)
     if not (p11 > 0.0 and p1 > 0.0):
@@ -80,7 +80,7 @@ def launch(l1, th, l0, p, y):  # type: ignore[no-untyped-def]
     return p11 * si, p1 * co
 
 
-def attempt(t, step, l0, ha, hb, p, stages, y, new):  # type: ignore[no-untyped-def]
+def attempt(t, step, l0, ha, hb, p, stages, y, new):
     """The stages of one step from (t, y), and its end ``new``. False if the film cannot be continued that far."""
     for s in range(1, STAGES + 1):
         for i in range(SIZE):
@@ -95,7 +95,7 @@ def attempt(t, step, l0, ha, hb, p, stages, y, new):  # type: ignore[no-untyped-
     return True
 
 
-def error_of(step, stages, y, new, size2, size1, rtol):  # type: ignore[no-untyped-def]
+def error_of(step, stages, y, new, size2, size1, rtol):
     """Estimated error of one step over what is allowed, as in ``scipy.integrate.DOP853``."""
     e3, e5 = 0.0, 0.0
     for i in range(4):
@@ -109,7 +109,7 @@ def error_of(step, stages, y, new, size2, size1, rtol):  # type: ignore[no-untyp
     return abs(step) * e5 / np.sqrt((e5 + 0.01 * e3) * 4.0) if e5 + e3 > 0.0 else 0.0
 
 
-def integrate(t, stop, step, l0, ha, hb, p, size2, size1, rtol, stages, y, new):  # type: ignore[no-untyped-def]
+def integrate(t, stop, step, l0, ha, hb, p, size2, size1, rtol, stages, y, new):
     """Continue y (11,) from t to ``stop``; returns the step to go on with, 0 if the film cannot be continued that far.
 
     size1, size2 : magnitudes of th, h and of the strains, which the absolute tolerance scales with
@@ -138,13 +138,13 @@ def integrate(t, stop, step, l0, ha, hb, p, size2, size1, rtol, stages, y, new):
     return 0.0
 
 
-def cross(x, l0, span, p, size2, size1, rtol, stages, y, new):  # type: ignore[no-untyped-def]
+def cross(x, l0, span, p, size2, size1, rtol, stages, y, new):
     """From x = (l1, th) at the disc to the ring; y (11,) is the state there. False if it is not reached."""
     ha, hb = launch(x[0], x[1], l0, p, y)
     return ha == ha and integrate(0.0, span, span / 3.0, l0, ha, hb, p, size2, size1, rtol, stages, y, new) > 0.0
 
 
-def newton(y, d, change, tangent):  # type: ignore[no-untyped-def]
+def newton(y, d, change, tangent):
     """Newton step (2,) for l2 = l0 and h = d at the ring, and dx/dd (2,), from the state y there. False if singular."""
     a, b, c, e = y[4], y[7], y[6], y[9]
     det = a * e - b * c
@@ -156,7 +156,7 @@ def newton(y, d, change, tangent):  # type: ignore[no-untyped-def]
     return True
 
 
-def solve_one(x, d, l0, span, p, rtol, most, stages, y, new, tangent):  # type: ignore[no-untyped-def]
+def solve_one(x, d, l0, span, p, rtol, most, stages, y, new, tangent):
     """Damped Newton for x = (l1, th)(0) at deflection d; x is overwritten. Returns the number of iterations, 0 if lost.
 
     tangent (2,) : dx/dd of the last integration. Convergence is of the residual, l2(T) - l0 and h(T) - d over their
@@ -168,14 +168,13 @@ def solve_one(x, d, l0, span, p, rtol, most, stages, y, new, tangent):  # type: 
     for iteration in range(most):
         good = cross(x, l0, span, p, size2, size1, rtol, stages, y, new)
         now = np.hypot(y[0] / size2, (y[3] - d) / d)
-        if not good or not now < norm * (1.0 - 1e-3 * alpha):
-            # Below this, round-off: no further fall is to be had.
-            if not (good and now < 30.0 * rtol):
-                if alpha < 1e-4 or iteration == 0:
-                    return 0
-                alpha *= 0.4
-                x[:] = base + alpha * change
-                continue
+        # Below 30 rtol there is round-off, and no further fall to be had.
+        if not good or (now >= 30.0 * rtol and not now < norm * (1.0 - 1e-3 * alpha)):
+            if alpha < 1e-4 or iteration == 0:
+                return 0
+            alpha *= 0.4
+            x[:] = base + alpha * change
+            continue
         norm, alpha = now, 1.0
         if not newton(y, d, change, tangent):
             return 0
@@ -187,14 +186,14 @@ def solve_one(x, d, l0, span, p, rtol, most, stages, y, new, tangent):  # type: 
     return 0
 
 
-def trial_start(i, j, d, l0, x):  # type: ignore[no-untyped-def]
+def trial_start(i, j, d, l0, x):
     """Point (i, j) of a coarse grid of starts at deflection d, into x (2,)."""
     size = min(d, 1.0)
     x[0] = l0 + (size * size * 0.04 + 0.05 * max(d - 1.0, 0.0)) * 1.35**j
     x[1] = d * (0.15 + 0.085 * i) if d < 1.0 else 0.2 + 0.11 * i
 
 
-def first_state(x, d, l0, span, p, rtol, stages, y, new, tangent):  # type: ignore[no-untyped-def]
+def first_state(x, d, l0, span, p, rtol, stages, y, new, tangent):
     """A start at deflection d from a coarse search over (l1, th), best residuals first. True if Newton converges."""
     tried = np.full((12, 14), np.inf)
     size = min(d, 1.0)
@@ -204,7 +203,7 @@ def first_state(x, d, l0, span, p, rtol, stages, y, new, tangent):  # type: igno
             if cross(x, l0, span, p, size * size, size, 1e-4, stages, y, new):
                 tried[i, j] = (y[0] / (size * size)) ** 2 + ((y[3] - d) / d) ** 2
     for _ in range(20):
-        at = np.argmin(tried)
+        at = int(np.argmin(tried))
         i, j = at // 14, at % 14
         if not np.isfinite(tried[i, j]):
             return False
@@ -215,7 +214,7 @@ def first_state(x, d, l0, span, p, rtol, stages, y, new, tangent):  # type: igno
     return False
 
 
-def extrapolate(goal, d, x, tangent, d_old, x_old, tangent_old, zero, power):  # type: ignore[no-untyped-def]
+def extrapolate(goal, d, x, tangent, d_old, x_old, tangent_old, zero, power):
     """x at deflection ``goal`` by the Hermite cubic through two states, or the tangent if they are the same.
 
     x grows like zero + d^power for small d and like d^(power - 1) for large: what is extrapolated, in ln d, is
@@ -233,7 +232,7 @@ def extrapolate(goal, d, x, tangent, d_old, x_old, tangent_old, zero, power):  #
     return zero + (v + ahead * (slope + ahead * bend)) * s_goal
 
 
-def walk(x0, slope0, d0, targets, sweep, l0, span, p, rtol, out, end, stages, y, new):  # type: ignore[no-untyped-def]
+def walk(x0, slope0, d0, targets, sweep, l0, span, p, rtol, out, end, stages, y, new):
     """Continue from the state x0 at d0 through targets (M,), in the direction of ``sweep`` (+1 or -1).
 
     out (M, 3) : l1(0), th(0), iterations; nan where the path was lost
@@ -270,7 +269,7 @@ def walk(x0, slope0, d0, targets, sweep, l0, span, p, rtol, out, end, stages, y,
         out[m, 0], out[m, 1], out[m, 2] = x[0], x[1], n
 
 
-def follow(targets, start, l0, span, p, rtol, out, end):  # type: ignore[no-untyped-def]
+def follow(targets, start, l0, span, p, rtol, out, end):
     """Follow one film through ascending scaled deflections ``targets`` (M,), from a state at small deflection.
 
     For small d every material starts alike (G alone matters, and drops out), so the start from there is a good guess:
@@ -296,7 +295,7 @@ def follow(targets, start, l0, span, p, rtol, out, end):  # type: ignore[no-unty
         d *= 0.5
 
 
-def look(t, y, l0, p, line):  # type: ignore[no-untyped-def]
+def look(t, y, l0, p, line):
     """Extremes of what the film passes through, at one point, into ``line`` (SEEN,); returns R P1 sin(th)."""
     l1, l2 = l0 + y[1], l0 + y[0]
     _, p1, p2, p11, p12, p22 = derivatives(p, l1, l2)
@@ -310,7 +309,7 @@ def look(t, y, l0, p, line):  # type: ignore[no-untyped-def]
     return np.exp(t) * p1 * np.sin(y[2])
 
 
-def survey(x, d, l0, span, p, rtol, line):  # type: ignore[no-untyped-def]
+def survey(x, d, l0, span, p, rtol, line):
     """Follow a solved state x = (l1, th)(0) once more, with one more Newton step in the end; into line (SEEN,).
 
     line : force and slope dF/dd (over 2 pi, scaled); change of R P1 sin(th) over the film relative to its value;
@@ -339,7 +338,7 @@ def survey(x, d, l0, span, p, rtol, line):  # type: ignore[no-untyped-def]
     line[SLOPE] = p11 * np.sin(th) * tangent[0] + p1 * np.cos(th) * tangent[1]
 
 
-def shoot(targets, start, l0, span, p, rtol, out, lines):  # type: ignore[no-untyped-def]
+def shoot(targets, start, l0, span, p, rtol, out, lines):
     """`follow`, then `survey` of every state into lines (M + 1, SEEN), the end of the path last; nan where none is."""
     end = np.empty(3)
     follow(targets, start, l0, span, p, rtol, out, end)

@@ -32,7 +32,7 @@ LANES = 8
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 
 
-class Lanes(types.Type):
+class Lanes(types.Type):  # type: ignore[misc]
     """numba type of one vector."""
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ lanes = Lanes()
 
 
 @register_model(Lanes)
-class _LanesModel(models.PrimitiveModel):
+class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, dmm: Any, fe_type: Any) -> None:
         super().__init__(dmm, fe_type, _VECTOR)
 
@@ -123,7 +123,7 @@ def _unary(name: str) -> Any:
 
 _sqrt, _fabs = (_unary(name) for name in ("sqrt", "fabs"))
 
-# ---- exp and log: LLVM would call the scalar ones of libm lane by lane ------------------------------------------------
+# ---- exp and log: LLVM would call the scalar ones of libm lane by lane -----------------------------------------------
 
 _INTEGERS = ir.VectorType(ir.IntType(64), LANES)
 # Adding it to a number below 2^51 leaves the number, rounded, in the lowest bits.
@@ -179,7 +179,7 @@ def _if_less(typing_context: Any, a: Any, b: Any, x: Any, y: Any) -> Any:
     return lanes(a, b, x, y), generate
 
 
-def _exp(x):  # type: ignore[no-untyped-def]
+def _exp(x):
     """2^n e^r with x = n ln 2 + r and the Taylor polynomial of e^r: below 1.5 ulp."""
     x = greatest(least(x, 1000.0), -1000.0)
     n = (x * _LOG2_E + _ROUNDING) - _ROUNDING
@@ -193,7 +193,7 @@ def _exp(x):  # type: ignore[no-untyped-def]
     return (1.0 + (r + s * (low + q * high))) * _power_of_two(half) * _power_of_two(n - half)
 
 
-def _log(x):  # type: ignore[no-untyped-def]
+def _log(x):
     """n ln 2 + ln(1 + f) by fdlibm's polynomial in f / (2 + f): below 1 ulp."""
     n, m = _split(_if_less(x, _TINY, x * 2.0**54, x))
     n, f = n - _if_less(x, _TINY, 54.0, 0.0), m - 1.0
@@ -213,12 +213,14 @@ def _extend(function: Any, implementation: Any) -> None:
 
     # numba compares the two signatures, annotations included: neither carries any.
     @overload(function)
-    def choose(a):  # type: ignore[no-untyped-def]
+    def choose(a):
         return (lambda a: compiled(a)) if isinstance(a, Lanes) else None
 
 
-for _function, _implementation in ((np.sqrt, _sqrt), (np.log, _log), (np.exp, _exp), (abs, _fabs)):
-    _extend(_function, _implementation)
+_extend(np.sqrt, _sqrt)
+_extend(np.log, _log)
+_extend(np.exp, _exp)
+_extend(abs, _fabs)
 
 
 def _choose(comparison: str) -> Any:

@@ -39,15 +39,16 @@ class Status(IntEnum):
 
 _SENTENCES = {
     Status.OK: "ok",
-    Status.LOCKED: "locked: the chains are fully stretched before this deflection is reached; lower the deflection or "
-    "raise the limit of the material",
-    Status.NOT_ELLIPTIC: "not elliptic: on the way to this deflection the meridional stiffness P11 falls to zero, so "
-    "these parameters describe no film that stays smooth up to here",
-    Status.INDEFINITE: "indefinite: on the way to this deflection the equilibrium stops being a minimum of the energy, "
-    "so a film with these parameters would jump away from it",
-    Status.UNRESOLVED: "unresolved: the solution keeps changing with every refinement, so the force is not known to 1e-6",
-    Status.ITERATION_LIMIT: "iteration limit: neither solver converged, and no physical reason was found; ask for "
-    "deflections in smaller steps",
+    Status.LOCKED: "locked: the deflection is beyond the one at which the chains are fully stretched; lower it or "
+    "raise the limit",
+    Status.NOT_ELLIPTIC: "not elliptic: the meridional stiffness P11 falls to zero on the way there, so the film has "
+    "no stable smooth state; these parameters do not describe a film at this deflection",
+    Status.INDEFINITE: "indefinite: the equilibrium found is not a minimum of the energy, or the path turns back "
+    "before, so the film would leave it; these parameters do not describe a film at this deflection",
+    Status.UNRESOLVED: "unresolved: finer polynomials would still release energy after every refinement, so the force "
+    "is not exact to 1e-6",
+    Status.ITERATION_LIMIT: "iteration limit: no solver converged; try fewer and smaller steps, or report these "
+    "parameters",
 }
 
 
@@ -95,7 +96,7 @@ class Curves:
     @property
     def ok(self) -> NDArray[np.bool_]:
         """(B, N) True where the force can be used."""
-        return self.status == Status.OK
+        return np.asarray(self.status == Status.OK)
 
     def tally(self) -> dict[str, int]:
         """How many forces carry each status, by label; statuses that do not occur are left out."""

@@ -311,9 +311,8 @@ def residuals(points: Points, quantiles: Array, material: str, kind: str = "svg"
         ax.axhline(0, color=INK, linewidth=0.8)
         ax.vlines(x, z[0], z[2], color=c, linewidth=3, alpha=0.4)
         ax.plot(x, z[1], color=c, linewidth=0.8, marker=marker(material), markersize=_marker_size(points) + 0.5)
-        reach = 1.1 * max(
-            float(np.nanmax(np.abs(z))) if np.any(np.isfinite(z)) else 1.0, 3.0 if points.sd is not None else 0
-        )
+        largest = float(np.nanmax(np.abs(z))) if np.any(np.isfinite(z)) else 0.0
+        reach = 1.1 * (max(largest, 3.0) if points.sd is not None else largest or 1.0)
         ax.set_ylim(-reach, reach)
         ax.set_xlim(left=0)
         ax.set_xlabel("deflection (mm)")
@@ -335,7 +334,8 @@ def corner_plot(
 ) -> Picture:
     """(c) Draws (S, m) of the natural parameters, each pair of them, with the optimum and the paper's point."""
     m, c = draws.shape[1], colour(material)
-    ranges = [_span(draws[:, i]) for i in range(m)]
+    logarithmic = [_wide(draws[:, i]) for i in range(m)]
+    ranges = [_span(draws[:, i], log) for i, log in enumerate(logarithmic)]
     size = WIDTH if m > 2 else 6.0
     with _style({"font.size": 10, "axes.labelsize": 10.5, "xtick.labelsize": 8.5, "ytick.labelsize": 8.5}):
         figure = Figure(figsize=(size, size))
@@ -347,6 +347,7 @@ def corner_plot(
             fig=figure,
             labels=[f"{symbol(n)} ({u or '-'})" for n, u in zip(names, units, strict=True)],
             range=ranges,
+            axes_scale=["log" if log else "linear" for log in logarithmic],
             color=c,
             bins=30,
             smooth=1.0,
@@ -358,7 +359,7 @@ def corner_plot(
             hist_kwargs={"linewidth": 1.3},
         )
         logging.getLogger().setLevel(level)
-        _corner_margins(figure, m, size)
+        _corner_margins(figure, m, size, logarithmic)
         handles = [Line2D([], [], color=c, label="posterior: 50 % and 90 % regions")]
         for values, shade, mark, label in ((optimum, INK, "x", "our optimum"), (published, ALARM, "+", "paper")):
             if values is not None and _mark(figure, m, values, ranges, shade, mark):
@@ -369,7 +370,7 @@ def corner_plot(
         return _encoded(figure, "png")
 
 
-def _corner_margins(figure: Figure, m: int, size: float) -> None:
+def _corner_margins(figure: Figure, m: int, size: float, logarithmic: Sequence[bool]) -> None:
     """Room for ticks and labels in inches, however many panels there are."""
     left, right, gap = 0.95, 0.1, 0.07
     figure.subplots_adjust(
@@ -380,16 +381,27 @@ def _corner_margins(figure: Figure, m: int, size: float) -> None:
         row, column = divmod(i, m)
         if row < column:
             continue
-        ax.xaxis.set_major_locator(MaxNLocator(3, prune="both"))
+        if not logarithmic[column]:
+            ax.xaxis.set_major_locator(MaxNLocator(3, prune="both"))
         ax.xaxis.set_label_coords(0.5, -0.72 / panel)
         if row > column:
-            ax.yaxis.set_major_locator(MaxNLocator(3, prune="both"))
+            if not logarithmic[row]:
+                ax.yaxis.set_major_locator(MaxNLocator(3, prune="both"))
             ax.yaxis.set_label_coords(-0.72 / panel, 0.5)
 
 
-def _span(values: Array) -> tuple[float, float]:
+def _wide(values: Array) -> bool:
+    """Whether a parameter is positive and spans more than a decade: then its axis is logarithmic."""
+    low, high = np.quantile(values, [0.01, 0.99])
+    return bool(np.min(values) > 0 and high > 10 * low)
+
+
+def _span(values: Array, logarithmic: bool = False) -> tuple[float, float]:
     """The middle 99 % of the draws and a margin; never of zero width."""
-    low, high = np.quantile(values, [0.005, 0.995])
+    if logarithmic:
+        low, high = _span(np.log(values))
+        return float(np.exp(low)), float(np.exp(high))
+    low, high = np.quantile(values, [0.005, 0.995]).tolist()
     margin = 0.12 * (high - low) or 1e-3 * (abs(high) or 1.0)
     return float(low - margin), float(high + margin)
 
@@ -471,11 +483,11 @@ def prior_posterior(marginals: Sequence[Marginal], material: str, kind: str = "s
 def _marginal(ax: Axes, marginal: Marginal, c: str) -> None:
     both = np.concatenate([np.quantile(marginal.prior, [0.01, 0.99]), np.quantile(marginal.posterior, [0.001, 0.999])])
     low, high = float(np.min(both)), float(np.max(both))
-    edges = np.linspace(low, high, 61)
+    edges, coarse = np.linspace(low, high, 61), np.linspace(low, high, 31 if marginal.prior.size < 2000 else 61)
     own = np.quantile(marginal.posterior, [0.001, 0.999])
     narrow = own[1] - own[0] < 0.15 * (high - low)
     fine = np.linspace(own[0], own[1], 25) if narrow and own[1] > own[0] else edges
-    for values, bins, shade, alpha in ((marginal.prior, edges, FAINT, 1.0), (marginal.posterior, fine, c, 0.75)):
+    for values, bins, shade, alpha in ((marginal.prior, coarse, FAINT, 1.0), (marginal.posterior, fine, c, 0.75)):
         counts, _ = np.histogram(values, bins)
         ax.stairs(counts / max(1, counts.max()), bins, fill=True, color=shade, alpha=alpha)
     if narrow:  # a spike of a few pixels must be seen
@@ -692,12 +704,12 @@ def reconstruction(ranges: Sequence[Recovered], losses: Sequence[LossBar], kind:
     names = [r.name for r in ranges]
     labels = list(dict.fromkeys(b.label for b in losses))
     with _style():
-        figure = _figure(3.6 + 0.5 + 0.23 * len(labels))
-        parts: Any = figure.subfigures(2, 1, height_ratios=(3.6, 0.5 + 0.23 * len(labels)))
+        figure = _figure(4.2 + 0.5 + 0.23 * len(labels))
+        parts: Any = figure.subfigures(2, 1, height_ratios=(4.2, 0.5 + 0.23 * len(labels)))
         top, bottom = parts
-        left, right = top.subplots(1, 2, width_ratios=(1.7, 1))
-        _recovered(left, ranges)
-        _counts(right, ranges)
+        left, right = top.subfigures(1, 2, width_ratios=(1.7, 1))
+        _recovered(left.subplots(2, 1, sharex=True, height_ratios=(3, 1)), ranges)
+        _counts(right.subplots(), ranges)
         grid = bottom.subplots(1, len(names), sharey=True, squeeze=False)
         for i, name in enumerate(names):
             _loss_bars(grid[0, i], [b for b in losses if b.range == name], labels, name)
@@ -707,26 +719,21 @@ def reconstruction(ranges: Sequence[Recovered], losses: Sequence[LossBar], kind:
 _RANGE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 
 
-def _recovered(ax: Axes, ranges: Sequence[Recovered]) -> None:
+def _recovered(axes: Sequence[Axes], ranges: Sequence[Recovered]) -> None:
     for i, r in enumerate(ranges):
-        ax.errorbar(
-            1e3 * r.points.deflection,
-            r.points.force,
-            None if r.points.sd is None else 2 * r.points.sd,
-            fmt="os^D"[i % 4],
-            color=_RANGE_COLOURS[i % 4],
-            markersize=4.5,
-            capsize=2.5,
-            elinewidth=1,
-            label=f"{r.name} (bars: 2 sd)",
-        )
-    ax.set_xlabel("deflection (mm)")
-    ax.set_ylabel("force (N)")
-    ax.set_xlim(left=0)
-    ax.set_ylim(bottom=0)
-    ax.set_title("Recovered curve")
-    ax.grid(color=FAINT, linewidth=0.6)
-    ax.legend(loc="upper left")
+        x, c, mark = 1e3 * r.points.deflection, _RANGE_COLOURS[i % 4], "os^D"[i % 4]
+        axes[0].plot(x, r.points.force, mark, color=c, markersize=4.5, label=r.name)
+        if r.points.sd is not None:
+            axes[1].plot(x, 1e3 * r.points.sd, mark, color=c, markersize=4.5)
+    axes[0].set_ylabel("force (N)")
+    axes[0].set_title("Recovered curve")
+    axes[0].legend(loc="upper left")
+    axes[1].set_ylabel("sd (mN)")
+    axes[1].set_xlabel("deflection (mm)")
+    axes[1].set_xlim(left=0)
+    for ax in axes:
+        ax.set_ylim(bottom=0)
+        ax.grid(color=FAINT, linewidth=0.6)
 
 
 def _counts(ax: Axes, ranges: Sequence[Recovered]) -> None:
@@ -759,6 +766,7 @@ def _loss_bars(ax: Axes, bars: Sequence[LossBar], labels: Sequence[str], name: s
                 0.98 * reach * side if outside else v + 0.03 * reach * side, k, f"{v:.3g} mN", va="center",
                 fontsize=8.5, ha=("right" if side > 0 else "left") if outside else ("left" if side > 0 else "right"),
                 color="white" if outside else ALARM, fontweight="bold",
+                bbox={"facecolor": ALARM if outside else "white", "edgecolor": "none", "pad": 1.5},
             )  # fmt: skip
     ax.set_xlim(-reach, reach)
     ax.axvline(0, color=INK, linewidth=0.8)

@@ -93,14 +93,15 @@ def write_shown(
     cache: Tally | None = None,
 ) -> Path:
     """As `write_report`, of runs that have been read."""
-    shown = sorted(shown, key=lambda s: (s.digest.end, s.data_hash))
+    shown = sorted(shown, key=lambda s: (s.digest.end, s.data_hash, s.hypothesis.curve_size, s.name))
     names = list(dict.fromkeys(s.specimen.name for s in shown))
     title = title or f"What the force curve of {sentences.listed(names)} says"
     cases = [s.case for s in shown]
     warnings = [*sentences.warnings(cases), *_solver_warnings(shown)]
     told = sentences.answer(cases)
     parts = [_data(shown, reconstruction), _curves(shown), _comparison(shown, compared)]
-    parts += [_break_points(shown)] if shown[0].digest.specimens else []
+    broken = [s for s in shown if s.digest.specimens]
+    parts += [_break_points(broken)] if broken else []
     parts += [_reconstruction(reconstruction)] if reconstruction is not None else []
     parts += [_run(s, _of(s, compared)) for s in shown]
     parts += [_checks(shown), _made(shown, cache)]
@@ -192,11 +193,10 @@ def _curves(shown: Sequence[Shown]) -> Section:
                 picture=figures.first_look([look]),
                 alt=f"Measured force against deflection up to {end} with the curves of {names}, and their residuals",
                 caption=f"Force (N) against deflection (mm), fitted up to {end}: median curves and 90 % bands of "
-                f"{names}. "
-                "Beyond the fitted range curves are dashed and bands hatched: there only the form of the energy and "
-                "the "
-                "priors speak. Below: measured minus median force (N); the grey band is two standard deviations of the "
-                "stated noise. The vertical axis of the residuals is logarithmic away from zero where it has to be.",
+                f"{names}. Beyond the fitted range curves are dashed and bands hatched: there only the form of the "
+                "energy and the priors speak. Below: measured minus median force (N); the grey band is two standard "
+                "deviations of the stated noise. The vertical axis of the residuals is logarithmic away from zero "
+                "where it has to be.",
             )
         )
         blocks += [Block("text", _held_out(s)) for s in group if s.digest.rest_at.size]
@@ -231,9 +231,8 @@ def _held_out(s: Shown) -> str:
     worst = sentences.newtons(float(np.nanmax(np.abs(r[1]))))
     missing = f", and {n - int(known.sum())} points have no prediction" if not np.all(known) else ""
     return (
-        f"{s.name}: of the {n} points beyond the fitted range {inside} lie in the 90 % band; the median misses them "
-        f"by up "
-        f"to {worst}{missing}."
+        f"{s.name}: of the {n} points beyond the fitted range {inside} lie in the 90 % band; the median misses them by "
+        f"up to {worst}{missing}."
     )
 
 
@@ -294,9 +293,8 @@ def _break_points(shown: Sequence[Shown]) -> Section:
                 alt=f"Forces at the break points of {len(names)} specimens, observed and predicted from fits up to "
                 f"{end}",
                 caption=f"Force (N) at the deflections at which {len(names)} specimens broke: observed, and predicted "
-                f"by "
-                f"films fitted up to {end}, scaled with the thickness (median, 90 % interval). The specimens had been "
-                "cycled before they broke, and the fitted curve is a first loading.",
+                f"by films fitted up to {end}, scaled with the thickness (median, 90 % interval). The specimens had "
+                "been cycled before they broke, and the fitted curve is a first loading.",
             )
         )
         lines = (
@@ -332,9 +330,9 @@ def _reconstruction(found: Reconstruction) -> Section:
         "figure",
         picture=figures.reconstruction(recovered, bars),
         alt=f"Recovered force curve over {names}, probabilities of the number of points, and loss residuals",
-        caption="The measured curve behind the published losses: recovered forces (N) against deflection (mm) with two "
-        "standard deviations, probability of the number of points, and distance of the recovered curve to each printed "
-        "loss (mN). Suspect rows are red and hatched.",
+        caption="The measured curve behind the published losses: recovered forces (N) and their standard deviations "
+        "(mN) against deflection (mm), probability of the number of points, and distance of the recovered curve to "
+        "each printed loss (mN). Suspect rows are red and hatched.",
     )
     blocks = [Block("text", s) for s in _reconstruction_sentences(found)] + [picture]
     if found.suspects:
@@ -357,7 +355,11 @@ def _run(s: Shown, compared: Compared | None) -> Section:
     end = f"{1e3 * s.digest.end:.4g} mm"
     blocks = [Block("text", text) for text in _run_sentences(s)]
     blocks.append(_table(tables.parameters_table(s, compared)))
-    blocks += [_residuals(s), _corner(s, compared), _priors(s), _traces(s), _map(s), _profiles(s)]
+    blocks += [_residuals(s), _corner(s, compared)]
+    blocks += (
+        [_priors(s)] if len(s.prior) else [Block("text", "The convexity prior leaves next to no prior draws to show.")]
+    )
+    blocks += [_traces(s), _map(s), _profiles(s)]
     blocks.append(_table(tables.coordinates_table(s)))
     return Section(s.key, f"{s.name}, fitted up to {end}", tuple(blocks))
 
@@ -376,8 +378,7 @@ def _residuals(s: Shown) -> Block:
         alt=f"Residuals of {s.name} against deflection {unit}",
         caption=f"{s.name}: measured minus computed force {unit} against deflection (mm), with the 90 % band of the "
         "posterior. The grey bands are one and two standard deviations. Residuals that follow each other with one "
-        "sign say "
-        "that the curve has another shape, or that the errors of the points depend on each other.",
+        "sign say that the curve has another shape, or that the errors of the points depend on each other.",
     )
 
 
@@ -400,8 +401,7 @@ def _corner(s: Shown, compared: Compared | None) -> Block:
         picture=figures.corner_plot(thin, h.natural_names, h.natural_units, s.material, optimum, published),
         alt=f"Corner plot of the parameters of {s.name}",
         caption=f"{s.name}: posterior of {names}, one by one and in pairs (regions that hold 50 % and 90 %; dashed: "
-        f"5, 50 "
-        f"and 95 %).{marked}",
+        f"5, 50 and 95 %; axes are logarithmic where a parameter spans more than a decade).{marked}",
     )
 
 
@@ -421,13 +421,14 @@ def _traces(s: Shown) -> Block:
     parameters = s.hypothesis.parameters
     names, units = [p.name for p in parameters], [p.unit for p in parameters]
     listed = sentences.listed(f"{spoken(n)} ({u})" for n, u in zip(names, units, strict=True))
+    whole = s.sampling.steps_at[0] < s.sampling.burn
+    discarded = "What is shaded was discarded." if whole else f"The first {s.sampling.burn} steps were discarded."
     return Block(
         "figure",
         picture=figures.traces(s.sampling.means, s.sampling.steps_at, s.sampling.burn, names, units),
         alt=f"Means of the ensembles of {s.name} against the step",
-        caption=f"{s.name}: mean over the walkers of each ensemble against the step (-), for {listed}. What is shaded "
-        f"was "
-        "discarded. Ensembles that stay apart, or drift, have not converged.",
+        caption=f"{s.name}: mean over the walkers of each ensemble against the step (-), for {listed}. {discarded} "
+        "Ensembles that stay apart, or drift, have not converged.",
     )
 
 
@@ -439,10 +440,9 @@ def _map(s: Shown) -> Block:
         picture=figures.convexity_map(d.map_1, d.map_2, d.eigenvalue, d.shape_at, d.state_1, d.state_2, s.material),
         alt=f"Map of the convexity of {s.name} over the stretches, with the states that the film reaches",
         caption=f"{s.name}: least eigenvalue of the Hessian of the energy over G d (-) in the plane of the stretches "
-        f"(-), for "
-        "the draw nearest to the median curve, and the states that its film passes from the ring to the disc at "
-        "several "
-        f"deflections (mm). Convexity prior: {s.hypothesis.convexity}; posterior draws that meet each mode: {shares}.",
+        "(-), for the draw nearest to the median curve, and the states that its film passes from the ring to the "
+        f"disc at several deflections (mm). Convexity prior: {s.hypothesis.convexity}; posterior draws that meet each "
+        f"mode: {shares}.",
     )
 
 
@@ -456,30 +456,13 @@ def _profiles(s: Shown) -> Block:
         ),
         alt=f"Deformed film of {s.name} at {at} mm",
         caption=f"{s.name}: the deformed film, height (mm) against radius (mm), at deflections of {at} mm; one thin "
-        f"line for "
-        f"each of {d.shape_radius.shape[1]} posterior draws.",
+        f"line for each of {d.shape_radius.shape[1]} posterior draws.",
     )
 
 
 def _checks(shown: Sequence[Shown]) -> Section:
-    blocks = [
-        Block(
-            "text",
-            "Every run computes a sample of its posterior draws a second time with the other solver, which works by "
-            "another "
-            "principle (shooting against energy minimisation), and reports the largest disagreement.",
-        )
-    ]
-    for s in shown:
-        if s.crosscheck:
-            name = f"{s.name}, {1e3 * s.digest.end:.4g} mm"
-            blocks.append(_table(tables.facts_table(f"crosscheck {s.key}", f"{name}: second solver.", s.crosscheck)))
-    blocks.append(_table(tables.masses_table(shown)))
-    outcomes = {f"{s.name}, {1e3 * s.digest.end:.4g} mm": dict(s.outcomes) for s in shown}
-    blocks.append(
-        _table(tables.facts_table("outcomes", "What became of all evaluations (numbers of draws).", outcomes))
-    )
-    return Section("checks", "Cross-checks", tuple(blocks))
+    made = (tables.crosscheck_table(shown), tables.masses_table(shown), tables.outcomes_table(shown))
+    return Section("checks", "Cross-checks", tuple(_table(t) for t in made))
 
 
 def _made(shown: Sequence[Shown], cache: Tally | None) -> Section:
@@ -491,12 +474,15 @@ def _made(shown: Sequence[Shown], cache: Tally | None) -> Section:
         caption = "The curve cache: films found, solved, and passed by because their draws never repeat; times in s."
         blocks.append(_table(tables.facts_table("cache", caption, caches)))
     facts = _common([s.facts for s in shown])
-    blocks.append(_table(tables.facts_table("settings", "Settings, seed and versions common to all runs.", facts)))
-    for s in shown if len(shown) > 1 else ():
-        own = {k: v for k, v in s.facts.items() if k not in facts}
-        if own:
-            name = f"{s.name}, {1e3 * s.digest.end:.4g} mm"
-            blocks.append(_table(tables.facts_table(f"settings {s.key}", f"{name}: what is its own.", own)))
+    blocks.append(
+        _table(
+            tables.facts_table(
+                "settings", "Settings, seed and versions" + (" common to all runs." if len(shown) > 1 else "."), facts
+            )
+        )
+    )
+    if len(shown) > 1:
+        blocks.append(_table(tables.own_facts_table(shown, facts)))
     return Section("made", "How it was made", tuple(blocks))
 
 

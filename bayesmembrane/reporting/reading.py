@@ -54,7 +54,7 @@ def read(run: Run | Path | str) -> Shown:
         digest=digest,
         x=run.draws(),
         natural=_stacked(run.data.posterior, h.natural_names),
-        prior=_stacked(run.data.prior, h.names),
+        prior=_stacked(run.data.prior, h.names) if "prior" in run.data.groups() else np.empty((0, len(h.names))),
         sampling=_sampling(run),
         goodness=run.status["goodness"],
         dominated=bool(run.status["extra_noise_dominates"]),

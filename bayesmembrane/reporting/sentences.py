@@ -99,9 +99,9 @@ def percent(share: float) -> str:
     """A share in per cent; never 0 or 100 unless it is."""
     if 0 < share < 0.001:
         return "less than 0.1 %"
-    if 0.999 < share < 1:
-        return "more than 99.9 %"
-    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.4g} %"
+    if 0.995 < share < 1:
+        return f"more than {'99.9' if share > 0.999 else '99.5'} %"
+    return f"{100 * share:.{2 if share < 0.995 else 3}g} %"
 
 
 def interval(low: float, middle: float, high: float, unit: str) -> str:
@@ -112,7 +112,7 @@ def interval(low: float, middle: float, high: float, unit: str) -> str:
     if width <= 0:
         return f"{middle:.6g} {unit}".strip()
     half = max(min(high - middle, middle - low), width / 50)  # a long tail must not hide how sharp the other side is
-    decimals = min(9, max(0, 1 - math.floor(math.log10(2 * half))))
+    decimals = min(9, max(0, -math.floor(math.log10(half / 2))))
     own = f"{middle:.{decimals}f}{' ' + unit if unit else ''}"
     return f"{own} (90 %: {low:.{decimals}f} to {high:.{decimals}f})"
 
@@ -137,7 +137,7 @@ def _digits(value: float) -> str:
 def answer(cases: Sequence[Case]) -> list[str]:
     """What to read if one reads nothing else: what describes each range, how stiff, what lies beyond, what to trust."""
     groups = _by_range(cases)
-    telling = next((g for g in groups if any(c.verdict in GOOD for c in g)), groups[-1])
+    telling = next((g for g in groups if any(c.verdict in GOOD for c in g)), min(groups, key=_miss))
     told = [*(describes(g) for g in groups), stiffness(telling), extrapolation(telling), convergence(cases)]
     return [t for t in told if t]
 
@@ -147,6 +147,11 @@ def details(cases: Sequence[Case]) -> list[str]:
     said = answer(cases)
     told = [f(g) for g in _by_range(cases) for f in (unknown, stiffness, extrapolation)]
     return [t for t in told if t and t not in said]
+
+
+def _miss(group: Sequence[Case]) -> float:
+    """The least residual of a range relative to its noise, or to what is predicted where none is stated."""
+    return min(c.rmse / (c.own_noise or abs(c.last_force[1]) or math.inf) for c in group)
 
 
 def _by_range(cases: Sequence[Case]) -> list[list[Case]]:
@@ -161,8 +166,8 @@ def describes(group: Sequence[Case]) -> str:
         best = sorted(group, key=lambda c: c.rmse)
         tail = f"; the others: {_named(best[1:])}" if best[1:] else ""
         return (
-            f"Up to {end} the measurement states no noise, so that no material can be called adequate or not; "
-            f"the smallest root mean square residual has {_named(best[:1])}{tail}."
+            f"Up to {end} the measurement states no noise, so that no material can be called adequate or not; the "
+            f"smallest root mean square residual has {_named(best[:1])}{tail}."
         )
     noise = newtons(group[0].own_noise or 0.0)
     parts = []
@@ -191,9 +196,10 @@ def _missed(cases: Sequence[Case], others: bool, noise: str) -> str:
     if one:
         return f"{_named(cases)} does not describe the curve: {misfit}, {conclusion}"
     ordered = sorted(cases, key=lambda c: c.rmse)
+    others_told = listed(f"{c.name} ({newtons(c.rmse)})" for c in ordered[1:])
     return (
-        f"no material describes the curve: {misfit}, {conclusion}; the nearest is {_named(ordered[:1])}, "
-        f"then {_named(ordered[1:])}"
+        f"no material describes the curve: {misfit}, {conclusion}; the nearest is {_named(ordered[:1])}, then "
+        f"{others_told}"
     )
 
 
@@ -207,11 +213,8 @@ def stiffness(group: Sequence[Case]) -> str:
     good = [c for c in group if c.verdict in GOOD] or [min(group, key=lambda c: c.rmse)]
     told = [f"{interval(*c.modulus, 'N/m')} by {c.name}" for c in good]
     modulus = [1e-6 * c.modulus[1] / c.thickness for c in good]
-    span = (
-        f"{min(modulus):.3g}"
-        if len({f"{m:.3g}" for m in modulus}) == 1
-        else f"{min(modulus):.3g} to {max(modulus):.3g}"
-    )
+    low, high = _digits(min(modulus)), _digits(max(modulus))
+    span = low if low == high else f"{low} to {high}"
     return f"The initial shear modulus times thickness is {listed(told)}, that is a shear modulus of {span} MPa."
 
 
@@ -227,20 +230,21 @@ def unknown(group: Sequence[Case]) -> str:
 
 def extrapolation(group: Sequence[Case]) -> str:
     """What is predicted beyond the fitted range, by the materials that describe the curve, and where nothing can be."""
-    good = [c for c in group if c.verdict in GOOD] or list(group)
-    beyond = [c for c in good if c.last > 1.001 * c.end]
-    if not beyond:
-        return ""
+    good = [c for c in group if c.verdict in GOOD]
+    beyond = [c for c in good or group if c.last > 1.001 * c.end]
     there = [c for c in beyond if all(math.isfinite(v) for v in c.last_force)]
     gone = [c for c in beyond if c not in there]
-    at = f"at {millimetres(beyond[0].last)}, beyond the fitted range,"
+    at = f"at {millimetres(beyond[0].last)}, beyond the fitted range," if beyond else ""
     parts = []
-    if there:
-        told = listed(f"{_span(c)} ({c.name})" for c in there)
-        parts.append(f"{at} the force would be {told}")
+    if there and (good or len(there) == 1):
+        parts.append(f"{at} the force would be {listed(f'{_span(c)} ({c.name})' for c in there)}")
+    elif there:
+        low, high = min(there, key=lambda c: c.last_force[0]), max(there, key=lambda c: c.last_force[2])
+        span = f"{newtons(low.last_force[0])} ({low.name}) to {newtons(high.last_force[2])} ({high.name})"
+        parts.append(f"{at} the materials give anything from {span}")
     if gone:
         told = listed(f"{c.name} ({reasons(c.lost)})" for c in gone)
-        parts.append(f"{at if not there else 'there'} nothing can be said by {told}")
+        parts.append(f"{'there' if there else at} nothing can be said by {told}")
     some = [c for c in there if sum(c.lost.values()) >= 0.01]
     if some:
         told = listed(f"{percent(sum(c.lost.values()))} of the draws of {c.name}" for c in some)
@@ -248,8 +252,10 @@ def extrapolation(group: Sequence[Case]) -> str:
     if not parts:
         return ""
     sentence = "; ".join(parts)
-    warning = " This is an extrapolation: only the form of the energy and the priors speak there."
-    return sentence[0].upper() + sentence[1:] + "." + warning
+    warning = "This is an extrapolation: only the form of the energy and the priors speak there."
+    if not good and beyond[0].verdict == "misses":
+        warning = "This is an extrapolation of a form that already misses the fitted points: do not rely on it."
+    return f"{sentence[0].upper()}{sentence[1:]}. {warning}"
 
 
 def _span(case: Case) -> str:

@@ -86,7 +86,8 @@ def symbol(name: str) -> str:
     logarithm = re.fullmatch(r"ln_([a-z])(\w+)", own)
     if logarithm:
         base, index = logarithm.groups()
-        return r"$\ln\,Gd$" if own == "ln_gd" else rf"$\ln\,{base}_{{{index}}}$"
+        special = {"ln_gd": r"$\ln\,Gd$", "ln_jm": r"$\ln\,J_m$"}
+        return special.get(own, rf"$\ln\,{base}_{{{index}}}$")
     return own.replace("_", " ")
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.inference.posterior import Outcome
 from bayesmembrane.inference.published import Compared
 from bayesmembrane.parameters import Array
 from bayesmembrane.reporting.sentences import percent
@@ -116,8 +117,8 @@ def fits_table(shown: Sequence[Shown]) -> Table:
         )
     return Table(
         "fits",
-        "Residuals of the most probable draw of each run: forces in N and mN, deflections in mm. Chi-square and p-value "
-        "use the noise that the measurement states, never the inferred one.",
+        "Residuals of the most probable draw of each run: forces in N and mN, deflections in mm. Chi-square and "
+        "p-value use the noise that the measurement states, never the inferred one.",
         columns,
         tuple(rows),
     )
@@ -271,7 +272,7 @@ def break_table(shown: Sequence[Shown]) -> Table:
         Column("observed_N", "observed (N)", ".3g"),
         *(Column(f"{s.key}_N", f"{s.name}, {1e3 * s.digest.end:.3g} mm (N)") for s in shown),
     )
-    rows = tuple(
+    rows: tuple[tuple[Value, ...], ...] = tuple(
         (
             name,
             1e6 * float(first.break_thickness[i]),
@@ -317,11 +318,60 @@ def masses_table(shown: Sequence[Shown]) -> Table:
     )
     caption = (
         "Convexity, shares in %: part of the untruncated prior that each mode leaves, and part of the posterior draws "
-        "that "
-        "meet it. reached: the Hessian is positive semidefinite on the states that the film reaches; box: on [1, 8]^2; "
-        "elliptic: P11 > 0 and P22 > 0 on the reached states."
+        "that meet it. reached: the Hessian is positive semidefinite on the states that the film reaches; box: on [1, "
+        "8]^2; elliptic: P11 > 0 and P22 > 0 on the reached states."
     )
     return Table("convexity", caption, columns, rows)
+
+
+def crosscheck_table(shown: Sequence[Shown]) -> Table:
+    """What the second solver found."""
+    columns = (
+        Column("run", "material"),
+        Column("end_mm", "fitted up to (mm)"),
+        Column("draws", "films solved twice", "d"),
+        Column("compared", "forces compared", "d"),
+        Column("largest", "largest relative difference (-)", ".1e"),
+        Column("at_mm", "met at (mm)"),
+        Column("missing", "forces that one solver lacks", "d"),
+    )
+    keys = ("draws", "compared", "largest", "at_mm", "missing")
+    rows: tuple[tuple[Value, ...], ...] = tuple(
+        (s.name, 1e3 * s.digest.end, *(s.crosscheck.get(k) for k in keys)) for s in shown
+    )
+    caption = (
+        "A sample of the posterior draws of each run, computed a second time with the other solver, which works by "
+        "another principle (shooting against energy minimisation). Differences relative to the force."
+    )
+    return Table("crosscheck", caption, columns, rows)
+
+
+def outcomes_table(shown: Sequence[Shown]) -> Table:
+    """What became of all evaluations."""
+    reasons = [o.label for o in Outcome if any(s.outcomes.get(o.label) for s in shown)]
+    columns = (
+        Column("run", "material"),
+        Column("end_mm", "fitted up to (mm)"),
+        *(Column(r.replace(" ", "_"), r, ",d") for r in reasons),
+    )
+    rows: tuple[tuple[Value, ...], ...] = tuple(
+        (s.name, 1e3 * s.digest.end, *(int(s.outcomes.get(r, 0)) for r in reasons)) for s in shown
+    )
+    caption = (
+        "What became of all evaluations, in numbers of films: all but ok have no posterior density; unresolved and "
+        "iteration limit are failures of the numbers, the others are physics or prior."
+    )
+    return Table("outcomes", caption, columns, rows)
+
+
+def own_facts_table(shown: Sequence[Shown], common: Mapping[str, Any]) -> Table:
+    """Settings in which the runs differ."""
+    names = list(dict.fromkeys(k for s in shown for k in s.facts if k not in common))
+    columns = (Column("run", "material"), Column("end_mm", "fitted up to (mm)"), *(Column(n, n) for n in names))
+    rows: tuple[tuple[Value, ...], ...] = tuple(
+        (s.name, 1e3 * s.digest.end, *(_fact(s.facts.get(n)) for n in names)) for s in shown
+    )
+    return Table("settings_of_runs", "Settings in which the runs differ.", columns, rows)
 
 
 def facts_table(name: str, caption: str, facts: Mapping[str, Any]) -> Table:

@@ -60,8 +60,10 @@ class Specimen:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """One run: x (S, k) are posterior draws, ``prior`` (P, k) draws of the truncated prior, both in coordinates.
+    """One run.
 
+    x, natural : (S, k) and (S, m) posterior draws in coordinates and natural parameters
+    prior : (P, k) draws of the truncated prior in coordinates; none where the convexity prior leaves next to nothing
     goodness : of the draw with the largest posterior density (`inference.goodness`)
     dominated : the inferred noise exceeds the stated one
     masses : (mass of the prior, standard error) by convexity mode
@@ -139,7 +141,9 @@ class Shown:
 
     def _loose(self) -> dict[str, float]:
         """Coordinates of the curve whose posterior is nearly as wide as the prior, with the ratio of the widths."""
-        found = {}
+        found: dict[str, float] = {}
+        if not len(self.prior):
+            return found
         for i, p in enumerate(self.hypothesis.parameters[: self.hypothesis.curve_size]):
             wide = float(np.subtract(*np.quantile(self.prior[:, i], (0.95, 0.05))))
             ratio = float(np.subtract(*np.quantile(self.x[:, i], (0.95, 0.05)))) / wide if wide > 0 else 0.0
