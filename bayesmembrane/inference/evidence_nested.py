@@ -94,7 +94,7 @@ def _run(problem: Problem, live: int, rng: np.random.Generator) -> tuple[float, 
         sampler.run_nested(dlogz=REMAINING, print_progress=False, save_bounds=False)
     r = sampler.results
     information = float(r.information[-1])
-    value = float(r.logz[-1]) + np.log(start.part) - 0.5 * information / live
+    value = float(r.logz[-1] + np.log(start.part) - 0.5 * information / live)
     return value, float(np.hypot(r.logzerr[-1], start.log_part_sd))
 
 
@@ -208,22 +208,23 @@ class _Proposals:
             way = np.einsum("nij,nj->ni", axes, z / np.linalg.norm(z, axis=1, keepdims=True))
             way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True) / longest, 1.0)
             low = -self.rng.random(n)
-            high = low + 1
-            for end, step in ((low, -1.0), (high, 1.0)):
-                expanded += self._step_out(at.u, way, end, step, floor)
+            low, high, steps = self._step_out(at.u, way, low, floor)
+            expanded += steps
             contracted += self._shrink(at, way, low, high, floor)
         info = {"n_expand": expanded / n, "n_contract": contracted / n, "expansion_warning_set": False}
         return at.returned(info)
 
-    def _step_out(self, u: Array, way: Array, end: Array, step: float, floor: float) -> int:
-        """Move ``end`` (n,) by steps until it lies outside; returns the steps taken."""
+    def _step_out(self, u: Array, way: Array, low: Array, floor: float) -> tuple[Array, Array, int]:
+        """Ends (n,) outside, found by unit steps from (low, low + 1), and the steps that it took."""
+        end, step = np.concatenate([low, low + 1]), np.repeat([-1.0, 1.0], len(low))
+        u, way = np.concatenate([u, u]), np.concatenate([way, way])
         steps, going = 0, np.arange(len(u))
         while going.size:
             _, value = self._inside_cube(u[going] + end[going, None] * way[going])
             going = going[value > floor]
-            end[going] += step
+            end[going] += step[going]
             steps += going.size
-        return steps
+        return end[: len(low)], end[len(low) :], steps
 
     def _shrink(self, at: _Place, way: Array, low: Array, high: Array, floor: float) -> int:
         """Draw on (low, high) until a point is inside, cutting at those that are not; returns the draws."""

@@ -57,11 +57,10 @@ def basis(ratio: float, elements: int, bubbles: int) -> Basis:
 
     Sampled at bubbles + 3 Gauss points per element and then at the two edges.
     """
-    span, ends = np.log(ratio), _ends(ratio, elements)
+    span, lengths = np.log(ratio), np.diff(_ends(ratio, elements))
     nodes, weights = legendre.leggauss(bubbles + 3)
     size, per, n = nodes.size, bubbles + 1, elements * (bubbles + 1) - 1
-    lengths = np.diff(ends)
-    points = np.append((ends[:-1, None] + 0.5 * (1 + nodes) * lengths[:, None]).ravel(), [0.0, span])
+    points = np.append(_gauss_points(ratio, elements, bubbles), [0.0, span])
     phi, slope = _shape_functions(ratio, elements, bubbles, points)
     home = np.append(np.repeat(np.arange(elements), size), [0, elements - 1])
     first = np.maximum(home * per - 1, 0)
@@ -92,9 +91,7 @@ def _next_bubbles(lengths: Array, nodes: Array, bubbles: int, growth: Array) -> 
 @cache
 def _prolongation(ratio: float, level: int) -> Array:
     """(n', n) : the functions of one level, n, as sums of those of the next, n'."""
-    span = np.log(ratio)
-    elements, bubbles = LEVELS[level + 1]
-    points = np.linspace(0, span, 4 * elements * (bubbles + 2) + 1)
+    points = _gauss_points(ratio, *LEVELS[level + 1])
     new, old = (_shape_functions(ratio, *LEVELS[k], points)[0] for k in (level + 1, level))
     return np.asarray(np.linalg.lstsq(new.T, old.T)[0])
 
@@ -140,6 +137,12 @@ def _shape_functions(ratio: float, elements: int, bubbles: int, t: Array) -> tup
 def _ends(ratio: float, elements: int) -> Array:
     """Element ends in t: shorter elements towards the edges, where soft films form boundary layers."""
     return np.asarray(np.log(ratio) * (1 - np.cos(np.pi * np.arange(elements + 1) / elements)) / 2)
+
+
+def _gauss_points(ratio: float, elements: int, bubbles: int) -> Array:
+    """bubbles + 3 points of every element."""
+    ends, nodes = _ends(ratio, elements), legendre.leggauss(bubbles + 3)[0]
+    return np.asarray((ends[:-1, None] + 0.5 * (1 + nodes) * np.diff(ends)[:, None]).ravel())
 
 
 def _bubbles(x: Array, count: int) -> tuple[Array, Array]:

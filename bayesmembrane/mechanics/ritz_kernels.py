@@ -315,31 +315,31 @@ def decide(first, last_chance, tolerance, d, lane, sums, dots, pivot, out):
     for k in range(LANES):
         for r in range(4):
             lane[r, k] = 0.0
+        if lane[MODE, k] < DONE:
+            energy, decrement = sums[0, k], dots[0, k]
+            scale, fall = abs(sums[1, k] * d[k]), lane[FALL, k]
+            good = np.isfinite(energy) and np.isfinite(decrement) and sums[3, k] > 0.0
+            if good and lane[MODE, k] == RUNNING and fall > 1e-5 * scale and fall > 1e-12 * abs(energy):
+                # Smaller falls drown in the round-off of the energy: there the step is trusted.
+                good = energy <= lane[BASE, k] - 1e-4 * lane[ALPHA, k] * fall
+            if good:
+                lane[ACCEPT, k], lane[ALPHA, k], lane[MODE, k] = 1.0, 1.0, RUNNING
+                lane[BASE, k], lane[FALL, k] = energy, decrement
+                if abs(decrement) <= tolerance * scale:
+                    lane[FINISH, k], lane[MODE, k] = 1.0, DONE
+                    out[FORCE, k] = sums[1, k] - dots[1, k]
+                    out[SLOPE, k] = sums[2, k] - dots[2, k]
+                    out[STORED, k] = energy - 0.5 * decrement
+                    out[STATUS, k] = OK if pivot[0, k] > 0.0 else INDEFINITE
+            elif lane[MODE, k] == RUNNING:
+                lane[HALVE, k] = 1.0
+                lane[ALPHA, k] *= 0.5
+            elif first and not last_chance:
+                lane[RESTART, k] = 1.0
+            else:
+                lane[MODE, k] = LOST
         if lane[MODE, k] >= DONE:
             over += 1
-            continue
-        energy, decrement = sums[0, k], dots[0, k]
-        scale = abs(sums[1, k] * d[k])
-        good = np.isfinite(energy) and np.isfinite(decrement) and sums[3, k] > 0.0
-        if good and lane[MODE, k] == RUNNING and lane[FALL, k] > 1e-5 * scale and lane[FALL, k] > 1e-12 * abs(energy):
-            # Smaller falls drown in the round-off of the energy: there the step is trusted.
-            good = energy <= lane[BASE, k] - 1e-4 * lane[ALPHA, k] * lane[FALL, k]
-        if good:
-            lane[ACCEPT, k], lane[ALPHA, k], lane[MODE, k] = 1.0, 1.0, RUNNING
-            lane[BASE, k], lane[FALL, k] = energy, decrement
-            if abs(decrement) <= tolerance * scale:
-                lane[FINISH, k], lane[MODE, k] = 1.0, DONE
-                out[FORCE, k] = sums[1, k] - dots[1, k]
-                out[SLOPE, k] = sums[2, k] - dots[2, k]
-                out[STORED, k] = energy - 0.5 * decrement
-                out[STATUS, k] = OK if pivot[0, k] > 0.0 else INDEFINITE
-        elif lane[MODE, k] == RUNNING:
-            lane[HALVE, k] = 1.0
-            lane[ALPHA, k] *= 0.5
-        elif first and not last_chance:
-            lane[RESTART, k] = 1.0
-        else:
-            lane[MODE, k] = LOST
     return over
 
 
@@ -432,9 +432,10 @@ def follow_block(p_rows, gd, l0, grid, q, tables, limits, keep, wishes, result, 
             store(pivot, 0, factorise(band, low, width, y, z))
             solve_newton(band, low, width, grad, mixed, y, z, dots)
             count += 1
-            if decide(count == 1, j == 0, tolerance, grid[j], lane, sums, dots, pivot, out) == LANES:
-                break
+            over = decide(count == 1, j == 0, tolerance, grid[j], lane, sums, dots, pivot, out)
             update(lane, d, before, base, step, y, z, old, trial, q, dq)
+            if over == LANES:
+                break
         end(lane)
         if keep[j]:
             states(q, d, l0, p, points, phi, both, slope, beta, first, last, x)

@@ -156,6 +156,7 @@ def _subtitle(shown: Sequence[Shown]) -> str:
 
 def _data(shown: Sequence[Shown], reconstruction: Reconstruction | None) -> Section:
     blocks = [Block("text", s) for s in _reconstruction_sentences(reconstruction)]
+    origin = ""
     for group in _groups(shown):
         s = group[0]
         d, film = s.digest, s.specimen
@@ -172,10 +173,11 @@ def _data(shown: Sequence[Shown], reconstruction: Reconstruction | None) -> Sect
             "forces": f"{float(np.min(d.force)):.4g} to {float(np.max(d.force)):.4g} N; {noise}",
             "whole measurement": f"up to {1e3 * d.full_range:.4g} mm",
             "files": ", ".join(f for f in film.files if f) or "-",
-            "origin": film.origin or "not stated",
+            "origin": "as above" if origin and film.origin == origin else film.origin or "not stated",
             "notes": "; ".join(film.notes) or "none",
             "data hash (SHA-256)": s.data_hash,
         }
+        origin = film.origin
         name = f"data up to {1e3 * d.end:.4g} mm"
         blocks.append(_table(tables.facts_table(name, f"The measurement, fitted up to {1e3 * d.end:.4g} mm.", facts)))
     return Section("data", "Data", tuple(blocks))
@@ -199,7 +201,8 @@ def _curves(shown: Sequence[Shown]) -> Section:
                 "where it has to be.",
             )
         )
-        blocks += [Block("text", _held_out(s)) for s in group if s.digest.rest_at.size]
+        unused = tuple(_held_out(s) for s in group if s.digest.rest_at.size)
+        blocks += [Block("list", lines=unused)] if unused else []
     return Section("curves", "Curves and residuals", tuple(blocks))
 
 
