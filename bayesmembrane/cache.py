@@ -83,6 +83,7 @@ class CachedSolver:
         sensitivities: bool = False,
         solver: str = "ritz",
         only: str = "all",
+        exact_up_to: float = np.inf,
     ) -> Curves:
         """As `mechanics.solve`; raises what that raises, and `StorageError` if the folder cannot be written."""
         asked = problem(material, parameters, deflection, inner_radius, outer_radius, prestretch)
@@ -90,7 +91,7 @@ class CachedSolver:
         shapes = len(material.field_names()) > 1
         if (shapes and gd.size > SMALL_BATCH) or not np.all(gd > 0):
             self.tally.bypassed += gd.size
-            return _direct(asked, sensitivities, solver, only)
+            return _direct(asked, sensitivities, solver, only, exact_up_to)
         begun = time.perf_counter()
         keys = _keys(asked, gd, sensitivities, solver)
         entries = {key: self._find(key) for key in dict.fromkeys(keys)}
@@ -170,7 +171,7 @@ class CachedSolver:
 _FIELDS = {f.name for f in fields(Curves)} - {"deflection", "sensitivity"}
 
 
-def _direct(asked: Problem, sensitivities: bool, solver: str, only: str = "all") -> Curves:
+def _direct(asked: Problem, sensitivities: bool, solver: str, only: str = "all", exact_up_to: float = np.inf) -> Curves:
     return api.solve(
         asked.material,
         asked.parameters,
@@ -181,6 +182,7 @@ def _direct(asked: Problem, sensitivities: bool, solver: str, only: str = "all")
         sensitivities=sensitivities,
         solver=solver,
         only=only,
+        exact_up_to=exact_up_to,
     )
 
 

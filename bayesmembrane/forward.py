@@ -131,6 +131,8 @@ class Forward:
     ) -> Curves:
         """Curves of ``films`` (B, n) at ``deflection`` (N,) m on the rig of the measurement."""
         rig = annulus(self.measurement)
+        # What lies beyond is solved to see whether the film stays convex there.
+        exact = float(np.max(self.deflection)) if only != "all" else np.inf
         options: dict[str, Any] = {"inner_radius": rig.inner_radius, "outer_radius": rig.outer_radius}
         return self.solve(
             self.hypothesis.material,
@@ -139,6 +141,7 @@ class Forward:
             sensitivities=sensitivities,
             solver=solver,
             only=only,
+            exact_up_to=exact,
             **options,
         )
 

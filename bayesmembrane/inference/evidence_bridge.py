@@ -115,9 +115,13 @@ def _halves(problem: Problem, draws: Array, effective: float | None, log_posteri
             f"(ensembles, steps, walkers, {problem.size})"
         )
     if draws.ndim == 2 and effective is None:
-        raise SettingsError("flat draws need their effective number", remedy="give effective=, or keep steps and walkers")
+        raise SettingsError(
+            "flat draws need their effective number", remedy="give effective=, or keep steps and walkers"
+        )
     if draws.size < FEWEST * problem.size:
-        raise SettingsError(f"{draws.size // problem.size} draws are too few for their evidence", remedy="sample longer")
+        raise SettingsError(
+            f"{draws.size // problem.size} draws are too few for their evidence", remedy="sample longer"
+        )
     if draws.ndim == 2:
         draws = draws[None, :, None, :]
     known = None if log_posterior is None else np.asarray(log_posterior, dtype=float).reshape(draws.shape[:-1])
@@ -130,7 +134,9 @@ def _halves(problem: Problem, draws: Array, effective: float | None, log_posteri
         x, log_p = _laid_out(draws[at]), None if known is None else _laid_out(known[at][..., None])[..., 0]
         some = np.linspace(0, len(x) - 1, max(1, min(len(x), USED // x.shape[1]))).astype(int)
         x = x[some]
-        log_p = problem.log_posterior(x.reshape(-1, problem.size)).reshape(x.shape[:2]) if log_p is None else log_p[some]
+        log_p = (
+            problem.log_posterior(x.reshape(-1, problem.size)).reshape(x.shape[:2]) if log_p is None else log_p[some]
+        )
         if not np.all(np.isfinite(log_p)):
             raise SettingsError("the target rules out some of the draws", remedy="give draws of this very target")
         share = len(draws[at].reshape(-1, problem.size)) / (draws.size / problem.size)
@@ -183,7 +189,9 @@ def _fixed_point(at_draws: Array, at_proposals: Array, n1: float, n2: float) -> 
     log_s1, log_s2 = np.log(n1 / (n1 + n2)), np.log(n2 / (n1 + n2))
     log_z = float(np.median(at_draws))
     for _ in range(1000):
-        above = logsumexp(at_proposals - np.logaddexp(log_s1 + at_proposals, log_s2 + log_z)) - np.log(at_proposals.size)
+        above = logsumexp(at_proposals - np.logaddexp(log_s1 + at_proposals, log_s2 + log_z)) - np.log(
+            at_proposals.size
+        )
         below = logsumexp(-np.logaddexp(log_s1 + at_draws, log_s2 + log_z)) - np.log(at_draws.size)
         new = float(above - below)
         if abs(new - log_z) < 1e-8:

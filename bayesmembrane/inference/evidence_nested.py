@@ -16,9 +16,8 @@ from bayesmembrane.errors import SettingsError
 from bayesmembrane.inference.evidence_target import Estimate, Problem, Target
 from bayesmembrane.parameters import Array
 
-LEAST_LIVE = 120
-FEWEST_RUNS = 3
-MOST_RUNS = 40
+LEAST_LIVE, MOST_LIVE = 120, 4000
+PILOTS, THEN, MOST_RUNS = 2, 2, 10
 REMAINING = 0.2  # ln Z that may be left in the live points when they are added
 QUEUE = 0.12  # of the live points are proposed at once: those that fall behind meanwhile are lost
 SHRINK = 0.3  # of ln(volume) between two fits of the bounds
@@ -33,10 +32,13 @@ Tell = Callable[[str], None]
 def nested(target: Target, seed: int, tolerance: float = 0.13, tell: Tell | None = None) -> Estimate:
     """ln Z = ln of the integral of L dX over the prior volume X, by live points that climb the likelihood.
 
-    Independent runs are added until the standard error is at most ``tolerance``: sqrt(H / N) for information H and N
-    live points in all, inflated by the scatter between runs where that is larger. Each run replaces its worst live
-    point by one drawn from the prior above its likelihood: uniformly from ellipsoids around the live points (bounds
-    enlarged by bootstrap) while that is efficient, by random slices otherwise.
+    Two small independent runs tell how many live points are needed for a standard error of ``tolerance``, and two more
+    hold them; others follow while the scatter between runs says that it was not enough. A run of N live points has the
+    error sqrt(H / N) for information H; their mean weighs them by it, and its error is inflated by the root of
+    chi^2 / (R - 1) of R runs where that is above 1.
+
+    Each run replaces its worst live point by one drawn from the prior above its likelihood: uniformly from ellipsoids
+    around the live points (bounds enlarged by bootstrap) while that is efficient, by random slices otherwise.
 
     ln Z is the mean over ln X of its posterior, -i/N at step i, and not ln E[X], which lies higher by H / 2N.
 
@@ -44,26 +46,35 @@ def nested(target: Target, seed: int, tolerance: float = 0.13, tell: Tell | None
     MNRAS 493 (2020) 3132. Raises `SettingsError` if prior and likelihood nowhere meet.
     """
     problem = Problem(target)
-    rngs = [np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(MOST_RUNS)]
+    rngs = np.random.default_rng(seed).spawn(MOST_RUNS)
     live = max(LEAST_LIVE, 20 * problem.size)
     found: list[tuple[float, float]] = []
-    for rng in rngs:
+    for i, rng in enumerate(rngs):
+        if i >= PILOTS:
+            live = _needed(found, live, tolerance, max(1, PILOTS + THEN - i))
         found.append(_run(problem, live, rng))
         value, sd = _together(found)
         if tell is not None:
             tell(f"nested sampling, run {len(found)}: {value:.2f} +- {sd:.2f}")
-        if len(found) >= FEWEST_RUNS and sd <= tolerance:
+        if len(found) >= PILOTS + THEN and sd <= tolerance:
             break
     return Estimate(value, sd, problem.evaluations, problem.seconds, tuple(z for z, _ in found))
 
 
+def _needed(found: list[tuple[float, float]], live: int, tolerance: float, runs: int) -> int:
+    """Live points for each of ``runs`` runs, so that the own errors of all together come down to ``tolerance``."""
+    own = np.array([sd for _, sd in found])
+    missing = tolerance**-2 - np.sum(own**-2)
+    return int(np.clip(live * missing / runs * own[-1] ** 2, LEAST_LIVE, MOST_LIVE))
+
+
 def _together(found: list[tuple[float, float]]) -> tuple[float, float]:
-    """(mean, standard error) of runs (ln Z, own error): the own one, times the root of chi^2 / (R - 1) if above 1."""
+    """(weighted mean, standard error) of runs (ln Z, own error)."""
     z, own = np.array(found).T
-    sd = float(np.sqrt(np.mean(own**2) / len(z)))
-    if len(z) > 1:
-        sd *= max(1.0, float(np.std(z, ddof=1) / np.sqrt(np.mean(own**2))))
-    return float(np.mean(z)), sd
+    w = own**-2
+    mean = float(w @ z / np.sum(w))
+    scatter = float(w @ (z - mean) ** 2 / max(1, len(z) - 1))
+    return mean, float(np.sqrt(max(1.0, scatter) / np.sum(w)))
 
 
 def _run(problem: Problem, live: int, rng: np.random.Generator) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from bayesmembrane.mechanics.solution import Curves, Status
 from bayesmembrane.parameters import Array
 from bayesmembrane.registry import material as material_named
 
-SOLVERS: MappingProxyType[str, Callable[[Problem, bool, str], Curves]] = MappingProxyType(
+SOLVERS: MappingProxyType[str, Callable[[Problem, bool, str, float], Curves]] = MappingProxyType(
     {"ritz": fallback.solve, "shooting": shooting.solve}
 )
 __all__ = ["SOLVERS", "force_curve", "profile", "ritz", "solve"]
@@ -34,6 +34,7 @@ def solve(
     sensitivities: bool = False,
     solver: str = "ritz",
     only: str = "all",
+    exact_up_to: float = np.inf,
 ) -> Curves:
     """Force-deflection curves F = dE/d(delta) of B films at N deflections, in SI units.
 
@@ -47,13 +48,17 @@ def solve(
     sensitivities : also dF/d(parameters), from the factorisation that is there anyway
     solver : "ritz" (batched, exact derivatives; films it cannot resolve go to shooting) or "shooting"
     only : "convex" or "elliptic" saves effort on films that turn out not to be so: their flags need not be final
+    exact_up_to : m; beyond it the Ritz solver only sees to it that films stay stable, and forces are good to 1e-3
 
     Raises `SettingsError` for arguments that make no sense. What the film cannot do is told by ``status``.
     """
     if solver not in SOLVERS:
         raise unknown_name("solver", solver, SOLVERS)
     return SOLVERS[solver](
-        problem(material, parameters, deflection, inner_radius, outer_radius, prestretch), sensitivities, only
+        problem(material, parameters, deflection, inner_radius, outer_radius, prestretch),
+        sensitivities,
+        only,
+        exact_up_to,
     )
 
 

@@ -34,7 +34,8 @@ def profile(
         gap = np.full(points, np.nan)
         return Profile(radius, gap, gap, gap, gap, gap, gap, gap, np.nan, np.nan, status)
     l2, u, w, rise = ritz.shape(asked, t)
-    l1, side = np.hypot(u, w), np.sign(deflection) or 1.0
+    side = np.sign(deflection)
+    l1, rise = np.hypot(u, w), rise * abs(side)
     p1, p2 = material.tension(l1, l2)
     rho = inner_radius / prestretch
     return Profile(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Literal
 
 import numpy as np
@@ -10,6 +11,9 @@ from scipy.optimize import root
 
 from bayesmembrane.materials.base import Material
 from bayesmembrane.parameters import Array
+
+# Longest step of the continuation, in units of R1.
+LONGEST = 0.7
 
 
 def rates(t: float | Array, y: Array, material: Material) -> Array:
@@ -37,8 +41,8 @@ def force_curve(
     span, forces = float(np.log(outer_radius / inner_radius)), np.full(len(deflection), np.nan)
     known: list[tuple[float, Array]] = []
     grid = np.asarray(deflection, dtype=float) / inner_radius
-    lead = np.geomspace(min(0.3, grid[0]), grid[0], max(1, int(np.ceil(grid[0] / 0.4))))
-    path = np.unique(np.concatenate([lead, grid]))
+    path = [np.geomspace(min(0.3, grid[0]), grid[0], max(1, int(np.ceil(grid[0] / 0.4)))), grid]
+    path += [np.linspace(a, b, int(np.ceil((b - a) / LONGEST)) + 1) for a, b in itertools.pairwise(grid)]
 
     def across(t: float, y: Array) -> Array:
         return rates(t, y, material)
@@ -50,7 +54,7 @@ def force_curve(
         y = end.y[:, -1] if end.success else np.full(4, 1e3)
         return np.array([(y[0] - 1) / min(1.0, d * d), y[3] / d - 1])
 
-    for d in path:
+    for d in np.unique(np.concatenate(path)):
         if len(known) < 2:
             guess = np.array([0.13, 0.56 * d]) if not known else known[-1][1] * [1.0, d / known[-1][0]]
         else:

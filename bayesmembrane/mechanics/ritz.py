@@ -40,6 +40,7 @@ SAME_END = 0.02
 NEARLY_BENT = 0.1
 # A margin of convexity or ellipticity below minus this rules a film out, whatever finer bases would say.
 RULED_OUT = 1e-6
+LOOSE_GAIN, LOOSE_VARIATION = 1e-5, 2e-2
 RULED_OUT_ON_THE_WAY = 1e-3
 
 
@@ -102,7 +103,7 @@ def shape(problem: Problem, t: Array) -> tuple[Array, Array, Array, Array]:
     u = l1 cos(theta), w = l1 sin(theta), and the rise h from the disc outwards in units of R1/l0. nan if unresolved.
     """
     one = replace(problem, parameters=problem.parameters[:1], prestretch=problem.prestretch[:1])
-    d = np.maximum(problem.scaled[:1, :1], SMALLEST)
+    d = np.where(problem.deflection[:1, :1] == 0, SMALLEST, problem.scaled[:1, :1])
     for level, (elements, bubbles) in enumerate(LEVELS):
         result, unknowns = follow(one, d, level, wishes=(False, True, False))
         if result[0, kernels.STATUS, 0] == Status.OK:
@@ -231,7 +232,7 @@ def _films(problem: Problem, films: NDArray[np.intp]) -> Problem:
     return replace(problem, parameters=problem.parameters[films], prestretch=problem.prestretch[films])
 
 
-def solve(problem: Problem, sensitivities: bool = False, only: str = "all") -> Curves:
+def solve(problem: Problem, sensitivities: bool = False, only: str = "all", exact_up_to: float = np.inf) -> Curves:
     """Force curves from the minimum of the stored energy,
 
         F = dE/d(delta),  E(delta) = min over the deformation of 2 pi int R^2 W dt.
@@ -242,7 +243,8 @@ def solve(problem: Problem, sensitivities: bool = False, only: str = "all") -> C
     physically, and is given its reason; what is left is flagged.
 
     ``only`` "convex" or "elliptic" spares this to films that a resolved state shows not to be so (a prior rules them
-    out whatever their other forces are): what is not resolved at first stays flagged.
+    out whatever their other forces are): what is not resolved at first stays flagged. Beyond the deflection
+    ``exact_up_to`` (m) states only show whether the film stays stable and convex: forces there are good to 1e-3.
     """
     d, back = _ascending(np.where(problem.deflection == 0, SMALLEST, problem.scaled))
     bound = extensibility(problem)
@@ -252,7 +254,8 @@ def solve(problem: Problem, sensitivities: bool = False, only: str = "all") -> C
         # A locked deflection is replaced by the last one that can be reached; its answer is not used.
         reach = np.max(np.where(locked, 0.0, d), axis=1, keepdims=True)
         d = np.where(locked, np.where(reach > 0, reach, 1e-3), d)
-    search = _Search(problem, d, ~locked, sensitivities, only)
+    loose = d > exact_up_to * (1 + 1e-9) * problem.prestretch[:, None] / problem.inner_radius
+    search = _Search(problem, d, ~locked, sensitivities, only, loose)
     if np.any(search.status) or np.any(locked):
         for level in range(1, len(LEVELS)):
             if not search.improve(level):
@@ -260,6 +263,12 @@ def solve(problem: Problem, sensitivities: bool = False, only: str = "all") -> C
         _pass_on(search.status)
         search.status[locked] = Status.LOCKED
     return _curves(problem, search, back)
+
+
+def _nearly_resolved(result: Array, d: Array) -> NDArray[np.bool_]:
+    """(B, N) True where the next bubbles would change the force by less than 1e-3 or so."""
+    even = result[:, kernels.VARIATION] < LOOSE_VARIATION
+    return np.asarray(even & (result[:, kernels.GAIN] < LOOSE_GAIN * np.abs(result[:, kernels.FORCE] * d)))
 
 
 def _ruled_out(problem: Problem, result: Array, status: NDArray[np.int8], only: str) -> NDArray[np.bool_]:
@@ -285,13 +294,21 @@ class _Search:
     """
 
     def __init__(
-        self, problem: Problem, d: Array, wanted: NDArray[np.bool_], sensitivities: bool, only: str = "all"
+        self,
+        problem: Problem,
+        d: Array,
+        wanted: NDArray[np.bool_],
+        sensitivities: bool,
+        only: str = "all",
+        loose: NDArray[np.bool_] | None = None,
     ) -> None:
         self.problem, self.d = problem, d
         self.only = only
         self.wishes = sensitivities, False, True
         self.result, unknowns = follow(problem, d, 0, self.wishes)
         self.status = self.result[:, kernels.STATUS].astype(np.int8)
+        if loose is not None:
+            self.status[loose & (self.status == Status.UNRESOLVED) & _nearly_resolved(self.result, d)] = Status.OK
         self.wanted = wanted & ~_ruled_out(problem, self.result, self.status, only)[:, None]
         self.ends = np.full(len(d), np.nan)
         self.rough: _Rough = self._nothing(0)

@@ -32,7 +32,13 @@ def compiled(material: type[Material]) -> Any:
     return bind(kernels.KERNELS, material)
 
 
-def solve(problem: Problem, sensitivities: bool = False, only: str = "all", rtol: float = RTOL) -> Curves:
+def solve(
+    problem: Problem,
+    sensitivities: bool = False,
+    only: str = "all",
+    exact_up_to: float = np.inf,
+    rtol: float = RTOL,
+) -> Curves:
     """Force curves from the initial value problem at the disc,
 
         F = 2 pi R1 P1 sin(theta) at R = R1, with (l1, theta)(R1) such that l2 = l0 and h = delta at the ring.

@@ -78,7 +78,7 @@ def test_forces_are_positive_and_rise_so_no_mirror_image_was_met(material):
 def test_shooting_stops_at_the_fold_instead_of_jumping_to_a_state_stretched_tenfold():
     curves = shooting.solve(asked(MooneyRivlin, [10.44, -2.94], WIDE))
     assert curves.status[0].tolist() == [Status.OK] * 7 + [Status.INDEFINITE] * 3
-    assert np.nanmax(curves.max_stretch) < 3
+    assert np.nanmax(curves.max_stretch) < 4
 
 
 def test_loss_of_ellipticity_is_named():
