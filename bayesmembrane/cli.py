@@ -227,7 +227,7 @@ def fit(
         out.print(f"The energy is {'' if found.convex else 'not '}convex where the film goes. Status: {found.status}.")
         if found.at_bound:
             out.print(
-                f"No optimum inside the bounds for {', '.join(found.at_bound)}: the loss falls, or is flat, up to there."
+                f"No optimum inside the bounds for {', '.join(found.at_bound)}: the loss falls, or is flat, up to it."
             )
         if found.constrained is not None and found.constrained is not found:
             out.print(f"Among films that meet the convexity prior the least loss is {found.constrained.loss_N:.5g} N.")

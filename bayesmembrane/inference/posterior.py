@@ -51,7 +51,7 @@ class Evaluation:
 
     log_prior, log_likelihood : (B,), -inf where they are zero; the prior is untruncated times the convexity indicator,
         so that the normalised one is larger by -ln(mass)
-    force : (B, N) N
+    force : (B, N) N; nan where there is none, or where a film that the prior rules out was not followed
     outcome : (B,) `Outcome` codes
     """
 
@@ -122,7 +122,7 @@ class Posterior:
         return self.evaluate(x).log_prior
 
     def log_likelihood(self, x: ArrayLike) -> Array:
-        """ln p(y | x), whatever the convexity prior says; -inf where the film has no curve; (B,)."""
+        """ln p(y | x), (B,); -inf where the film has no curve, or is not followed since the prior rules it out."""
         return self.evaluate(x).log_likelihood
 
     def pointwise(self, x: Array, force: Array) -> Array:

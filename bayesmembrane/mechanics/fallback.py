@@ -15,8 +15,8 @@ def solve(problem: Problem, sensitivities: bool = False, only: str = "all", exac
     """Curves by the Ritz method; deflections left `UNRESOLVED` or at the `ITERATION_LIMIT` are shot.
 
     So are those of a film that was clamped slack: its flat state is not stable, and no path leads on from there.
-    ``only`` "convex" or "elliptic" leaves films as they are of which a resolved state shows that they are not so, and forces
-    beyond the deflection ``exact_up_to`` good to 1e-3.
+    ``only`` "convex" or "elliptic" leaves films as they are of which a resolved state shows that they are not so, and
+    forces beyond the deflection ``exact_up_to`` good to 1e-3.
     """
     curves = ritz.solve(problem, sensitivities, only, exact_up_to)
     failed = np.isin(curves.status, (Status.UNRESOLVED, Status.ITERATION_LIMIT))
