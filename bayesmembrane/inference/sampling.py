@@ -30,7 +30,7 @@ class Settings:
     """How to sample.
 
     ess : wanted effective sample size of the worst coordinate
-    ensembles, walkers : independent ensembles, and walkers in each (None: two a coordinate, in sixteens)
+    ensembles, walkers : independent ensembles, and walkers in each (None: four a coordinate, in sixteens)
     chunk : steps before the first look at tau
     most_steps : each ensemble stops there, and the run says so
     """
@@ -234,8 +234,9 @@ def _progress(chains: Chains, found: Convergence, settings: Settings) -> Progres
 
 
 def _walkers(posterior: Posterior, settings: Settings) -> int:
-    # Half an ensemble moves at a time, and the solver takes films by eights; emcee wants two walkers a coordinate.
-    return settings.walkers or 16 * -(-2 * posterior.size // 16)
+    # Half an ensemble moves at a time, and the solver takes films by eights. Few walkers know a narrow valley badly:
+    # with two a coordinate, Ogden's tau is several times that with four or more.
+    return settings.walkers or 16 * -(-4 * posterior.size // 16)
 
 
 def _sampler(posterior: Posterior, walkers: int, counts: Counter[str]) -> Any:

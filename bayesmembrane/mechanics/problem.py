@@ -56,19 +56,29 @@ def problem(
     names = material.field_names()
     if p.ndim != 2 or p.shape[1] != len(names):
         raise SettingsError(f"{material.name} takes {len(names)} parameters ({', '.join(names)}), not {p.shape[-1]}")
-    d = np.asarray(deflection, dtype=float)
+    count, d = p.shape[0], np.asarray(deflection, dtype=float)
+    if not count or not d.size:
+        raise SettingsError("there is no film or no deflection to solve for", remedy="give at least one of each")
     if not np.all(np.isfinite(d)):
         raise SettingsError("a deflection is not a finite number", remedy="give deflections in metres")
-    l0 = np.broadcast_to(np.asarray(prestretch, dtype=float), (p.shape[0],))
+    if d.ndim > 2 or (d.ndim == 2 and d.shape[0] not in (1, count)):
+        raise SettingsError(
+            f"the deflections have the shape {d.shape}", remedy=f"give one row for all films, or {count} rows"
+        )
+    l0 = np.asarray(prestretch, dtype=float)
+    if l0.ndim > 1 or l0.size not in (1, count):
+        raise SettingsError(
+            f"the pre-stretches have the shape {l0.shape}", remedy=f"give one for all films, or {count} numbers"
+        )
     if not np.all((l0 > 0) & np.isfinite(l0)):
         raise SettingsError("the pre-stretch must be a positive number", remedy="1 means clamped without stretch")
-    if not 0 < inner_radius < outer_radius:
+    if not 0 < inner_radius < outer_radius < np.inf:
         raise SettingsError(
             f"the inner radius ({inner_radius * 1e3:g} mm) must be positive and smaller than the outer one "
             f"({outer_radius * 1e3:g} mm)"
         )
-    d = np.broadcast_to(np.atleast_1d(d) if d.ndim < 2 else d, (p.shape[0], d.shape[-1] if d.ndim else 1))
-    return Problem(material, p, d, l0, float(inner_radius), float(outer_radius))
+    d = np.broadcast_to(np.atleast_1d(d), (count, d.shape[-1] if d.ndim else 1))
+    return Problem(material, p, d, np.broadcast_to(l0, (count,)), float(inner_radius), float(outer_radius))
 
 
 def extensibility(problem: Problem) -> Array:

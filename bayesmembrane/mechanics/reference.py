@@ -14,6 +14,7 @@ from bayesmembrane.parameters import Array
 
 # Longest step of the continuation, in units of R1.
 LONGEST = 0.7
+MOST_CALLS = 5000
 
 
 def rates(t: float | Array, y: Array, material: Material) -> Array:
@@ -44,14 +45,22 @@ def force_curve(
     path = [np.geomspace(min(0.3, grid[0]), grid[0], max(1, int(np.ceil(grid[0] / 0.4)))), grid]
     path += [np.linspace(a, b, int(np.ceil((b - a) / LONGEST)) + 1) for a, b in itertools.pairwise(grid)]
 
-    def across(t: float, y: Array) -> Array:
-        return rates(t, y, material)
-
     def miss(x: Array, d: float) -> Array:
+        calls = itertools.count()
+
+        def across(t: float, y: Array) -> Array:
+            slope = rates(t, y, material)
+            # Where the film cannot go, `solve_ivp` would shorten its steps for ever.
+            if next(calls) > MOST_CALLS or not np.all(np.isfinite(slope)):
+                raise ArithmeticError
+            return slope
+
         start = np.array([1.0, 1.0 + x[0] * d * d / (1 + d), x[1], 0.0])
-        with np.errstate(all="ignore"):
-            end = solve_ivp(across, (0.0, span), start, method=method, rtol=rtol, atol=rtol * 1e-3)
-        y = end.y[:, -1] if end.success else np.full(4, 1e3)
+        try:
+            with np.errstate(all="ignore"):
+                y = solve_ivp(across, (0.0, span), start, method=method, rtol=rtol, atol=rtol * 1e-3).y[:, -1]
+        except ArithmeticError:
+            return np.full(2, 1e3)
         return np.array([(y[0] - 1) / min(1.0, d * d), y[3] / d - 1])
 
     for d in np.unique(np.concatenate(path)):

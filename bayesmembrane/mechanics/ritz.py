@@ -376,6 +376,10 @@ class _Search:
         self.ends[films] = np.nan
         if not some.size:
             return
+        if self.only != "all" and level > 1:
+            # Lost by several bases: such a film is worth no more effort where a prior is about to judge it.
+            verdict[lost] = Status.INDEFINITE
+            return
         problem, d = _films(self.problem, films[some]), self.d[films[some]]
         first, rows = np.argmax(lost[some], axis=1), np.arange(some.size)
         high = d[rows, first]

@@ -74,7 +74,7 @@ def test_unknown_names_suggest_the_nearest():
         force_curve("neohookean", [7.5], [0.01])
 
 
-def test_no_deflections_make_no_forces():
-    curves = solve(NeoHookean, [7.5], [], inner_radius=0.01, outer_radius=0.035)
-    assert curves.force.shape == (1, 0)
-    assert curves.tally() == {}
+@pytest.mark.parametrize(("films", "deflection"), [([7.5], []), (np.empty((0, 1)), [0.01])])
+def test_asking_for_nothing_is_refused(films, deflection):
+    with pytest.raises(SettingsError, match="no film or no deflection"):
+        solve(NeoHookean, films, deflection, inner_radius=0.01, outer_radius=0.035)
