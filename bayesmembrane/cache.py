@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import tempfile
 import time
 import zipfile
@@ -56,8 +55,9 @@ class Tally:
 class CachedSolver:
     """``solve`` of `mechanics` with a memory.
 
-    The key of a film is what its physics depends on: the strain energy (its source text too), parameters over G d,
-    R2/R1, pre-stretch, deflections over R1. So a change of modulus, thickness or size alone is a hit, rescaled by
+    The key of a film is what its physics depends on: the strain energy, parameters over G d, R2/R1, pre-stretch,
+    deflections over R1; and the texts of material and solvers, so that a stored curve is never older than they are.
+    So a change of modulus, thickness or size alone is a hit, rescaled by
         F = G d R1 Phi(delta/R1; R2/R1, l0, parameter ratios).
     Parameters and deflections that agree to 12 digits count as equal.
 
@@ -100,7 +100,8 @@ class CachedSolver:
         solved = {key: self._solve(asked, keys.index(key), gd, sensitivities, solver, key) for key in missing}
         done = time.perf_counter()
         found = {key: entry for key, entry in entries.items() if entry is not None} | solved
-        curves = _rescale(asked, gd, [found[key] for key in keys])
+        place = {key: i for i, key in enumerate(found)}
+        curves = _rescale(asked, gd, list(found.values()), [place[key] for key in keys])
         self.tally.misses += len(missing)
         self.tally.hits += len(keys) - len(missing)
         self.tally.seconds_looking += looked - begun + time.perf_counter() - done
@@ -142,7 +143,7 @@ class CachedSolver:
         if path is None or not path.exists():
             return None
         try:
-            with np.load(path, allow_pickle=False) as stored:
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
                 entry = {name: stored[name] for name in stored.files}
             if entry.pop("key").tobytes() == key and entry.keys() >= _FIELDS:
                 return entry
@@ -155,12 +156,17 @@ class CachedSolver:
         path = self._path(key)
         if path is None:
             return
+        part = None
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
-                np.savez(file, allow_pickle=False, key=np.frombuffer(key, np.uint8), **entry)
-            os.replace(file.name, path)
+                part = Path(file.name)
+                arrays: dict[str, Any] = {"key": np.frombuffer(key, np.uint8), **entry}
+                np.savez(file, **arrays)
+            part.replace(path)
         except OSError as error:
+            if part is not None:
+                part.unlink(missing_ok=True)
             raise StorageError(
                 f"the curve cache cannot be written ({error.strerror})",
                 where=str(path.parent),
@@ -200,7 +206,10 @@ def _keys(asked: Problem, gd: Array, sensitivities: bool, solver: str) -> list[b
 
 @cache
 def _source(material: type[Material]) -> str:
-    return f"{material.name} {hashlib.sha256(material.source_text().encode()).hexdigest()[:16]}"
+    """Name of the material, and a hash of its text and those of the solvers."""
+    texts = [material.source_text().encode()]
+    texts += [path.read_bytes() for path in sorted(Path(api.__file__).parent.glob("*.py"))]
+    return f"{material.name} {hashlib.sha256(b''.join(texts)).hexdigest()[:16]}"
 
 
 def _factor(name: str, asked: Problem, gd: Array) -> Array:
@@ -222,11 +231,14 @@ def _scaled(curves: Curves, asked: Problem, gd: float) -> Entry:
     return entry
 
 
-def _rescale(asked: Problem, gd: Array, entries: list[Entry]) -> Curves:
-    values: dict[str, Any] = {name: np.stack([e[name] for e in entries]) * _factor(name, asked, gd) for name in _FIELDS}
+def _rescale(asked: Problem, gd: Array, entries: list[Entry], place: list[int]) -> Curves:
+    """Curves of films with scaled entries[place[i]], i = 0..B-1."""
+
+    def films(name: str) -> Array:
+        return np.stack([entry[name] for entry in entries])[place]
+
+    values: dict[str, Any] = {name: films(name) * _factor(name, asked, gd) for name in _FIELDS}
     for name in ("status", "note"):
         values[name] = values[name].astype(np.int8)
-    sensitivity = None
-    if "sensitivity" in entries[0]:
-        sensitivity = np.stack([e["sensitivity"] for e in entries]) * _field_factor(asked, gd)
+    sensitivity = films("sensitivity") * _field_factor(asked, gd) if "sensitivity" in entries[0] else None
     return Curves(deflection=asked.deflection, sensitivity=sensitivity, **values)

@@ -153,7 +153,8 @@ def run_ensembles(
     walked is returned with the status "interrupted".
     """
     counts: Counter[str] = Counter() if chains is None else Counter(chains.counts)
-    samplers = [_sampler(posterior, _walkers(posterior, settings), counts) for _ in range(settings.ensembles)]
+    walkers = _walkers(posterior, settings) if chains is None else chains.x.shape[2]
+    samplers = [_sampler(posterior, walkers, counts) for _ in range(settings.ensembles)]
     began = time.perf_counter() - (0.0 if chains is None else chains.seconds)
     if chains is None:
         chains = _start(posterior, settings, seed, counts)
@@ -234,8 +235,7 @@ def _progress(chains: Chains, found: Convergence, settings: Settings) -> Progres
 
 
 def _walkers(posterior: Posterior, settings: Settings) -> int:
-    # Half an ensemble moves at a time, and the solver takes films by eights. Few walkers know a narrow valley badly:
-    # with two a coordinate, Ogden's tau is several times that with four or more.
+    # Half an ensemble moves at a time, and the solver takes films by eights; tau grows when there are fewer.
     return settings.walkers or 16 * -(-4 * posterior.size // 16)
 
 
