@@ -15,7 +15,8 @@ TARGET = Path(__file__).parent / "images" / "first_look.png"
 
 
 def main(chains: Path) -> None:
-    looks = [look_of([read(chains / f"elastosil_50um_{r}_{m}") for m in MATERIALS]) for r in RANGES]
+    folders = [[chains / f"elastosil_50um_{r}_{m}" for m in MATERIALS] for r in RANGES]
+    looks = [look_of([read(f) for f in group if (f / "status.json").exists()]) for group in folders]
     TARGET.parent.mkdir(parents=True, exist_ok=True)
     TARGET.write_bytes(first_look(looks, "png").data)
     print(f"{TARGET}: {TARGET.stat().st_size // 1000} kB")
