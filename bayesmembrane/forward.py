@@ -11,14 +11,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bayesmembrane.composed import Composition, differences
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.mechanics import api
 from bayesmembrane.mechanics.convexity import box_margins, reached_convexity, reached_ellipticity
+from bayesmembrane.mechanics.film_law import Gap, film_law
 from bayesmembrane.mechanics.solution import Curves, Status
+from bayesmembrane.mechanics.strip_law import StripLaw, margins
 from bayesmembrane.parameters import Array
+from bayesmembrane.protocol import Path
 from bayesmembrane.rigs.annulus import Annulus
+from bayesmembrane.rigs.base import Strip
 
 Solve = Callable[..., Curves]
 """`mechanics.api.solve`, or a cache with its signature."""
@@ -26,6 +31,11 @@ Solve = Callable[..., Curves]
 BOX = (1.0, 8.0)
 GAPS = 10
 """Between two deflections at which convexity is asked for lies at most this fraction of the whole measured range."""
+
+LONG = 100
+"""Curves of more points than this are interpolated, to 1e-6."""
+AT_ONCE = 2_000_000
+"""Readings that are computed in one batch."""
 
 STEP = 1e-3  # of the differences in coordinates: h^4 and round-off are both 1e-13 there
 
@@ -112,6 +122,8 @@ class Forward:
         ``reached`` False saves the solutions beyond ``deflection``, and the margins are those up to there.
         """
         x = np.atleast_2d(np.asarray(coordinates, dtype=float))
+        if self.composes:
+            return self._composed(x, sensitivities, reached, only)
         films = self.hypothesis.films(x)
         if self.hypothesis.material.scales == (1,) and solver == "ritz":
             curves = _scaled(self._unit[int(reached)], films)
@@ -125,6 +137,106 @@ class Forward:
         whole = (np.where(lost, -np.inf, m) for m in (reached_convexity(curves), reached_ellipticity(curves)))
         margins = *whole, curves.convexity, curves.ellipticity
         return Prediction(self.deflection, curves.force[:, :n], curves.status[:, :n], films, chained, *margins)
+
+    # ---- film and effects ------------------------------------------------------------------------------------------
+
+    @cached_property
+    def composes(self) -> bool:
+        """True where curves come from a film law and the effects around it, and not straight from the solver."""
+        return bool(self.hypothesis.effects) or self.deflection.size > LONG or isinstance(self.measurement.rig, Strip)
+
+    @cached_property
+    def path(self) -> Path:
+        """How the disc moves: as in the measurement at its own deflections, else through ``deflection`` at its speed."""
+        m = self.measurement
+        if self._measured:
+            return m.path
+        path = Path(self.deflection, None, m.full_range)
+        if m.path.time is None:
+            return path
+        speed = float(np.median(m.path.speed))
+        return Path(self.deflection, np.cumsum(np.maximum(path.steps, 1e-9 * m.full_range)) / speed, m.full_range)
+
+    @cached_property
+    def _measured(self) -> bool:
+        return np.array_equal(self.deflection, self.measurement.deflection)
+
+    @cached_property
+    def composition(self) -> Composition:
+        """The effects on the path; raises `SettingsError` for one that cannot occur here."""
+        for effect in self.hypothesis.effects:
+            if reason := effect.unavailable(self.measurement.rig.name, self.path):
+                raise SettingsError(reason, remedy="leave it out")
+        return Composition(self.hypothesis.effects, self.path)
+
+    @cached_property
+    def _beyond(self) -> Array:
+        return beyond(self.deflection, self.measurement.full_range)
+
+    def _composed(self, x: Array, sensitivities: bool, reached: bool, only: str) -> Prediction:
+        """As `__call__`, in batches that fit into memory."""
+        count = self.hypothesis.curve_size + 1 if sensitivities else 1
+        rows = max(1, AT_ONCE // (count * self.path.deflection.size))
+        parts = [self._batch(x[i : i + rows], sensitivities, reached, only) for i in range(0, len(x), rows)]
+        if len(parts) == 1:
+            return parts[0]
+        names = [f.name for f in fields(Prediction) if f.name != "deflection"]
+        whole = {n: [getattr(p, n) for p in parts] for n in names}
+        return Prediction(self.deflection, **{n: None if v[0] is None else np.concatenate(v) for n, v in whole.items()})
+
+    def _batch(self, x: Array, sensitivities: bool, reached: bool, only: str) -> Prediction:
+        films = self.hypothesis.films(x)
+        theta = x[:, self.hypothesis.material_size : self.hypothesis.curve_size]
+        law, at = self.law(films, theta, sensitivities, reached, only)
+        slopes = None
+        if sensitivities:
+            jacobian = self.jacobian(x)[:, :, : self.hypothesis.material_size]
+            force, status, slopes = differences(
+                self.composition, law, lambda moved: self.law(films, moved)[0], theta, jacobian
+            )
+        else:
+            force, status = self.composition(law, theta)
+        here = self.measurement.on_path if self._measured else slice(None)
+        least = [np.min(np.where(np.isnan(m), np.inf, m), axis=1) for m in at]
+        least = [np.where(np.all(np.isnan(m), axis=1), np.nan, v) for m, v in zip(at, least, strict=True)]
+        slopes = None if slopes is None else slopes[:, here]
+        return Prediction(self.deflection, force[:, here], status[:, here], films, slopes, *least, *at)
+
+    def law(
+        self, films: Array, theta: Array, sensitivities: bool = False, reached: bool = False, only: str = "all"
+    ) -> tuple[Any, tuple[Array, Array]]:
+        """The law of ``films`` (B, n) with effect parameters ``theta`` (B, k), and margins (B, M) of its states.
+
+        The margins are those of convexity and of ellipticity, -inf where the film's energy became indefinite.
+        """
+        extra = self._beyond if reached else np.empty(0)
+        rig, material = self.measurement.rig, self.hypothesis.material
+        if isinstance(rig, Strip):
+            states = np.unique(np.concatenate([self.path.deflection, extra]))
+            states = states[np.linspace(0, states.size - 1, min(states.size, 4 * GAPS)).astype(int)]
+            return StripLaw(material, films, rig, self._pushes), margins(material, films, rig, states)
+        composition = self.composition
+        end = np.maximum(composition.end(theta), 1e-3 * self.measurement.full_range)
+        options: dict[str, Any] = {"sensitivities": sensitivities, "only": only}
+        if only != "all":
+            options["exact_up_to"] = float(np.max(end))
+        law, curves = film_law(
+            material, films, self._gap, composition.prestretch(theta), end, extra, self.solve, **options
+        )
+        lost = (curves.status == Status.INDEFINITE) | (curves.status == Status.NOT_ELLIPTIC)
+        at = (np.where(lost, -np.inf, m) for m in (curves.convexity, curves.ellipticity))
+        return law, tuple(at)  # type: ignore[return-value]
+
+    @cached_property
+    def _gap(self) -> Gap:
+        rig = annulus(self.measurement)
+        return Gap(rig.inner_radius, rig.outer_radius)
+
+    @cached_property
+    def _pushes(self) -> bool:
+        """True where the specimen was compressed, and pushed back."""
+        m = self.measurement
+        return bool(np.any((m.deflection < -0.01 * m.full_range) & (m.force < 0)))
 
     def curves(
         self, films: Array, deflection: Array, sensitivities: bool = False, solver: str = "ritz", only: str = "all"

@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bayesmembrane.effects.base import Effect
 from bayesmembrane.errors import SettingsError, unknown_name
 from bayesmembrane.materials.base import Material
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.noise.base import Noise, force_scale
 from bayesmembrane.noise.white import White
 from bayesmembrane.parameters import Array, Parameter
-from bayesmembrane.registry import component, components, material
+from bayesmembrane.registry import component, material
 
 CONVEXITY = ("reached", "box", "elliptic", "none")
 """Where the prior asks the energy to be convex: on the states that the film reaches over the whole measured range, on
@@ -28,22 +29,26 @@ class Hypothesis:
     """y = F(delta; material, effects) + noise, with priors on all parameters and a convexity prior on the energy.
 
     material : class of the strain energy
-    effects : components whose parameters join the vector, each with a ``name`` and ``coordinates``
+    effects : what the plain film on an ideal rig lacks; their parameters join the vector
     noise : noise model
     convexity : one of `CONVEXITY`
 
     The vector x holds the material's coordinates, those of the effects, and those of the noise, in this order. Their
-    names carry the component: ``yeoh.ln_gd``, ``noise.ln_sd``. Raises `SettingsError` for an unknown convexity mode.
+    names carry the component: ``yeoh.ln_gd``, ``clamp_slip.length``, ``noise.ln_sd``. Raises `SettingsError` for an
+    unknown convexity mode and for an effect that is named twice.
     """
 
     material: type[Material]
-    effects: tuple[Any, ...] = ()
+    effects: tuple[Effect, ...] = ()
     noise: Noise = field(default_factory=White)
     convexity: str = "reached"
 
     def __post_init__(self) -> None:
         if self.convexity not in CONVEXITY:
             raise unknown_name("convexity prior", self.convexity, CONVEXITY)
+        names = [e.name for e in self.effects]
+        if repeated := sorted({n for n in names if names.count(n) > 1}):
+            raise SettingsError(f'the effect "{repeated[0]}" is named twice', remedy="name every effect once")
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -129,7 +134,7 @@ def hypothesis(
             f'the noise model "{noise}" always infers a part of the noise', remedy='use "white" to do without'
         )
     instance = model() if extra_noise else model(extra=False)
-    return Hypothesis(material(material_name), tuple(_effect(e) for e in effects), instance, convexity)
+    return Hypothesis(material(material_name), tuple(component("effects", e)() for e in effects), instance, convexity)
 
 
 def from_settings(settings: Mapping[str, Any]) -> Hypothesis:
@@ -137,10 +142,3 @@ def from_settings(settings: Mapping[str, Any]) -> Hypothesis:
     return hypothesis(
         settings["material"], settings["effects"], settings["noise"], settings["convexity"], settings["extra_noise"]
     )
-
-
-def _effect(name: str) -> Any:
-    known = components("effects")
-    if not known:
-        raise SettingsError(f'there is no effect called "{name}"', remedy="leave it out: no effect is known yet")
-    return component("effects", name)()

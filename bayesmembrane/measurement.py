@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from bayesmembrane.errors import DataError, SettingsError, StorageError
 from bayesmembrane.parameters import Array
-from bayesmembrane.protocol import check_order, check_time, cycles, first_loading, legs
+from bayesmembrane.protocol import Path as Motion
+from bayesmembrane.protocol import check_order, check_time, first_loading
 from bayesmembrane.registry import components
 from bayesmembrane.rigs.base import KINDS, Rig
 from bayesmembrane.settings import Section, load_toml
@@ -71,6 +72,8 @@ class Measurement:
     force_sd : (N,) N, standard deviation of the measurement's own noise, or None if unknown
     covariance : (N, N) N^2, covariance of that noise, or None if it is independent or unknown
     full_range : the largest deflection of the whole measurement in m, also where this one is truncated
+    motion : how the disc was moved, also past points that were left out; the film remembers those too
+    places : (N,) where the points lie on it
 
     Raises `DataError` for shapes that do not agree, values that are not finite, a standard deviation that is not
     positive, and a covariance that is not symmetric and positive definite. With a covariance, `force_sd` is the root
@@ -86,6 +89,8 @@ class Measurement:
     covariance: Array | None = None
     provenance: Provenance = Provenance()
     full_range: float = math.nan
+    motion: Motion | None = None
+    places: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         n = np.size(self.deflection)
@@ -109,19 +114,29 @@ class Measurement:
         return int(self.deflection.size)
 
     @cached_property
+    def path(self) -> Motion:
+        """How the disc was moved up to the last point: `motion`, or the points themselves."""
+        return self.motion or Motion(self.deflection, self.time, self.full_range)
+
+    @cached_property
+    def on_path(self) -> NDArray[np.int64]:
+        """(N,) where the points lie on `path`."""
+        return np.arange(len(self)) if self.places is None else self.places
+
+    @cached_property
     def leg(self) -> NDArray[np.int8]:
         """(N,) +1 while the deflection grows (loading), -1 while it falls (unloading); a hold belongs to its leg."""
-        return legs(self.deflection)
+        return self.path.leg[self.on_path]
 
     @cached_property
     def cycle(self) -> NDArray[np.int64]:
         """(N,) number of the cycle, from 1; a cycle starts where unloading turns into loading."""
-        return cycles(self.leg)
+        return self.path.cycle[self.on_path]
 
     @cached_property
     def is_first_loading(self) -> NDArray[np.bool_]:
         """(N,) True where the film is loaded to a deflection that it has not seen before."""
-        return first_loading(self.deflection, self.leg)
+        return first_loading(self.path.deflection, self.path.leg)[self.on_path]
 
     @property
     def noise_covariance(self) -> Array | None:
@@ -136,6 +151,9 @@ class Measurement:
         digest = hashlib.sha256(f"{self.rig!r} {self.specimen.thickness!r} {self.full_range!r}".encode())
         for array in (self.deflection, self.force, self.time, self.force_sd, self.covariance):
             digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
+        if self.motion is not None:
+            for array in (self.motion.deflection, self.motion.time, self.on_path):
+                digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()
 
     def up_to(self, max_deflection: float) -> Measurement:
@@ -152,14 +170,20 @@ class Measurement:
         return self if np.all(keep) else self.select(keep)
 
     def select(self, keep: NDArray[Any]) -> Measurement:
-        """The points at ``keep``, (N,) booleans or indices in order; `full_range` stays."""
+        """The points at ``keep``, (N,) booleans or indices in order; `full_range` stays, and the path up to the last."""
 
         def part(array: Array | None) -> Array | None:
             return None if array is None else array[keep]
 
         covariance = None if self.covariance is None else self.covariance[keep][:, keep]
+        places = self.on_path[keep]
+        end = int(places[-1]) + 1 if places.size else 0
+        remembers = places.size != end
+        past = None if self.path.time is None else self.path.time[:end]
         return replace(
             self,
+            motion=Motion(self.path.deflection[:end], past, self.full_range) if remembers else None,
+            places=places if remembers else None,
             deflection=self.deflection[keep],
             force=self.force[keep],
             time=part(self.time),

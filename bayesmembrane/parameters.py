@@ -76,6 +76,46 @@ class Uniform(Prior):
 
 
 @dataclass(frozen=True)
+class HalfNormal(Prior):
+    """|z| scale + origin with z ~ N(0, 1): of what can only lie above ``origin``."""
+
+    scale: float
+    origin: float = 0.0
+
+    def distribution(self) -> Any:
+        return stats.halfnorm(self.origin, self.scale)
+
+    def log_density(self, x: ArrayLike) -> Array:
+        z = (np.asarray(x, dtype=float) - self.origin) / self.scale
+        return np.where(z >= 0, -0.5 * z * z - np.log(self.scale * np.sqrt(np.pi / 2)), -np.inf)
+
+    def __str__(self) -> str:
+        start = f", from {self.origin:g} on" if self.origin else ""
+        return f"half-normal, scale {self.scale:g}{start}"
+
+
+@dataclass(frozen=True)
+class LogNormal(Prior):
+    """median exp(spread z) with z ~ N(0, 1): of what is positive and known to a factor exp(spread)."""
+
+    median: float
+    spread: float
+
+    def distribution(self) -> Any:
+        return stats.lognorm(self.spread, scale=self.median)
+
+    def log_density(self, x: ArrayLike) -> Array:
+        x = np.asarray(x, dtype=float)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            z = np.log(x / self.median) / self.spread
+            value = -0.5 * z * z - np.log(x * self.spread * np.sqrt(2 * np.pi))
+        return np.where(x > 0, value, -np.inf)
+
+    def __str__(self) -> str:
+        return f"log-normal, median {self.median:g}, within a factor {np.exp(self.spread):.3g}"
+
+
+@dataclass(frozen=True)
 class Parameter:
     """One coordinate: what it is called, its unit, what it means, and its prior.
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +13,74 @@ from bayesmembrane.parameters import Array
 
 REVERSAL = 0.005
 """A reversal of the deflection counts as a new leg beyond this part of the whole range; less is jitter."""
+
+
+NOMINAL_SPEED = 1e-3
+"""m/s: without times the disc counts as moved at this speed, so that a second is a millimetre of travel."""
+SLOWEST = 1e-3
+"""Of the largest speed of a path: below it the disc counts as moving this fast."""
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """How the disc was moved: what the film remembers.
+
+    Attributes
+    ----------
+    deflection : (N,) m, in the order of the test
+    time : (N,) s, strictly increasing, or None
+    full_range : the deflection in m that histories are measured against, the largest of the whole measurement
+    """
+
+    deflection: Array
+    time: Array | None
+    full_range: float
+
+    @cached_property
+    def leg(self) -> NDArray[np.int8]:
+        """(N,) +1 while the deflection grows, -1 while it falls."""
+        return legs(self.deflection)
+
+    @cached_property
+    def cycle(self) -> NDArray[np.int64]:
+        """(N,) number of the cycle, from 1."""
+        return cycles(self.leg)
+
+    @cached_property
+    def steps(self) -> Array:
+        """(N,) m: distances travelled to each point from the one before, and from zero to the first."""
+        return np.abs(np.diff(self.deflection, prepend=0.0))
+
+    @cached_property
+    def clock(self) -> Array:
+        """(N,) s since the disc stood at zero; without times, distance travelled at `NOMINAL_SPEED`.
+
+        The way to the first point counts as made at the speed between the first two.
+        """
+        if self.time is None:
+            return np.cumsum(self.steps) / NOMINAL_SPEED
+        start = 0.0
+        if self.time.size > 1 and self.steps[1] > 0:
+            start = self.steps[0] * (self.time[1] - self.time[0]) / self.steps[1]
+        return self.time - self.time[0] + min(start, float(self.time[-1] - self.time[0]))
+
+    @cached_property
+    def speed(self) -> Array:
+        """(N,) m/s: speed of the disc, averaged over neighbours on the same leg; `NOMINAL_SPEED` without times."""
+        if self.time is None or self.time.size < 2:
+            return np.full(self.deflection.size, NOMINAL_SPEED)
+        speed = np.abs(np.diff(self.deflection)) / np.diff(self.time)
+        middle = np.empty(self.deflection.size)
+        for leg in np.split(np.arange(middle.size), np.flatnonzero(np.diff(self.leg)) + 1):
+            # The steps that end and begin on this leg; a leg of one point has those around it.
+            low, high = max(leg[0] - (leg.size < 2), 0), max(leg[-1], leg[0] + 1)
+            inner = speed[low:high]
+            window = min(9, inner.size)
+            smooth = np.convolve(inner, np.ones(window), "same") / np.convolve(
+                np.ones(inner.size), np.ones(window), "same"
+            )
+            middle[leg] = np.interp(leg, np.arange(low, low + inner.size) + 0.5, smooth[: inner.size])
+        return np.maximum(middle, SLOWEST * float(np.max(middle)))
 
 
 def legs(deflection: Array) -> NDArray[np.int8]:

@@ -9,6 +9,8 @@ from dataclasses import dataclass, fields
 from typing import ClassVar
 
 from bayesmembrane.errors import DataError
+from bayesmembrane.parameters import Array
+from bayesmembrane.units import RATIO, STRESS
 
 KINDS = ("annulus", "uniaxial", "equibiaxial", "planar", "biaxial")
 """Every kind of rig that a specimen file may name; those without a file in this folder are not supported."""
@@ -51,3 +53,26 @@ class Rig(ABC):
     def length_names(cls) -> tuple[str, ...]:
         """The fields, which a specimen file gives with a unit: ``inner_radius_mm``."""
         return tuple(f.name for f in fields(cls))
+
+
+class Strip(Rig, ABC):
+    """A homogeneous test: one stretch l, read as the deflection L (l - 1), gives the nominal stress P1 / thickness.
+
+    The force is the nominal stress times width times thickness, so that deflections and forces are those of a specimen
+    of this length and width; where the specimen file gives none, 50 mm and 10 mm.
+    """
+
+    length: float
+    width: float
+    columns: ClassVar[Mapping[str, str]] = {"stretch": RATIO, "nominal_stress": STRESS}
+
+    def check(self) -> None:
+        """Any length goes with any width."""
+
+    def size(self) -> float:
+        return self.length
+
+    @staticmethod
+    @abstractmethod
+    def lateral(stretch: Array) -> tuple[Array, Array]:
+        """(l2, dl2/dl) at stretches l; the film is isotropic and incompressible."""
