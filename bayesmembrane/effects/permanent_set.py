@@ -1,0 +1,50 @@
+"""The film stays longer after it was stretched."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bayesmembrane.effects._history import EXPONENT
+from bayesmembrane.effects.base import Deflection, EffectParameter, running_max
+from bayesmembrane.parameters import Array, HalfNormal, Uniform
+from bayesmembrane.protocol import Path
+
+
+@dataclass(frozen=True)
+class PermanentSet(Deflection):
+    """delta_film = delta - set (m / D)^exponent (1 - rejoin delta / m), slack below; m: largest deflection so far.
+
+    D is the full range of the test. ``rejoin`` 1 comes back to the first loading curve at m, 0 keeps the whole shift.
+    """
+
+    name: ClassVar[str] = "permanent_set"
+    title: ClassVar[str] = "permanent set"
+    reference: ClassVar[str] = "A. Dorfmann, R. W. Ogden, Int. J. Solids Struct. 41 (2004) 1855"
+    signature: ClassVar[str] = (
+        "After each new maximum the film comes back slack: unloading reaches zero force before zero deflection, "
+        "reloading starts there, and the shift grows with the largest deflection, not with time."
+    )
+    rank: ClassVar[int] = 1
+    coordinates: ClassVar[tuple[EffectParameter, ...]] = (
+        EffectParameter(
+            "set", "m", "deflection at which the film is slack after the test", HalfNormal(1e-3), (0.0, 2e-2), 0.0
+        ),
+        EXPONENT,
+        EffectParameter(
+            "rejoin",
+            "-",
+            "part of the set that is gone when the previous maximum is reached again",
+            Uniform(0.0, 1.0),
+            (0.0, 1.0),
+        ),
+    )
+
+    def deflect(self, p: Array, deflection: Array, path: Path) -> Array:
+        largest = running_max(deflection)
+        lasting = p[:, :1] * (largest / path.full_range) ** p[:, 1:2]
+        with np.errstate(all="ignore"):
+            part = np.where(largest > 0, np.maximum(deflection, 0.0) / largest, 0.0)
+        return np.asarray(deflection - lasting * (1 - p[:, 2:3] * part))

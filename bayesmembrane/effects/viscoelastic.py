@@ -1,0 +1,48 @@
+"""The film relaxes: quasi-linear viscoelasticity with a Prony series."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bayesmembrane.effects._history import follow
+from bayesmembrane.effects.base import EffectParameter, Memory
+from bayesmembrane.parameters import Array, HalfNormal, LogNormal
+from bayesmembrane.protocol import Path
+
+TERMS = 4
+
+
+@dataclass(frozen=True)
+class Viscoelastic(Memory):
+    """F(t) = F_e(t) - strength int (1 - sum_i exp(-(t - s) / time_i) / n) dF_e(s), n = 4 times evenly spread in log time.
+
+    The times lie within ``decades`` decades around ``time``: one relaxation time if it is zero, a broad spectrum if not.
+    F_e is the instantaneous force. Without times the clock is the distance travelled at 1 mm/s.
+    """
+
+    name: ClassVar[str] = "viscoelastic"
+    title: ClassVar[str] = "viscoelastic relaxation"
+    reference: ClassVar[str] = "Y. C. Fung, Biomechanics: Mechanical Properties of Living Tissues, 2nd ed. (1993), 7.6"
+    signature: ClassVar[str] = (
+        "Unloading below loading in every cycle, with a gap that depends on time and speed and closes at rest; force "
+        "falls in holds and recovers at zero."
+    )
+    coordinates: ClassVar[tuple[EffectParameter, ...]] = (
+        EffectParameter(
+            "strength", "-", "part of the instantaneous force that relaxes", HalfNormal(0.2), (0.0, 0.98), 0.0
+        ),
+        EffectParameter("time", "s", "middle relaxation time", LogNormal(30.0, 1.5), (0.05, 2e4)),
+        EffectParameter("decades", "-", "width of the spectrum of times", HalfNormal(1.0), (0.0, 4.0)),
+    )
+
+    def remember(self, p: Array, force: Array, path: Path) -> Array:
+        gap = np.diff(path.clock, prepend=0.0)
+        start = np.zeros(len(p))
+        kept = np.zeros_like(force)
+        for place in (np.arange(TERMS) + 0.5) / TERMS - 0.5:
+            time = p[:, 1:2] * 10.0 ** (place * p[:, 2:3])
+            kept += follow(force, gap / time, start) / TERMS
+        return np.asarray(force - p[:, :1] * (force - kept))
