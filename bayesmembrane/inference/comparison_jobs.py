@@ -1,0 +1,275 @@
+"""What is computed for one hypothesis of a comparison, and kept beside its run so that it is computed once.
+
+nested.json, bridge.json, loo.json, widths.json, modes.json, range.json lie in the folder of the run, each with the key
+of what it was made from.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayesmembrane.errors import DataError, SettingsError, StorageError
+from bayesmembrane.hypothesis import Hypothesis
+from bayesmembrane.inference import storage
+from bayesmembrane.inference.evidence_bridge import bridge
+from bayesmembrane.inference.evidence_nested import nested
+from bayesmembrane.inference.evidence_sensitivity import ByMode, Widened, by_convexity, prior_widths
+from bayesmembrane.inference.evidence_target import Estimate, PosteriorTarget
+from bayesmembrane.inference.posterior import Posterior
+from bayesmembrane.inference.predictive_comparison import LeaveOneOut, LeaveRangeOut, leave_one_out, leave_range_out
+from bayesmembrane.inference.prior import Mass
+from bayesmembrane.inference.run import Run, sample
+from bayesmembrane.inference.sampling import Progress, Settings
+from bayesmembrane.measurement import Measurement
+from bayesmembrane.parameters import Array
+
+Tell = Callable[[str, str], None]
+"""(label of a hypothesis, what is being done for it)."""
+
+MODE_ESS = 400.0
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One hypothesis on one measurement, and how it is to be judged.
+
+    label : as tables name it
+    whole : the measurement that ``measurement`` is the first part of, if the rest is to be predicted
+    out : folder of all runs, None: nothing is stored
+    modes : whether evidence under every convexity mode is wanted, which takes a second sampling
+    """
+
+    label: str
+    measurement: Measurement
+    hypothesis: Hypothesis
+    seed: int
+    ess: float
+    out: Path | None
+    whole: Measurement | None
+    modes: bool
+
+    @property
+    def settings(self) -> Settings:
+        """How it is sampled."""
+        return Settings(ess=self.ess)
+
+
+@dataclass(frozen=True)
+class Climbed:
+    """What nested sampling says, and the part of the prior that convexity leaves; or why there is none."""
+
+    nested: Estimate | None
+    mass: Mass | None
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """What comes from the posterior draws; or why there are none.
+
+    ``notes`` are sentences that a reader needs; ``run`` is the folder, if it is stored.
+    """
+
+    bridge: Estimate | None
+    loo: LeaveOneOut | None
+    rest: LeaveRangeOut | None
+    widths: tuple[Widened, ...]
+    modes: tuple[ByMode, ...]
+    run: Path | None
+    evaluations: int
+    seconds: float
+    notes: tuple[str, ...]
+    reason: str
+
+
+def climb(job: Job, tell: Tell) -> Climbed:
+    """Mass and nested sampling, from nothing but the posterior."""
+    tell(job.label, "prior mass")
+    try:
+        posterior = Posterior(job.hypothesis, job.measurement)
+        masses, inside = posterior.prior.survey(job.measurement, job.seed)
+        mass = masses[job.hypothesis.convexity]
+        if not len(inside):
+            return Climbed(None, Mass(0.0, mass.sd), _no_mass(job.hypothesis))
+
+        def make() -> dict[str, Any]:
+            target = PosteriorTarget(posterior)
+            return asdict(nested(target, job.seed, tell=lambda text: tell(job.label, text)))
+
+        found = _kept(_folder(job), "nested", _asked(job)["fingerprint"], make)
+    except (SettingsError, DataError) as error:
+        return Climbed(None, None, str(error))
+    return Climbed(_estimate(found), mass, "")
+
+
+def walk(job: Job, tell: Tell) -> Sampled:
+    """The run, and everything that its draws tell. Raises KeyboardInterrupt once an interrupted run is stored."""
+    try:
+        return _from_draws(job, _run(job, tell), tell)
+    except (SettingsError, DataError) as error:
+        return Sampled(None, None, None, (), (), None, 0, 0.0, (), str(error))
+
+
+def _no_mass(hypothesis: Hypothesis) -> str:
+    return (
+        f'The convexity prior "{hypothesis.convexity}" leaves none of the prior draws of {hypothesis.label()}, so that '
+        "there is nothing to be fitted."
+    )
+
+
+def _from_draws(job: Job, run: Run, tell: Tell) -> Sampled:
+    posterior = Posterior(job.hypothesis, job.measurement)
+    key = f"{run.settings['fingerprint']} {run.status['evaluations']}"
+    draws, worth = run.draws(), float(run.status["ess_bulk"])
+
+    def kept(name: str, words: str, make: Callable[[], Any], more: str = "") -> Any:
+        tell(job.label, words)
+        return _kept(run.path, name, f"{key} {more}", make)
+
+    found = kept("bridge", "bridge sampling", lambda: asdict(_bridged(posterior, run, job.seed)))
+    told = lambda text: tell(job.label, text)  # noqa: E731 - too short for a name
+    loo = kept("loo", "leave one out", lambda: asdict(leave_one_out(posterior, run.data, job.seed, told)))
+    widths = kept("widths", "prior widths", lambda: [asdict(w) for w in _widths(posterior, draws, worth, job.seed)])
+    rest = None
+    if job.whole is not None:
+        whole = job.whole
+        rest = kept("range", "the rest", lambda: asdict(leave_range_out(posterior, draws, whole)), whole.data_hash)
+    modes = _modes(job, run, _estimate(found), tell) if job.modes else ()
+    return Sampled(
+        bridge=_estimate(found),
+        loo=LeaveOneOut(**_arrays(loo, "pointwise", "pareto_k"), refitted=tuple(loo["refitted"])),
+        rest=None if rest is None else LeaveRangeOut(**_arrays(rest, "deflection", "predicted", "sd")),
+        widths=tuple(Widened(**_numbers(w)) for w in widths),
+        modes=modes,
+        run=run.path,
+        evaluations=int(run.status["evaluations"]),
+        seconds=float(run.status["seconds"]),
+        notes=tuple(run.status["sentences"]),
+        reason="",
+    )
+
+
+def _run(job: Job, tell: Tell) -> Run:
+    """The run of a job, read back if it is stored."""
+
+    def progress(p: Progress) -> None:
+        tell(job.label, f"sampling: ESS {p.ess:.0f} of {p.wanted:.0f}")
+
+    run = sample(job.measurement, job.hypothesis, seed=job.seed, out=job.out, settings=job.settings, progress=progress)
+    if run.interrupted:
+        raise KeyboardInterrupt
+    return run
+
+
+def _bridged(posterior: Posterior, run: Run, seed: int) -> Estimate:
+    """Bridge sampling on the draws of a run, ensemble by ensemble."""
+    log_posterior = run.data.sample_stats["lp"].values.ravel().astype(float)
+    return bridge(
+        PosteriorTarget(posterior),
+        run.draws(),
+        seed=seed,
+        effective=float(run.status["ess_bulk"]),
+        log_posterior=log_posterior,
+    )
+
+
+def _widths(posterior: Posterior, draws: Array, worth: float, seed: int) -> tuple[Widened, ...]:
+    return prior_widths(posterior, draws, worth, seed)
+
+
+def _modes(job: Job, run: Run, found: Estimate, tell: Tell) -> tuple[ByMode, ...]:
+    """Evidence under every convexity mode, from a run without any."""
+    if job.hypothesis.convexity != "none":
+        free = replace(job, hypothesis=replace(job.hypothesis, convexity="none"), ess=min(job.ess, MODE_ESS))
+        run = _run(free, lambda label, text: tell(label, f"without convexity, {text}"))
+    posterior = Posterior(run.hypothesis, job.measurement)
+    key = f"{run.settings['fingerprint']} {run.status['evaluations']}"
+
+    def make() -> list[dict[str, Any]]:
+        estimate = found if run.hypothesis == job.hypothesis else _bridged(posterior, run, job.seed)
+        masses = posterior.prior.masses(job.measurement, job.seed)
+        worth = float(run.status["ess_bulk"])
+        return [
+            asdict(m) for m in by_convexity(posterior, run.draws(), worth, estimate.log_evidence, estimate.sd, masses)
+        ]
+
+    return tuple(ByMode(**m) for m in _kept(run.path, "modes", key, make))
+
+
+# ---- kept beside the run ---------------------------------------------------------------------------------------------
+
+
+def _asked(job: Job) -> dict[str, Any]:
+    return storage.describe(job.measurement, job.hypothesis, job.settings, job.seed)
+
+
+def _folder(job: Job) -> Path | None:
+    """The folder that the run of this job has, or will have."""
+    if job.out is None:
+        return None
+    asked = _asked(job)
+    return storage.claim(job.out / storage.run_name(job.measurement, job.hypothesis, asked), asked)
+
+
+def _kept(folder: Path | None, name: str, key: str, make: Callable[[], Any]) -> Any:
+    """What ``make`` returns, in plain values; from ``folder/name.json`` if that was made with the same ``key``.
+
+    Raises `StorageError` if it cannot be written. A file that cannot be read is made again.
+    """
+    if folder is None:
+        return _plain(make())
+    path, digest = folder / f"{name}.json", hashlib.sha256(key.encode()).hexdigest()
+    try:
+        stored = json.loads(path.read_text(encoding="utf-8"))
+        if stored["key"] == digest:
+            return stored["value"]
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    value = _plain(make())
+    try:
+        handle, temporary = tempfile.mkstemp(dir=folder, prefix=f".{name}.")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            json.dump({"key": digest, "value": value}, file, indent=1, allow_nan=False)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise StorageError(f"the result cannot be stored ({error.strerror})", str(path), "free some space") from None
+    return value
+
+
+def _plain(value: Any) -> Any:
+    """What JSON can hold; nan becomes null, and infinity a number that no double exceeds."""
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return None if np.isnan(value) else float(np.nan_to_num(value))
+    return value
+
+
+def _numbers(stored: dict[str, Any]) -> dict[str, Any]:
+    """The inverse: null is nan."""
+    return {k: np.nan if v is None else v for k, v in stored.items()}
+
+
+def _arrays(stored: dict[str, Any], *names: str) -> dict[str, Any]:
+    """`_numbers` with lists as arrays; what is given by name elsewhere is left out."""
+    single = {k: v for k, v in _numbers(stored).items() if k not in names and k != "refitted"}
+    return single | {n: np.array(stored[n], dtype=float) for n in names}
+
+
+def _estimate(stored: dict[str, Any]) -> Estimate:
+    values = _numbers(stored)
+    return Estimate(**{**values, "parts": tuple(values["parts"])})

@@ -1,0 +1,80 @@
+"""Evidence of three materials on the shipped data against cubature on a grid of the same coordinates."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from bayesmembrane.demo import shipped_measurement
+from bayesmembrane.hypothesis import hypothesis
+from bayesmembrane.inference.evidence_bridge import bridge
+from bayesmembrane.inference.evidence_nested import nested
+from bayesmembrane.inference.evidence_sensitivity import prior_widths, scaled
+from bayesmembrane.inference.evidence_target import PosteriorTarget
+from bayesmembrane.inference.posterior import Posterior
+from bayesmembrane.inference.sampling import Settings, run_ensembles
+from tests.statistics.cubature import log_evidence
+
+MATERIALS = ("neo_hookean", "mooney_rivlin", "gent")
+
+
+@cache
+def posterior(name: str, convexity: str = "reached", range_name: str = "OP1") -> Posterior:
+    return Posterior(hypothesis(name, convexity=convexity), shipped_measurement(range_name))
+
+
+@cache
+def exact(name: str, convexity: str = "reached", range_name: str = "OP1") -> float:
+    return log_evidence(posterior(name, convexity, range_name))
+
+
+@cache
+def sampled(name: str, convexity: str = "reached", range_name: str = "OP1"):
+    found = run_ensembles(posterior(name, convexity, range_name), Settings(ess=400), 211)
+    burn = found.convergence.burn
+    return found.chains.x[:, burn:], found.chains.log_posterior[:, burn:], float(np.min(found.convergence.ess))
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_the_grid_is_fine_enough(name):
+    assert log_evidence(posterior(name), cells=60) == pytest.approx(exact(name), abs=0.005)
+
+
+@pytest.mark.parametrize("range_name", ["OP1", "OP2"])
+@pytest.mark.parametrize("name", MATERIALS)
+def test_bridge_sampling_is_right_within_a_twentieth(name, range_name):
+    x, log_posterior, _ = sampled(name, range_name=range_name)
+    found = bridge(PosteriorTarget(posterior(name, range_name=range_name)), x, seed=7, log_posterior=log_posterior)
+    assert abs(found.log_evidence - exact(name, range_name=range_name)) < 0.05
+    assert found.sd < 0.05
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_nested_sampling_is_right_within_three_standard_errors(name):
+    found = nested(PosteriorTarget(posterior(name)), 212, tolerance=0.15)
+    assert found.sd <= 0.15
+    assert abs(found.log_evidence - exact(name)) < 3 * found.sd
+
+
+@pytest.mark.parametrize("name", ["gent", "mooney_rivlin"])
+def test_prior_widths_agree_with_priors_of_that_width(name):
+    """The reweighted change is that of the two cubatures, with the mass of either prior."""
+    p = posterior(name)
+    x, _, worth = sampled(name)
+    widths = {(w.parameter, w.factor): w for w in prior_widths(p, x.reshape(-1, x.shape[-1])[::5], worth, seed=214)}
+    parameter = p.hypothesis.parameters[1]
+    for factor in (0.5, 2.0):
+        coordinates = list(p.hypothesis.material.coordinates)
+        coordinates[1] = replace(coordinates[1], prior=scaled(coordinates[1].prior, factor))
+        kind = p.hypothesis.material
+        same = {"__qualname__": kind.__qualname__, "source_text": kind.source_text}
+        other = type(kind.__name__, (kind,), {"coordinates": tuple(coordinates), **same})
+        wide = Posterior(replace(p.hypothesis, material=other), p.measurement)
+        masses = [q.prior.masses(p.measurement, 215)["reached"] for q in (wide, p)]
+        change = log_evidence(wide) - exact(name) - np.log(masses[0].value / masses[1].value)
+        error = np.hypot(*(m.sd / m.value for m in masses))
+        found = widths[parameter.name, factor]
+        assert found.reason == ""
+        assert abs(found.change - change) < 3.5 * np.hypot(found.sd, error) + 0.01
+    assert widths[parameter.name, 1.0].change == 0.0
