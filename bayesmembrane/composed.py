@@ -33,9 +33,10 @@ Law = Any
 """(deflection (B, N), excess (B, N) or None) -> (force (B, N), slope (B, N)), and ``status`` (B,) where it is nan."""
 
 MOST_ITERATIONS = 40
-CLOSED = 1e-12  # of the largest deflection: the loop around the frame ends there
-# Steps of differences: in material coordinates, which are of order one, and relative to an effect's expected size; a film
-# that is mounted differently is solved again, to a tenth of 1e-6.
+CLOSED = 1e-10  # of the largest deflection: the loop around the frame ends there
+SHORT, STEEP = 1e-7, 5.0  # a secant over a shorter step is round-off, a steeper one no slope
+# Steps of differences: in material coordinates, which are of order one, and relative to an effect's expected size; a
+# film that is mounted differently is solved again, to a tenth of 1e-6.
 MATERIAL_STEP, EFFECT_STEP, MOUNTING_STEP = 1e-6, 1e-5, 3e-3
 BACK = 0.9  # of its way to a deflection at which there is no force is what a film is tried at instead
 
@@ -93,9 +94,9 @@ class Composition:
         return np.where(status == Status.OK, force, np.nan), status
 
     def closed(self, law: Law, x: Array) -> tuple[Array, Array]:
-        """((B, N) m, (B, N) N): deflection at the film's edge and force of the film, with delta + u(F(delta)) = measured.
+        """((B, N) m, (B, N) N): deflection and force of the film, with delta + u(F(delta)) = the measured deflection.
 
-        Newton's method with the film's slope: what the film remembers is left to the next iteration.
+        Newton's method, at first with the slope of a film without memory, then with secants.
         """
         measured = self._measured(len(x))
         frame = self._acting(Compliance, x)
@@ -103,16 +104,21 @@ class Composition:
         force, slope = self.film(law, x, delta)
         if not frame:
             return delta, force
-        limit = CLOSED * max(float(np.max(np.abs(measured))), 1e-12)
+        reach = max(float(np.max(np.abs(measured))), 1e-12)
         for _ in range(MOST_ITERATIONS):
             u, du = (np.sum(v, axis=0) for v in zip(*(e.yielding(p, force) for e, p in frame), strict=True))
             residual = delta + u - measured
             lost = ~np.isfinite(residual)
-            if np.all(lost | (np.abs(residual) <= limit)):
+            if np.all(lost | (np.abs(residual) <= CLOSED * reach)):
                 break
             step = np.where(lost, (BACK - 1) * delta, -residual / (1 + du * slope))
-            delta = delta + step
+            delta, before = delta + step, force
             force, slope = self.film(law, x, delta)
+            # The secant also sees what history adds to the slope.
+            with np.errstate(all="ignore"):
+                secant = (force - before) / step
+            use = (np.abs(step) > SHORT * reach) & (secant > 0) & (secant < STEEP * slope)
+            slope = np.where(use, secant, slope)
         return delta, force
 
     def film(self, law: Law, x: Array, delta: Array) -> tuple[Array, Array]:

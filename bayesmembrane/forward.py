@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -19,7 +19,7 @@ from bayesmembrane.mechanics import api
 from bayesmembrane.mechanics.convexity import box_margins, reached_convexity, reached_ellipticity
 from bayesmembrane.mechanics.film_law import Gap, film_law
 from bayesmembrane.mechanics.solution import Curves, Status
-from bayesmembrane.mechanics.strip_law import StripLaw, margins
+from bayesmembrane.mechanics.strip_law import StripLaw, strip_curves
 from bayesmembrane.parameters import Array
 from bayesmembrane.protocol import Path
 from bayesmembrane.rigs.annulus import Annulus
@@ -89,7 +89,9 @@ class Prediction:
 class Forward:
     """F(delta; x) of one hypothesis on the rig of one measurement, at ``deflection`` (N,) m.
 
-    A material of one modulus alone is solved once: F(c) = (c / 1) F(1).
+    At the measurement's own deflections the film remembers how the disc was moved; other deflections are one path of
+    their own, at the speed of the measurement. Effects, homogeneous rigs and long curves go through a film law that is
+    interpolated to 1e-6. A material of one modulus alone is solved once: F(c) = (c / 1) F(1).
     """
 
     hypothesis: Hypothesis
@@ -147,7 +149,7 @@ class Forward:
 
     @cached_property
     def path(self) -> Path:
-        """How the disc moves: as in the measurement at its own deflections, else through ``deflection`` at its speed."""
+        """How the disc moves: as in the measurement at its own deflections, else through others at its speed."""
         m = self.measurement
         if self._measured:
             return m.path
@@ -182,7 +184,8 @@ class Forward:
             return parts[0]
         names = [f.name for f in fields(Prediction) if f.name != "deflection"]
         whole = {n: [getattr(p, n) for p in parts] for n in names}
-        return Prediction(self.deflection, **{n: None if v[0] is None else np.concatenate(v) for n, v in whole.items()})
+        joined: dict[str, Any] = {n: None if v[0] is None else np.concatenate(v) for n, v in whole.items()}
+        return Prediction(self.deflection, **joined)
 
     def _batch(self, x: Array, sensitivities: bool, reached: bool, only: str) -> Prediction:
         films = self.hypothesis.films(x)
@@ -196,10 +199,9 @@ class Forward:
             )
         else:
             force, status = self.composition(law, theta)
-        here = self.measurement.on_path if self._measured else slice(None)
-        least = [np.min(np.where(np.isnan(m), np.inf, m), axis=1) for m in at]
-        least = [np.where(np.all(np.isnan(m), axis=1), np.nan, v) for m, v in zip(at, least, strict=True)]
+        here = self._here
         slopes = None if slopes is None else slopes[:, here]
+        least = (np.fmin.reduce(at[0], axis=1), np.fmin.reduce(at[1], axis=1))
         return Prediction(self.deflection, force[:, here], status[:, here], films, slopes, *least, *at)
 
     def law(
@@ -212,9 +214,9 @@ class Forward:
         extra = self._beyond if reached else np.empty(0)
         rig, material = self.measurement.rig, self.hypothesis.material
         if isinstance(rig, Strip):
-            states = np.unique(np.concatenate([self.path.deflection, extra]))
-            states = states[np.linspace(0, states.size - 1, min(states.size, 4 * GAPS)).astype(int)]
-            return StripLaw(material, films, rig, self._pushes), margins(material, films, rig, states)
+            strip = StripLaw(material, films, rig, self._pushes, self.path.across)
+            shown = strip_curves(*self._states(strip, extra))
+            return strip, (shown.convexity, shown.ellipticity)
         composition = self.composition
         end = np.maximum(composition.end(theta), 1e-3 * self.measurement.full_range)
         options: dict[str, Any] = {"sensitivities": sensitivities, "only": only}
@@ -223,9 +225,31 @@ class Forward:
         law, curves = film_law(
             material, films, self._gap, composition.prestretch(theta), end, extra, self.solve, **options
         )
-        lost = (curves.status == Status.INDEFINITE) | (curves.status == Status.NOT_ELLIPTIC)
-        at = (np.where(lost, -np.inf, m) for m in (curves.convexity, curves.ellipticity))
-        return law, tuple(at)  # type: ignore[return-value]
+        indefinite, bent = (curves.status == s for s in (Status.INDEFINITE, Status.NOT_ELLIPTIC))
+        convexity, ellipticity = (
+            np.where(indefinite | (bent & np.isnan(m)), -np.inf, m) for m in (curves.convexity, curves.ellipticity)
+        )
+        return law, (convexity, ellipticity)
+
+    def _states(self, strip: StripLaw, extra: Array) -> tuple[StripLaw, Array]:
+        """Law and deflections of a few states up to the end of the range, or of all of them in a biaxial test."""
+        d = self.path.deflection
+        if strip.across is not None:
+            return strip, d
+        states = np.unique(np.concatenate([d, extra]))
+        return strip, states[np.linspace(0, states.size - 1, min(states.size, 4 * GAPS)).astype(int)]
+
+    def film_force(self, films: Array) -> Array:
+        """(B, N) N: forces of films (B, n) without effects at ``deflection``; nan where there is none."""
+        if not self.composes:
+            return self.curves(films, self.deflection).force
+        plain = replace(self, hypothesis=replace(self.hypothesis, effects=()))
+        nothing = np.empty((len(films), 0))
+        return plain.composition(plain.law(films, nothing)[0], nothing)[0][:, plain._here]
+
+    @property
+    def _here(self) -> Any:
+        return self.measurement.on_path if self._measured else slice(None)
 
     @cached_property
     def _gap(self) -> Gap:
@@ -241,7 +265,10 @@ class Forward:
     def curves(
         self, films: Array, deflection: Array, sensitivities: bool = False, solver: str = "ritz", only: str = "all"
     ) -> Curves:
-        """Curves of ``films`` (B, n) at ``deflection`` (N,) m on the rig of the measurement."""
+        """Curves of ``films`` (B, n) without effects at ``deflection`` (N,) m on the rig of the measurement."""
+        if isinstance(self.measurement.rig, Strip):
+            strip = StripLaw(self.hypothesis.material, films, self.measurement.rig, self._pushes, self.path.across)
+            return strip_curves(strip, deflection, sensitivities)
         rig = annulus(self.measurement)
         # What lies beyond is solved to see whether the film stays convex there.
         exact = float(np.max(self.deflection)) if only != "all" else np.inf
@@ -287,7 +314,7 @@ def predict(
 ) -> Prediction:
     """Force curves F(delta; x) of coordinates x (B, k) at ``deflection`` (N,) m, or at those of the measurement.
 
-    Raises `SettingsError` if the rig of the measurement is not an annulus.
+    Raises `SettingsError` for an effect that cannot occur on the rig or needs times that the measurement lacks.
     """
     at = measurement.deflection if deflection is None else np.atleast_1d(np.asarray(deflection, dtype=float))
     return Forward(hypothesis, measurement, at, solve)(coordinates, sensitivities)

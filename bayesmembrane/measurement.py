@@ -6,7 +6,7 @@ import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,7 +19,7 @@ from bayesmembrane.parameters import Array
 from bayesmembrane.protocol import Path as Motion
 from bayesmembrane.protocol import check_order, check_time, first_loading
 from bayesmembrane.registry import components
-from bayesmembrane.rigs.base import KINDS, Rig
+from bayesmembrane.rigs.base import Rig
 from bayesmembrane.settings import Section, load_toml
 from bayesmembrane.tables import Table, parse_table, read_matrix, read_text
 from bayesmembrane.units import FORCE, LENGTH, TIME
@@ -74,6 +74,7 @@ class Measurement:
     full_range : the largest deflection of the whole measurement in m, also where this one is truncated
     motion : how the disc was moved, also past points that were left out; the film remembers those too
     places : (N,) where the points lie on it
+    across : (N,) stretch across the direction of pull where it was measured (biaxial tests), or None
 
     Raises `DataError` for shapes that do not agree, values that are not finite, a standard deviation that is not
     positive, and a covariance that is not symmetric and positive definite. With a covariance, `force_sd` is the root
@@ -91,10 +92,11 @@ class Measurement:
     full_range: float = math.nan
     motion: Motion | None = None
     places: NDArray[np.int64] | None = None
+    across: Array | None = None
 
     def __post_init__(self) -> None:
         n = np.size(self.deflection)
-        for name in ("deflection", "force", "time", "force_sd"):
+        for name in ("deflection", "force", "time", "force_sd", "across"):
             self._freeze(name, (n,))
         self._freeze("covariance", (n, n))
         if n == 0:
@@ -116,7 +118,7 @@ class Measurement:
     @cached_property
     def path(self) -> Motion:
         """How the disc was moved up to the last point: `motion`, or the points themselves."""
-        return self.motion or Motion(self.deflection, self.time, self.full_range)
+        return self.motion or Motion(self.deflection, self.time, self.full_range, self.across)
 
     @cached_property
     def on_path(self) -> NDArray[np.int64]:
@@ -151,8 +153,10 @@ class Measurement:
         digest = hashlib.sha256(f"{self.rig!r} {self.specimen.thickness!r} {self.full_range!r}".encode())
         for array in (self.deflection, self.force, self.time, self.force_sd, self.covariance):
             digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
+        if self.across is not None:
+            digest.update(np.ascontiguousarray(self.across).tobytes())
         if self.motion is not None:
-            for array in (self.motion.deflection, self.motion.time, self.on_path):
+            for array in (self.motion.deflection, self.motion.time, self.on_path.astype(float)):
                 digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()
 
@@ -170,7 +174,7 @@ class Measurement:
         return self if np.all(keep) else self.select(keep)
 
     def select(self, keep: NDArray[Any]) -> Measurement:
-        """The points at ``keep``, (N,) booleans or indices in order; `full_range` stays, and the path up to the last."""
+        """The points at ``keep``, (N,) booleans or indices in order; `full_range` and the path to the last stay."""
 
         def part(array: Array | None) -> Array | None:
             return None if array is None else array[keep]
@@ -179,10 +183,11 @@ class Measurement:
         places = self.on_path[keep]
         end = int(places[-1]) + 1 if places.size else 0
         remembers = places.size != end
-        past = None if self.path.time is None else self.path.time[:end]
+        past, across = (None if v is None else v[:end] for v in (self.path.time, self.path.across))
         return replace(
             self,
-            motion=Motion(self.path.deflection[:end], past, self.full_range) if remembers else None,
+            motion=Motion(self.path.deflection[:end], past, self.full_range, across) if remembers else None,
+            across=part(self.across),
             places=places if remembers else None,
             deflection=self.deflection[keep],
             force=self.force[keep],
@@ -242,8 +247,10 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     specimen = _specimen(root.section("specimen"), rig, curve_csv.stem)
     options = root.section("measurement", required=False)
     found, notes = curve_columns(table, rig.columns)
-    deflection, force = found["deflection"], found["force"]
-    check_samples(found, table.file, table.lines)
+    found = rig.from_columns(found, specimen.thickness)
+    deflection, force, across = found["deflection"], found["force"], found.get("across")
+    if across is None:
+        check_samples(found, table.file, table.lines)
     _check_size(deflection, table, rig)
     sd, covariance, covariance_file = _noise(options, found.get("force_sd"), force.size)
     origin = [options.text("origin"), root.section("origin", required=False).all_text()]
@@ -255,7 +262,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     if sd is not None and np.min(sd) < LEAST_SD:
         fault = f"a standard deviation of {np.min(sd):g} N looks like a wrong unit"
         raise DataError(fault, options.where, "check the unit of the noise")
-    return Measurement(deflection, force, rig, specimen, found.get("time"), sd, covariance, provenance)
+    return Measurement(deflection, force, rig, specimen, found.get("time"), sd, covariance, provenance, across=across)
 
 
 def write_measurement(measurement: Measurement, curve_csv: str | Path, specimen_toml: str | Path) -> None:
@@ -264,11 +271,14 @@ def write_measurement(measurement: Measurement, curve_csv: str | Path, specimen_
     Raises `StorageError` if a file exists already or cannot be written; nothing is overwritten.
     """
     curve_csv, specimen_toml = Path(curve_csv), Path(specimen_toml)
-    columns = {"time_s": measurement.time, "deflection_mm": 1e3 * measurement.deflection, "force_N": measurement.force}
+    arrays = {"time": measurement.time, "deflection": measurement.deflection, "force": measurement.force}
     if measurement.covariance is None:
-        columns["force_sd_N"] = measurement.force_sd
+        arrays["force_sd"] = measurement.force_sd
+    columns = measurement.rig.to_columns(
+        {k: v for k, v in arrays.items() if v is not None}, measurement.specimen.thickness
+    )
     options: dict[str, Any] = {"origin": measurement.provenance.origin} if measurement.provenance.origin else {}
-    texts = {curve_csv: csv_text({k: v for k, v in columns.items() if v is not None})}
+    texts = {curve_csv: csv_text(columns)}
     if measurement.covariance is not None:
         beside = specimen_toml.parent / f"{curve_csv.stem}_covariance.csv"
         options["covariance"] = beside.name
@@ -313,13 +323,12 @@ def _rig(section: Section) -> Rig:
     known = components("rigs")
     if kind not in known:
         supported = f"supported: {', '.join(known)}"
-        if kind in KINDS:
-            raise DataError(f'the rig "{kind}" is not supported yet', section.where, supported)
         raise DataError(f'there is no rig of the kind "{kind}"', section.where, supported)
     cls: type[Rig] = known[kind]
-    lengths = [section.measure(name, LENGTH, f"{name}_mm") for name in cls.length_names()]
+    required = {name: not cls.has_default(name) for name in cls.length_names()}
+    lengths = {name: section.measure(name, LENGTH, f"{name}_mm", need) for name, need in required.items()}
     section.finish()
-    rig = _at(section.where, cls, *lengths)
+    rig = _at(section.where, partial(cls, **{k: v for k, v in lengths.items() if v is not None}))
     if not RIGS[0] <= rig.size() <= RIGS[1]:
         raise DataError(f"a rig of {rig.size():g} m looks like a wrong unit", section.where, "check the units")
     return rig
@@ -385,11 +394,12 @@ def check_samples(columns: dict[str, Array], file: str, lines: Sequence[int]) ->
 
 def _check_size(deflection: Array, table: Table, rig: Rig) -> None:
     k = int(np.argmax(deflection))
+    row = table.lines[k % len(table.lines)]
     if deflection[k] > LARGEST_LIFT * rig.size():
         fault = (
             f"a deflection of {1e3 * deflection[k]:g} mm on a rig of {1e3 * rig.size():g} mm looks like a wrong unit"
         )
-        raise DataError(fault, f"{table.file}, line {table.lines[k]}", "check the unit in the header")
+        raise DataError(fault, f"{table.file}, line {row}", "check the unit in the header")
 
 
 def _noise(options: Section, column: Array | None, n: int) -> tuple[Array | None, Array | None, str]:

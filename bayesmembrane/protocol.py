@@ -30,11 +30,13 @@ class Path:
     deflection : (N,) m, in the order of the test
     time : (N,) s, strictly increasing, or None
     full_range : the deflection in m that histories are measured against, the largest of the whole measurement
+    across : (N,) stretch across the direction of pull where it was measured (biaxial tests), or None
     """
 
     deflection: Array
     time: Array | None
     full_range: float
+    across: Array | None = None
 
     @cached_property
     def leg(self) -> NDArray[np.int8]:
@@ -62,7 +64,7 @@ class Path:
         start = 0.0
         if self.time.size > 1 and self.steps[1] > 0:
             start = self.steps[0] * (self.time[1] - self.time[0]) / self.steps[1]
-        return self.time - self.time[0] + min(start, float(self.time[-1] - self.time[0]))
+        return np.asarray(self.time - self.time[0] + min(start, float(self.time[-1] - self.time[0])))
 
     @cached_property
     def speed(self) -> Array:

@@ -327,7 +327,7 @@ def test_missing_files_and_folders(files: Files) -> None:
         ("_mm = 35.0", "_m = 35.0", "a rig of 35 m looks like a wrong unit"),
         ("inner_radius_mm = 10.0\n", "", "[rig]: the key inner_radius_mm is missing"),
         ("[rig]", "[rgi]", 'the section [rig] is missing; rename "rgi" if that is it'),
-        ("annulus", "planar", 'the rig "planar" is not supported yet; supported: annulus'),
+        ("annulus", "planr", 'no rig of the kind "planr"'),
         ("annulus", "anulus", 'there is no rig of the kind "anulus"'),
         ('kind = "annulus"', "", "the key kind is missing"),
         ("[specimen]", "[extra]\na = 1\n[specimen]", 'the key "extra" is unknown'),

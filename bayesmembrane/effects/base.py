@@ -15,12 +15,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.parameters import Array, Parameter
+from bayesmembrane.parameters import Array, Parameter, Prior
 from bayesmembrane.protocol import Path
 
 ANNULUS = ("annulus",)
@@ -44,14 +44,19 @@ class EffectParameter(Parameter):
 
     @property
     def scale(self) -> float:
-        """Size that is expected before the data: the prior's root mean square distance from the null value, or its sd."""
-        d = self.prior.distribution()
-        return float(np.sqrt(d.var() + (d.mean() - self.null) ** 2) if self.null is not None else d.std())
+        """Size that is expected before the data: the prior's root mean square distance from null, or its sd."""
+        return _scale(self.prior, self.null)
 
     @property
     def typical(self) -> float:
         """Prior median of a shape; null value plus one scale of a size."""
         return float(self.prior.quantile(0.5)) if self.null is None else self.null + self.scale
+
+
+@cache
+def _scale(prior: Prior, null: float | None) -> float:
+    d = prior.distribution()
+    return float(d.std() if null is None else np.sqrt(d.var() + (d.mean() - null) ** 2))
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ class ForceGain(Sensor):
     reference: ClassVar[str] = "ISO 7500-1:2018, 6.5 (relative indication error)"
     signature: ClassVar[str] = "None: the whole curve is scaled, and so is the material's modulus."
     absorbed: ClassVar[str] = (
-        "The material's modulus absorbs a gain error of the load cell without trace: only a calibration weight shows it."
+        "The material's modulus absorbs a gain error of the load cell without trace; only a calibration weight shows "
+        "it."
     )
     rank: ClassVar[int] = 2
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (

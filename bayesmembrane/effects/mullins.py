@@ -16,15 +16,16 @@ from bayesmembrane.parameters import Array, HalfNormal, LogNormal
 class Mullins(Carried):
     """F = F0 (1 - softening erf((w_max - w) / (width w_full + w_max / 4))), with the work w = F0 delta.
 
-    w_max is its largest value so far and w_full that of the whole test: unloading runs below loading, reloading rejoins.
+    w_max is its largest value so far and w_full that of the whole test: unloading runs below loading, and reloading
+    rejoins.
     """
 
     name: ClassVar[str] = "mullins"
     title: ClassVar[str] = "Mullins softening"
     reference: ClassVar[str] = "R. W. Ogden, D. G. Roxburgh, Proc. R. Soc. A 455 (1999) 2861"
     signature: ClassVar[str] = (
-        "Unloading and reloading below the previous maximum are softer than first loading and coincide with each other; "
-        "the curve rejoins first loading where the previous maximum is passed."
+        "Unloading and reloading below the previous maximum are softer than first loading and coincide with each "
+        "other; the curve rejoins first loading where the previous maximum is passed."
     )
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(

@@ -17,10 +17,11 @@ TERMS = 4
 
 @dataclass(frozen=True)
 class Viscoelastic(Memory):
-    """F(t) = F_e(t) - strength int (1 - sum_i exp(-(t - s) / time_i) / n) dF_e(s), n = 4 times evenly spread in log time.
+    """F(t) = F_e(t) - strength int (1 - sum_i exp(-(t - s) / time_i) / n) dF_e(s), n = 4.
 
-    The times lie within ``decades`` decades around ``time``: one relaxation time if it is zero, a broad spectrum if not.
-    F_e is the instantaneous force. Without times the clock is the distance travelled at 1 mm/s.
+    The times are evenly spread in log time within ``decades`` decades around ``time``: one relaxation time if it is
+    zero, a broad spectrum if not. F_e is the instantaneous force. Without times the clock is the distance
+    travelled at 1 mm/s.
     """
 
     name: ClassVar[str] = "viscoelastic"

@@ -30,6 +30,7 @@ from bayesmembrane.mechanics import api
 from bayesmembrane.mechanics.convexity import least_eigenvalue
 from bayesmembrane.mechanics.solution import Status
 from bayesmembrane.parameters import Array
+from bayesmembrane.rigs.base import Strip
 
 FILE = "digest.nc"
 QUANTILES = (0.05, 0.5, 0.95)
@@ -343,6 +344,10 @@ def _meets(margin: Array, mode: str) -> NDArray[np.bool_]:
 
 def _profiles(film: Material, at: Array, measurement: Measurement) -> Array:
     """(4, D, M): radius, height, l1 and l2 at each deflection; nan where the film has no state."""
+    if isinstance(measurement.rig, Strip):
+        l1 = np.repeat(1.0 + at[:, None] / measurement.rig.length, POINTS, axis=1)
+        along = np.linspace(0.0, measurement.rig.length, POINTS)
+        return np.stack([l1 * along, 0.0 * l1, l1, measurement.rig.lateral(l1)[0]])
     rig = annulus(measurement)
     radii = {"inner_radius": rig.inner_radius, "outer_radius": rig.outer_radius}
     found = [api.profile(film, float(d), points=POINTS, **radii) for d in at]

@@ -10,11 +10,12 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
 from bayesmembrane.errors import SettingsError, unknown_name
-from bayesmembrane.forward import Forward, Prediction, Solve, annulus
+from bayesmembrane.forward import Forward, Prediction, Solve
 from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.inference.prior import JointPrior
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.parameters import Array
+from bayesmembrane.rigs.annulus import Annulus
 
 LOSSES = ("euclidean", "weighted")
 SCREENED, INFLATED = 768, 256
@@ -76,7 +77,7 @@ class Objective:
         F(s c) = s F(c), so that s = <F, y> / <F, F> is exact.
         """
         scales = np.asarray(self.hypothesis.material.scales)
-        force = self.whiten(self.forward.curves(films, self.measurement.deflection).force.T)
+        force = self.whiten(self.forward.film_force(films).T)
         y = self.whiten(self.measurement.force)
         with np.errstate(all="ignore"):
             s = y @ force / np.sum(force**2, axis=0)
@@ -111,7 +112,9 @@ class Objective:
 
         Films without are told late, and hardly ever reach the data: they are not worth a solution in a search.
         """
-        rig = annulus(self.measurement)
+        rig = self.measurement.rig
+        if not isinstance(rig, Annulus):
+            return np.ones(len(films), bool)
         rise = np.max(np.abs(self.measurement.deflection)) / (rig.outer_radius - rig.inner_radius)
         stretch = np.linspace(1.0, np.sqrt(1.0 + rise * rise), ON_THE_WAY + 1)[1:, None]
         with np.errstate(all="ignore"):

@@ -25,12 +25,17 @@ from bayesmembrane.errors import StorageError
 from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.inference.sampling import Chains, Settings
 from bayesmembrane.measurement import Measurement, Provenance, Specimen
+from bayesmembrane.protocol import Path as Motion
 from bayesmembrane.registry import component
 
 ASKED, POSTERIOR, STATUS, CHAINS = "run.toml", "posterior.nc", "status.json", "chains.npz"
 PACKAGES = ("bayesmembrane", "numpy", "scipy", "numba", "emcee", "arviz")
 # What the answer of a run depends on; reports and the command line are not among it.
-FLOORS = ("noise", "materials", "mechanics", "rigs", "effects", "inference", "hypothesis.py", "forward.py")
+MOTION = ("deflection", "time", "across")
+FLOORS = (
+    *("noise", "materials", "mechanics", "rigs", "effects", "inference"),
+    *("protocol.py", "hypothesis.py", "composed.py", "forward.py"),
+)
 
 
 # ---- what was asked --------------------------------------------------------------------------------------------------
@@ -210,11 +215,16 @@ def read_chains(folder: Path) -> Chains | None:
 def inference_data(measurement: Measurement, **groups: Any) -> Any:
     """arviz InferenceData with ``groups``, the measured curve and all that `measurement_of` needs."""
     constant = {"deflection": measurement.deflection}
-    for name in ("time", "force_sd", "covariance"):
+    for name in ("time", "force_sd", "covariance", "across"):
         values = getattr(measurement, name)
         if values is not None:
             constant[name] = values
-    dims = {"force": ["point"], "curve": ["point"], "deflection": ["point"], "time": ["point"], "force_sd": ["point"]}
+    if measurement.motion is not None:
+        motion = {n: getattr(measurement.motion, n) for n in MOTION}
+        constant |= {f"motion_{n}": v for n, v in motion.items() if v is not None}
+        constant["places"] = measurement.on_path.astype(float)
+    dims = {n: ["point"] for n in ("force", "curve", "deflection", "time", "force_sd", "across", "places")}
+    dims |= {f"motion_{n}": ["station"] for n in MOTION}
     data = arviz.from_dict(
         **groups,
         observed_data={"force": measurement.force},
@@ -237,6 +247,9 @@ def measurement_of(data: Any) -> Measurement:
     about = json.loads(data.constant_data.attrs["measurement"])
     rig = component("rigs", about["rig"]["kind"])(**about["rig"]["lengths"])
     arrays = {k: np.asarray(data.constant_data[k].values, dtype=float) for k in data.constant_data.data_vars}
+    motion = {n: arrays.pop(f"motion_{n}") for n in MOTION if f"motion_{n}" in arrays}
+    places = arrays.pop("places").astype(int) if motion else None
+    whole = (motion["deflection"], motion.get("time"), about["full_range"], motion.get("across")) if motion else None
     if "covariance" in arrays:
         arrays.pop("force_sd", None)
     notes = {**about["provenance"], "notes": tuple(about["provenance"]["notes"])}
@@ -246,5 +259,7 @@ def measurement_of(data: Any) -> Measurement:
         specimen=Specimen(**about["specimen"]),
         provenance=Provenance(**notes),
         full_range=about["full_range"],
+        motion=None if whole is None else Motion(*whole),
+        places=places,
         **arrays,
     )

@@ -48,12 +48,12 @@ class Gap:
     def tautness(self) -> float:
         """What pre-stretch weighs against deflection in the film, relative to the strip.
 
-        Film: F = 2 pi T delta / ln(R2/R1) under the tension T alone and c G d delta^3 without any; strip: T delta / L and
-        2 G d delta^3 / L^3, both times its width.
+        Film: F = 2 pi T delta / ln(R2/R1) under the tension T alone and c G d delta^3 without any; strip: T delta / L
+        and 2 G d delta^3 / L^3, both times its width.
         """
         small = np.array([1e-2 * self.inner_radius])
-        radii = {"inner_radius": self.inner_radius, "outer_radius": self.outer_radius}
-        cubic = float(solve(NeoHookean, [0.5], small, **radii).force[0, 0] / small[0] ** 3)
+        curve = solve(NeoHookean, [0.5], small, inner_radius=self.inner_radius, outer_radius=self.outer_radius)
+        cubic = float(curve.force[0, 0] / small[0] ** 3)
         return float(2 * np.pi / np.log(self.outer_radius / self.inner_radius) * 2 / (cubic * self.length**2))
 
     @property
@@ -113,7 +113,7 @@ class FilmLaw:
     def replaced(self, rows: NDArray[np.int64], other: FilmLaw) -> FilmLaw:
         """This law with the films at ``rows`` from another one, whose knots are at least as many."""
         room = other.pieces.shape[1] - self.pieces.shape[1]
-        wide = {"pieces": np.pad(self.pieces, ((0, 0), (0, room), (0, 0)))}
+        wide: dict[str, Any] = {"pieces": np.pad(self.pieces, ((0, 0), (0, room), (0, 0)))}
         if self.tangents is not None:
             wide["tangents"] = np.pad(self.tangents, ((0, 0), (0, room), (0, 0), (0, 0)))
         for name in ("prestretch", "step", "last", "status"):
@@ -181,7 +181,9 @@ def knots(gap: Gap, end: Array, count: int) -> Array:
     return np.asarray(WIDTH * gap.length * np.sinh(u[:, None] * (np.arange(count) + 0.5)))
 
 
-def law(gap: Gap, prestretch: Array, deflection: Array, force: Array, slope: Array, status: Array) -> FilmLaw:
+def law(
+    gap: Gap, prestretch: Array, deflection: Array, force: Array, slope: Array, status: NDArray[np.int8]
+) -> FilmLaw:
     """The law through forces and slopes (B, J) at `knots`; what follows the first knot without a force is left out."""
     bad = (status != Status.OK) | ~(force > 0)
     last = np.where(np.any(bad, axis=1), np.argmax(bad, axis=1), force.shape[1])
@@ -228,7 +230,7 @@ def error(found: FilmLaw, force: Array, slope: Array, deflection: Array) -> Arra
     """
     third = slice(1, None, 3)
     ok = np.arange(force.shape[1]) < found.last[:, None]
-    status = np.where(ok[:, third], Status.OK, Status.UNRESOLVED)
+    status = np.where(ok[:, third], Status.OK, Status.UNRESOLVED).astype(np.int8)
     coarse = law(found.gap, found.prestretch, deflection[:, third], force[:, third], slope[:, third], status)
     guess, _ = coarse(deflection)
     with np.errstate(invalid="ignore"):
@@ -237,7 +239,7 @@ def error(found: FilmLaw, force: Array, slope: Array, deflection: Array) -> Arra
 
 @cache
 def _spline_slopes(count: int) -> tuple[Array, Array]:
-    """Matrices (count, count) that take values at u = j + 1/2 of an even function to its first two derivatives there."""
+    """Matrices (count, count) from values at j + 1/2 of an even function to its first two derivatives there."""
     at = np.arange(count) + 0.5
     both = np.concatenate([-at[::-1], at])
     unit = np.eye(count)
@@ -307,10 +309,11 @@ def _evaluate(pieces, step, last, prestretch, length, tautness, deflection, exce
                     force[b, n] = np.nan
                     slope[b, n] = np.nan
                 continue
-            stretch = 1.0 + excess[b, n] if longer else 1.0
+            extra = excess[b, n] if longer else 0.0
+            stretch = 1.0 + extra
             area = 1.0 / (stretch * stretch)
             q = x * x
-            if longer:
+            if extra > 0.0:
                 q = (length * length + q) * area - length * length
             reach = 1.0 + q / (length * length)
             kappa = ((reach - 1.0) * (reach + 1.0) + (1.0 - ratio)) / (reach * reach)

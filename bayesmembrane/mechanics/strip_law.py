@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesmembrane.materials.base import Material
-from bayesmembrane.mechanics.solution import Status
+from bayesmembrane.mechanics.convexity import least_eigenvalue
+from bayesmembrane.mechanics.solution import Curves, Status
 from bayesmembrane.parameters import Array
 from bayesmembrane.rigs.base import Strip
 
@@ -21,12 +22,14 @@ class StripLaw:
     material, parameters : the films (B, n)
     rig : length, width and lateral stretch
     pushes : True if the specimen bears compression; else it is slack there
+    across : (N,) stretch across the pull where it was measured, or None
     """
 
     material: type[Material]
     parameters: Array
     rig: Strip
     pushes: bool = False
+    across: Array | None = None
 
     @property
     def status(self) -> NDArray[np.int8]:
@@ -41,7 +44,7 @@ class StripLaw:
         longer = 1.0 if excess is None else 1.0 + excess
         stretch = (1.0 + deflection / self.rig.length) / longer
         pulled = np.maximum(stretch, 1e-3 if self.pushes else 1.0)
-        l2, dl2 = self.rig.lateral(pulled)
+        l2, dl2 = self.rig.lateral(pulled, self.across)
         with np.errstate(all="ignore"):
             _, p1, _, p11, p12, _ = self.material.derivatives(self.parameters.T[:, :, None], pulled, l2)
         width = self.rig.width
@@ -59,16 +62,28 @@ class StripLaw:
         return replace(laws[0], parameters=np.concatenate([law.parameters for law in laws]))
 
 
-def margins(material: type[Material], films: Array, rig: Strip, deflection: Array) -> tuple[Array, Array]:
-    """((B, M), (B, M)): least eigenvalue of the Hessian of W, and least of P11 and P22, over G d.
-
-    films : (B, n) membrane parameters
-    deflection : (M,) m, states at which they are taken; nan where there is none
-    """
-    stretch = np.maximum(1.0 + deflection / rig.length, 1e-3)
-    l2, _ = rig.lateral(stretch)
+def strip_curves(law: StripLaw, deflection: Array, sensitivities: bool = False) -> Curves:
+    """Curves of the films of ``law`` at ``deflection`` (N,) m, which all are where ``across`` is, if that is given."""
+    d = np.broadcast_to(deflection, (len(law.parameters), deflection.size))
+    force, slope = law(d)
+    stretch = np.maximum(1.0 + d / law.rig.length, 1e-3)
+    l2, _ = law.rig.lateral(stretch, law.across)
+    p = law.parameters.T[:, :, None]
     with np.errstate(all="ignore"):
-        *_, a, b, c = material.derivatives(films.T[:, :, None], stretch, l2)
-        gd = np.abs(np.asarray(material.shear_modulus(films.T)))[:, None]
-        least = 0.5 * (a + c) - np.sqrt(0.25 * (a - c) ** 2 + b * b)
-    return np.asarray(least / gd), np.asarray(np.minimum(a, c) / gd)
+        w, _, _, a, b, c = law.material.derivatives(p, stretch, l2)
+        rates = np.stack([s[1] + 0.0 * stretch for s in law.material.sensitivities(p, stretch, l2)], axis=2)
+        gd = np.abs(np.asarray(law.material.shear_modulus(law.parameters.T)))[:, None]
+    zero = np.zeros(d.shape)
+    return Curves(
+        deflection=d,
+        force=force,
+        status=np.where(np.isfinite(force), Status.OK, Status.LOCKED).astype(np.int8),
+        note=np.zeros(d.shape, np.int8),
+        slope=slope,
+        sensitivity=np.where((force == 0)[:, :, None], 0.0, law.rig.width * rates) if sensitivities else None,
+        variation=zero,
+        max_stretch=np.maximum(stretch, l2),
+        ellipticity=np.asarray(np.minimum(a, c) / gd),
+        convexity=np.asarray(least_eigenvalue(a, b, c) / gd),
+        energy=w * law.rig.width * law.rig.length + zero,
+    )

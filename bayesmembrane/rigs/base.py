@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from typing import ClassVar
 
 from bayesmembrane.errors import DataError
 from bayesmembrane.parameters import Array
 from bayesmembrane.units import RATIO, STRESS
-
-KINDS = ("annulus", "uniaxial", "equibiaxial", "planar", "biaxial")
-"""Every kind of rig that a specimen file may name; those without a file in this folder are not supported."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +41,25 @@ class Rig(ABC):
     def size(self) -> float:
         """The length in m that deflections and thicknesses are judged against: a film much larger is a wrong unit."""
 
+    def from_columns(self, found: Mapping[str, Array], thickness: float) -> dict[str, Array]:
+        """``deflection`` (m), ``force`` (N), their ``force_sd`` and others, from the columns of a curve in SI."""
+        return dict(found)
+
+    def to_columns(self, arrays: Mapping[str, Array], thickness: float) -> dict[str, Array]:
+        """The inverse of `from_columns`: header names with units -> values."""
+        units = {"time": ("time_s", 1.0), "deflection": ("deflection_mm", 1e3)}
+        names = {k: units.get(k, (f"{k}_N", 1.0)) for k in arrays}
+        return {names[k][0]: names[k][1] * v for k, v in arrays.items()}
+
     @property
     def lengths(self) -> dict[str, float]:
         """The fields by name, in m."""
         return {f.name: float(getattr(self, f.name)) for f in fields(self)}
+
+    @classmethod
+    def has_default(cls, name: str) -> bool:
+        """True if a specimen file may leave this length out."""
+        return next(f for f in fields(cls) if f.name == name).default is not MISSING
 
     @classmethod
     def length_names(cls) -> tuple[str, ...]:
@@ -74,5 +86,16 @@ class Strip(Rig, ABC):
 
     @staticmethod
     @abstractmethod
-    def lateral(stretch: Array) -> tuple[Array, Array]:
-        """(l2, dl2/dl) at stretches l; the film is isotropic and incompressible."""
+    def lateral(stretch: Array, across: Array | None = None) -> tuple[Array, Array]:
+        """(l2, dl2/dl) at stretches l (B, N); ``across`` (N,) is l2 where it was measured."""
+
+    def from_columns(self, found: Mapping[str, Array], thickness: float) -> dict[str, Array]:
+        rest = {k: v for k, v in found.items() if k not in ("stretch", "nominal_stress")}
+        deflection = self.length * (found["stretch"] - 1.0)
+        return {**rest, "deflection": deflection, "force": found["nominal_stress"] * self.width * thickness}
+
+    def to_columns(self, arrays: Mapping[str, Array], thickness: float) -> dict[str, Array]:
+        out = {"time_s": arrays["time"]} if "time" in arrays else {}
+        out["stretch"] = 1.0 + arrays["deflection"] / self.length
+        out["nominal_stress_MPa"] = 1e-6 * arrays["force"] / (self.width * thickness)
+        return out | ({"force_sd_N": arrays["force_sd"]} if "force_sd" in arrays else {})

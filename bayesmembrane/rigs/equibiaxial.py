@@ -22,5 +22,5 @@ class Equibiaxial(Strip):
     title: ClassVar[str] = "equibiaxial film"
 
     @staticmethod
-    def lateral(stretch: Array) -> tuple[Array, Array]:
+    def lateral(stretch: Array, across: Array | None = None) -> tuple[Array, Array]:
         return stretch, np.ones_like(stretch)

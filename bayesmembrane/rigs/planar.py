@@ -22,5 +22,5 @@ class Planar(Strip):
     title: ClassVar[str] = "planar strip (pure shear)"
 
     @staticmethod
-    def lateral(stretch: Array) -> tuple[Array, Array]:
+    def lateral(stretch: Array, across: Array | None = None) -> tuple[Array, Array]:
         return np.ones_like(stretch), np.zeros_like(stretch)

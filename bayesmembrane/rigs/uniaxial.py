@@ -22,5 +22,5 @@ class Uniaxial(Strip):
     title: ClassVar[str] = "uniaxial strip"
 
     @staticmethod
-    def lateral(stretch: Array) -> tuple[Array, Array]:
+    def lateral(stretch: Array, across: Array | None = None) -> tuple[Array, Array]:
         return 1 / np.sqrt(stretch), -0.5 * stretch**-1.5
