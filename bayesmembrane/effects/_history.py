@@ -10,7 +10,7 @@ from bayesmembrane.parameters import Array, LogNormal, Uniform
 from bayesmembrane.protocol import Path
 
 EXPONENT = EffectParameter(
-    "exponent", "-", "power of the deflection with which it grows", LogNormal(2.0, 0.7), (0.2, 10.0)
+    "exponent", "-", "power of the deflection with which it grows", LogNormal(2.0, 0.7), (0.2, 20.0)
 )
 REPEATED = EffectParameter(
     "repeated",

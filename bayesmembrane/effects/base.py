@@ -132,11 +132,6 @@ class State:
         """(B, N) m: largest deflection so far."""
         return running_max(self.deflection)
 
-    @cached_property
-    def work(self) -> Array:
-        """(B, N) F delta in N m: grows with the stored energy, of which it is three to four times as much or less."""
-        return self.force * np.maximum(self.deflection, 0.0)
-
 
 def running_max(values: Array) -> Array:
     """(B, N) max(0, largest so far) along the path."""

@@ -8,16 +8,16 @@ from typing import ClassVar
 import numpy as np
 from scipy.special import erf
 
-from bayesmembrane.effects.base import Carried, EffectParameter, State, running_max
+from bayesmembrane.effects.base import Carried, EffectParameter, State
 from bayesmembrane.parameters import Array, HalfNormal, LogNormal
 
 
 @dataclass(frozen=True)
 class Mullins(Carried):
-    """F = F0 (1 - softening erf((w_max - w) / (width w_full + w_max / 4))), with the work w = F0 delta.
+    """F = F0 (1 - softening erf((m^2 - delta^2) / (width D^2 + m^2 / 4))), m: largest deflection so far.
 
-    w_max is its largest value so far and w_full that of the whole test: unloading runs below loading, and reloading
-    rejoins.
+    Far out the stored energy of the reference grows like delta^2, which stands for it here; D is the full range of the
+    test. Unloading runs below loading, and reloading rejoins at m.
     """
 
     name: ClassVar[str] = "mullins"
@@ -34,16 +34,13 @@ class Mullins(Carried):
         EffectParameter(
             "width",
             "-",
-            "drop in work, relative to that of the whole test, over which it is lost",
+            "drop in delta^2 over which it is lost, relative to the square of the full range",
             LogNormal(0.3, 1.0),
             (0.01, 10.0),
         ),
     )
 
     def carried(self, p: Array, force: Array, state: State) -> Array:
-        work = state.work
-        largest = running_max(work)
-        # nan where the film has no force: such a draw has no reading anyway.
-        full = np.max(largest, axis=1, keepdims=True)
-        scale = np.maximum(p[:, 1:2] * full + 0.25 * largest, 1e-300)
-        return np.asarray(force * (1.0 - p[:, :1] * erf((largest - work) / scale)))
+        now, largest = np.maximum(state.deflection, 0.0) ** 2, state.reached**2
+        scale = p[:, 1:2] * state.path.full_range**2 + 0.25 * largest
+        return np.asarray(force * (1.0 - p[:, :1] * erf((largest - now) / scale)))
