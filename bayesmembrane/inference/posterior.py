@@ -125,6 +125,11 @@ class Posterior:
         """ln p(y | x), (B,); -inf where the film has no curve, or is not followed since the prior rules it out."""
         return self.evaluate(x).log_likelihood
 
+    def given(self, force: Array, x: Array) -> Array:
+        """(B,) ln p0(x) + ln p(y | x) if the curves of x (B, k) were ``force`` (B, N): what an emulator asks."""
+        residual = self.measurement.force - force
+        return self.prior.log_density(x) + self.noise.log_likelihood(residual, self.hypothesis.noise_coordinates(x))
+
     def pointwise(self, x: Array, force: Array) -> Array:
         """ln p(y_i | other y, x) of draws x (B, k) with curves ``force`` (B, N), shape (B, N)."""
         return self.noise.pointwise(self.measurement.force - force, self.hypothesis.noise_coordinates(x))

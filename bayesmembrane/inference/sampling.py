@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import arviz
@@ -14,6 +14,7 @@ import numpy as np
 from emcee.autocorr import integrated_time
 
 from bayesmembrane.errors import SettingsError
+from bayesmembrane.inference.emulator import Emulator, emulate
 from bayesmembrane.inference.initial import starting_points
 from bayesmembrane.inference.posterior import Posterior, tally
 from bayesmembrane.parameters import Array
@@ -23,6 +24,10 @@ BURN_TAUS = 10
 LEAST_STEPS = 20  # fewer say nothing
 R_HAT = 1.01
 GROWTH = 1.25  # a look costs little, but nothing is learned from looking at every step
+FIRST_LESSON, NEXT_LESSON = 100, 2
+"""The proposal is learned from the chains after so many steps, and anew after so many times as many while fewer than
+half of the autocorrelation times are there. What came before never counts: only a fixed proposal makes a chain."""
+LEARNED_SHARE = 0.6
 
 
 @dataclass(frozen=True)
@@ -72,6 +77,7 @@ class Chains:
     random_states : state of each ensemble's generator, as NumPy gives it
     counts : outcomes of all evaluations, by label
     seconds : time spent
+    lessons : steps after which the proposal was learned
     """
 
     x: Array
@@ -79,6 +85,7 @@ class Chains:
     random_states: tuple[Any, ...]
     counts: Counter[str]
     seconds: float
+    lessons: tuple[int, ...] = ()
 
     @property
     def steps(self) -> int:
@@ -154,14 +161,16 @@ def run_ensembles(
     """
     counts: Counter[str] = Counter() if chains is None else Counter(chains.counts)
     walkers = _walkers(posterior, settings) if chains is None else chains.x.shape[2]
-    samplers = [_sampler(posterior, walkers, counts) for _ in range(settings.ensembles)]
     began = time.perf_counter() - (0.0 if chains is None else chains.seconds)
     if chains is None:
         chains = _start(posterior, settings, seed, counts)
+    sampler = _sampler(posterior, walkers, counts, learned(posterior, chains))
     target, status = max(settings.chunk, chains.steps), "interrupted"
     try:
         while True:
-            chains = _walk(samplers, chains, target, counts, began)
+            lesson = _next_lesson(chains)
+            stop = target if lesson <= chains.steps else min(target, lesson)
+            chains = _walk(sampler, chains, stop, counts, began)
             found = convergence(chains)
             if progress is not None:
                 progress(_progress(chains, found, settings))
@@ -171,6 +180,9 @@ def run_ensembles(
             if chains.steps >= settings.most_steps:
                 status = "step limit"
                 break
+            if chains.steps >= _next_lesson(chains):
+                chains = replace(chains, lessons=(*chains.lessons, chains.steps))
+                sampler = _sampler(posterior, walkers, counts, learned(posterior, chains))
             target = min(settings.most_steps, _next_look(chains.steps, found, settings))
     except KeyboardInterrupt:
         found = convergence(chains)
@@ -180,14 +192,16 @@ def run_ensembles(
 def convergence(chains: Chains) -> Convergence:
     """Autocorrelation times, burn-in, ESS, R-hat and acceptance of what was walked so far.
 
-    Burn-in is ten autocorrelation times of the second half, and half of the steps at most.
+    Burn-in is ten autocorrelation times of the second half, and half of the steps at most, but all the steps from which
+    the proposal was learned.
     """
     steps, walkers = chains.x.shape[1:3]
     if steps < LEAST_STEPS:
         unknown = np.full(chains.x.shape[3], np.inf)
         return Convergence(unknown, 0, 1 / unknown, unknown, 0.0, 0.0)
-    tau = _tau(chains.x[:, steps // 2 :])
-    burn = min(steps // 2, int(np.ceil(BURN_TAUS * np.max(tau))))
+    learned = max((s for s in chains.lessons if s <= steps - LEAST_STEPS), default=0)
+    tau = _tau(chains.x[:, max(learned, steps // 2) :])
+    burn = max(learned, min(steps // 2, int(np.ceil(BURN_TAUS * np.max(tau)))))
     kept = chains.x[:, burn:]
     tau = _tau(kept)
     flat = kept[:, :: max(1, int(np.max(tau) / 4))].reshape(kept.shape[0], -1, kept.shape[-1])
@@ -239,8 +253,28 @@ def _walkers(posterior: Posterior, settings: Settings) -> int:
     return settings.walkers or 16 * -(-4 * posterior.size // 16)
 
 
-def _sampler(posterior: Posterior, walkers: int, counts: Counter[str]) -> Any:
-    """An ensemble that proposes by differential evolution, snooker and stretch.
+def learned(posterior: Posterior, chains: Chains) -> Emulator | None:
+    """The emulator on which proposals walk, from the later half of what all ensembles walked until the last lesson.
+
+    It follows from the chains alone, so that a run that was interrupted learns the same again.
+    """
+    if not chains.lessons:
+        return None
+    end = chains.lessons[-1]
+    x = chains.x[:, end // 4 : end].reshape(-1, chains.x.shape[-1])
+    try:
+        return emulate(posterior, x, np.random.default_rng(end))
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _next_lesson(chains: Chains) -> int:
+    """Steps after which the proposal may be learned (anew)."""
+    return int(NEXT_LESSON * chains.lessons[-1]) if chains.lessons else FIRST_LESSON
+
+
+def _sampler(posterior: Posterior, walkers: int, counts: Counter[str], emulator: Emulator | None) -> Any:
+    """An ensemble that proposes by differential evolution, snooker and stretch, and by walks on an emulator.
 
     The first two suit curved valleys; differential evolution with gamma = 1 jumps between valleys.
     """
@@ -250,13 +284,25 @@ def _sampler(posterior: Posterior, walkers: int, counts: Counter[str]) -> Any:
         counts.update(tally(e.outcome))
         return e.log_posterior
 
+    share = 1.0 if emulator is None else 1 - LEARNED_SHARE
     moves = [
-        (emcee.moves.DEMove(), 0.6),
-        (emcee.moves.DEMove(gamma0=1.0), 0.1),
-        (emcee.moves.DESnookerMove(), 0.1),
-        (emcee.moves.StretchMove(), 0.2),
+        (emcee.moves.DEMove(), 0.6 * share),
+        (emcee.moves.DEMove(gamma0=1.0), 0.1 * share),
+        (emcee.moves.DESnookerMove(), 0.1 * share),
+        (emcee.moves.StretchMove(), 0.2 * share),
     ]
+    if emulator is not None:
+        moves.append((emcee.moves.MHMove(_surrogate(emulator)), LEARNED_SHARE))
     return emcee.EnsembleSampler(walkers, posterior.size, log_probability, moves=moves, vectorize=True)
+
+
+def _surrogate(emulator: Emulator) -> Callable[[Array, Any], tuple[Array, Array]]:
+    """The proposal of a Metropolis-Hastings move: where a walk on the emulator ends, and its factor."""
+
+    def propose(x: Array, random: Any) -> tuple[Array, Array]:
+        return emulator.walk(x, np.random.default_rng(random.randint(2**31, size=4)))
+
+    return propose
 
 
 def _start(posterior: Posterior, settings: Settings, seed: int, counts: Counter[str]) -> Chains:
@@ -269,13 +315,14 @@ def _start(posterior: Posterior, settings: Settings, seed: int, counts: Counter[
     return Chains(x[:, None], lp[:, None], states, counts, 0.0)
 
 
-def _walk(samplers: list[Any], chains: Chains, target: int, counts: Counter[str], began: float) -> Chains:
+def _walk(sampler: Any, chains: Chains, target: int, counts: Counter[str], began: float) -> Chains:
     """Advance every ensemble to ``target`` steps; what an interruption cuts is dropped: all stay equally long."""
     more = target - chains.steps
     if more <= 0:
         return chains
     x, lp, states = [], [], []
-    for e, sampler in enumerate(samplers):
+    for e in range(len(chains.x)):
+        sampler.reset()
         start = emcee.State(chains.x[e, -1], chains.log_posterior[e, -1], random_state=chains.random_states[e])
         xs, lps = np.empty((more, *chains.x.shape[2:])), np.empty((more, chains.x.shape[2]))
         state = start
@@ -284,4 +331,5 @@ def _walk(samplers: list[Any], chains: Chains, target: int, counts: Counter[str]
         x.append(np.concatenate([chains.x[e], xs]))
         lp.append(np.concatenate([chains.log_posterior[e], lps]))
         states.append(state.random_state)
-    return Chains(np.stack(x), np.stack(lp), tuple(states), Counter(counts), time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    return Chains(np.stack(x), np.stack(lp), tuple(states), Counter(counts), seconds, chains.lessons)

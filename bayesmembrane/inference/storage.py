@@ -186,6 +186,7 @@ def _save_chains(path: Path, chains: Chains) -> None:
             log_posterior=chains.log_posterior,
             counts=np.array(json.dumps(chains.counts)),
             seconds=np.array(chains.seconds),
+            lessons=np.array(chains.lessons, dtype=int),
             **states,
         )
 
@@ -202,7 +203,8 @@ def read_chains(folder: Path) -> Chains | None:
                 for e, rest in ((e, f[f"rest{e}"]) for e in range(len(f["x"])))
             )
             counts = Counter(json.loads(str(f["counts"])))
-            return Chains(f["x"], f["log_posterior"], states, counts, float(f["seconds"]))
+            lessons = tuple(int(s) for s in f["lessons"])
+            return Chains(f["x"], f["log_posterior"], states, counts, float(f["seconds"]), lessons)
     except (OSError, ValueError, KeyError) as error:
         raise StorageError(
             f"the chains are damaged ({error})", str(path), "remove the folder and sample again"
