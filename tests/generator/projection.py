@@ -37,11 +37,17 @@ class Projector:
 
 
 def sized(
-    snr: Callable[[float], float], target: float, start: float, largest: float, tolerance: float = 0.005
+    snr: Callable[[float], float],
+    target: float,
+    start: float,
+    largest: float,
+    tolerance: float = 0.005,
+    most: int = 25,
 ) -> float:
     """The size whose ratio is ``target`` within ``tolerance``; if that is too weak, ``largest`` or where solutions end.
 
-    The ratio grows about as a power of the size; the power is learnt from the last two sizes.
+    The ratio grows about as a power of the size; the power is learnt from the last two sizes. The nearest of ``most``
+    trials is returned, so the caller checks the ratio.
     """
     if target <= 0:
         return 0.0
@@ -55,7 +61,7 @@ def sized(
     size, power = min(start, largest), 1.0
     low, high, before = 0.0, largest, None
     best = (np.inf, size)
-    for _ in range(25):
+    for _ in range(most):
         here = level(size)
         if np.isfinite(here) and abs(here) < best[0]:
             best = (abs(here), size)
@@ -103,6 +109,7 @@ def best_fit(
     """Parameters of a declarable ``family`` closest to ``force`` (N,), and the whitened residual.
 
     Signs of the start are kept where the family needs them; Gent's limit moves as its reciprocal, which may vanish.
+    Within 25 steps, which the six parameters of an Ogden film may outlast: its residual is a bound from above.
     """
     lower = np.linalg.cholesky(covariance)
     logs = {"ogden": np.ones(6, bool), "gent": np.array([True, False])}.get(family, np.zeros(start.size, bool))
@@ -140,6 +147,6 @@ def best_fit(
     if family == "ogden":
         low[3:], high[3:] = np.log(0.4), np.log(2.5)
     fit = least_squares(
-        residual, first, jacobian, (low, high), x_scale="jac", ftol=1e-4, xtol=1e-6, gtol=1e-6, max_nfev=40
+        residual, first, jacobian, (low, high), x_scale="jac", ftol=1e-4, xtol=1e-6, gtol=1e-6, max_nfev=25
     )
     return parameters(fit.x), fit.fun
