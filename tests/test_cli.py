@@ -136,3 +136,41 @@ def test_an_unwritable_folder_is_one_sentence(run: Run, tmp_path: Path) -> None:
     assert "Traceback" not in err
     assert "cannot be stored" in err.strip().splitlines()[-1]
     assert blocked.read_text() == "mine"
+
+
+def test_fit_finds_effects_in_a_curve_of_the_other_solver(run: Run, tmp_path: Path) -> None:
+    """The curve is shot, and the shift and the frame are put in by hand, point by point."""
+    film, shift, compliance = [8.0, -0.2, 0.03], 6e-4, 4e-4
+    knots = np.linspace(1e-3, 0.07, 60)
+    shot = solve(material("yeoh"), film, knots, inner_radius=0.01, outer_radius=0.035, solver="shooting").force[0]
+    deflection = knots + compliance * shot + shift
+    force = shot + 1e-3 * np.random.default_rng(4).standard_normal(knots.size)
+    rows = "".join(f"{1e3 * d!r},{f!r}\n" for d, f in zip(deflection.tolist(), force.tolist(), strict=True))
+    (tmp_path / "c.csv").write_text("deflection_mm,force_N\n" + rows)
+    (tmp_path / "c.toml").write_text(
+        '[specimen]\nthickness_um = 50\n[rig]\nkind = "annulus"\ninner_radius_mm = 10\nouter_radius_mm = 35\n'
+    )
+    base = ["fit", tmp_path / "c.csv", "--specimen", tmp_path / "c.toml", "--material", "yeoh", "--json"]
+    code, out, _ = run(*base, "--effects", "zero_offset,machine_compliance")
+    found = json.loads(out)["parameters"]
+    assert code == 0
+    for name, truth in (("zero_offset.shift", shift), ("machine_compliance.compliance", compliance), ("c1", film[0])):
+        assert abs(found[name]["value"] - truth) < 4 * found[name]["sd"]
+        assert found[name]["sd"] < 0.2 * truth
+    _, plain, _ = run(*base)
+    assert json.loads(plain)["rmse_N"] > 2 * json.loads(out)["rmse_N"]
+
+
+@pytest.mark.parametrize(
+    ("effects", "sentence"),
+    [
+        ("zero_ofset", 'no effect called "zero_ofset"; did you mean "zero_offset"'),
+        ("mullins,mullins", 'the effect "mullins" is named twice'),
+        ("rate", 'the effect "rate" needs times'),
+    ],
+)
+def test_an_effect_that_cannot_be_is_refused_in_a_sentence(run: Run, effects: str, sentence: str) -> None:
+    code, _, err = run("fit", CURVE, "--specimen", SPECIMEN, "--material", "yeoh", "--effects", effects)
+    assert code == 1
+    assert sentence in " ".join(err.split())
+    assert "Traceback" not in err

@@ -14,10 +14,11 @@ from bayesmembrane.parameters import Array, HalfNormal, LogNormal
 
 @dataclass(frozen=True)
 class Mullins(Carried):
-    """F = F0 (1 - softening erf((m^2 - delta^2) / (width D^2 + m^2 / 4))), m: largest deflection so far.
+    """F = F0 (1 - softening erf((1 - (delta / m)^power) / w) / erf(1 / width)), w = width (D / m)^fading.
 
-    Far out the stored energy of the reference grows like delta^2, which stands for it here; D is the full range of the
-    test. Unloading runs below loading, and reloading rejoins at m.
+    m is the largest deflection so far and D the full range of the test. (delta / m)^power stands for the stored energy
+    relative to its maximum W_m: the reference's erf((W_m - W) / (a + b W_m)) with b = 0 is fading = power, with a = 0
+    it is fading = 0. Unloading runs below loading, and reloading rejoins at m.
     """
 
     name: ClassVar[str] = "mullins"
@@ -29,18 +30,32 @@ class Mullins(Carried):
     )
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
-            "softening", "-", "part of the force that is lost far below the maximum", HalfNormal(0.2), (0.0, 0.95), 0.0
+            "softening",
+            "-",
+            "part of the force that is lost on return to zero from the full range",
+            HalfNormal(0.2),
+            (0.0, 0.95),
+            0.0,
         ),
         EffectParameter(
             "width",
             "-",
-            "drop in delta^2 over which it is lost, relative to the square of the full range",
-            LogNormal(0.3, 1.0),
-            (0.01, 10.0),
+            "drop in energy over which it is lost, relative to the maximum",
+            LogNormal(0.5, 1.0),
+            (0.01, 20.0),
+        ),
+        EffectParameter(
+            "fading", "-", "power with which this drop is larger after a smaller maximum", HalfNormal(1.5), (0.0, 8.0)
+        ),
+        EffectParameter(
+            "power", "-", "power of the deflection with which the energy grows", LogNormal(2.0, 0.4), (0.5, 8.0)
         ),
     )
 
     def carried(self, p: Array, force: Array, state: State) -> Array:
-        now, largest = np.maximum(state.deflection, 0.0) ** 2, state.reached**2
-        scale = p[:, 1:2] * state.path.full_range**2 + 0.25 * largest
-        return np.asarray(force * (1.0 - p[:, :1] * erf((largest - now) / scale)))
+        m, full = state.reached, state.path.full_range
+        with np.errstate(all="ignore"):
+            part = np.where(m > 0, np.maximum(state.deflection, 0.0) / m, 1.0)
+            wide = p[:, 1:2] * (full / np.maximum(m, 1e-6 * full)) ** p[:, 2:3]
+        lost = erf((1.0 - part ** p[:, 3:4]) / wide) / erf(1.0 / p[:, 1:2])
+        return np.asarray(force * np.maximum(1.0 - p[:, :1] * lost, 0.0))
