@@ -33,7 +33,7 @@ Law = Any
 """(deflection (B, N), excess (B, N) or None) -> (force (B, N), slope (B, N)), and ``status`` (B,) where it is nan."""
 
 MOST_ITERATIONS = 40
-CLOSED = 1e-10  # of the largest deflection: the loop around the frame ends there
+CLOSED = 1e-11  # of the largest deflection: the loop around the frame ends there
 SHORT, STEEP = 1e-7, 5.0  # a secant over a shorter step is round-off, a steeper one no slope
 # Steps of differences: in material coordinates, which are of order one, and relative to an effect's expected size; a
 # film that is mounted differently is solved again, to a tenth of 1e-6.
@@ -68,6 +68,11 @@ class Composition:
         stages = [isinstance(e, Geometry) for e in self.effects for _ in e.coordinates]
         return np.array(stages, dtype=bool)
 
+    @property
+    def yields(self) -> bool:
+        """True if there is a loop around the frame to close."""
+        return any(isinstance(e, Compliance) for e in self.effects)
+
     def prestretch(self, x: Array) -> Array:
         """(B,) pre-stretch of films with effect parameters x (B, k)."""
         out = np.ones(len(x))
@@ -85,22 +90,23 @@ class Composition:
         """(B,) m: the largest deflection that a film may see."""
         return np.asarray(np.max(self.given(x, self._measured(len(x))), axis=1))
 
-    def __call__(self, law: Law, x: Array) -> tuple[Array, NDArray[np.int8]]:
-        """(reading (B, N) N, status (B, N)) of films with effect parameters x (B, k)."""
-        _, force = self.closed(law, x)
+    def __call__(self, law: Law, x: Array, start: Array | None = None) -> tuple[Array, NDArray[np.int8]]:
+        """(reading (B, N) N, status (B, N)) of films with effect parameters x (B, k); ``start`` as in `closed`."""
+        _, force = self.closed(law, x, start)
         for effect, p in self._acting(Sensor, x):
             force = effect.read(p, force, self.path)
         status = np.where(np.isfinite(force), Status.OK, law.status[:, None]).astype(np.int8)
         return np.where(status == Status.OK, force, np.nan), status
 
-    def closed(self, law: Law, x: Array) -> tuple[Array, Array]:
+    def closed(self, law: Law, x: Array, start: Array | None = None) -> tuple[Array, Array]:
         """((B, N) m, (B, N) N): deflection and force of the film, with delta + u(F(delta)) = the measured deflection.
 
-        Newton's method, at first with the slope of a film without memory, then with secants.
+        Newton's method, at first with the slope of a film without memory, then with secants, from ``start`` (B, N) or
+        from what is measured.
         """
         measured = self._measured(len(x))
         frame = self._acting(Compliance, x)
-        delta = measured
+        delta = measured if start is None or not frame else start
         force, slope = self.film(law, x, delta)
         if not frame:
             return delta, force
@@ -171,7 +177,10 @@ def differences(
         laws.append(mounted(moved) if mounting else law)
         points.append(moved)
         steps.append(step)
-    reading, status = composition(type(law).stack(laws), np.concatenate(points))
+    start = None
+    if composition.yields:
+        start = np.tile(composition.closed(law, x)[0], (len(laws), 1))
+    reading, status = composition(type(law).stack(laws), np.concatenate(points), start)
     reading = reading.reshape(len(steps), len(x), -1)
     slopes = (reading[1:] - reading[0]) / np.array(steps[1:]).reshape(-1, len(x), 1)
     return reading[0], status[: len(x)], np.moveaxis(slopes, 0, 2)
