@@ -283,6 +283,92 @@ def sample(
 
 
 @app.command()
+def valleys(
+    curve: Curve,
+    specimen: SpecimenFile,
+    material: Material,
+    effects: Effects = "",
+    ranges_mm: Annotated[
+        str, typer.Option("--ranges-mm", help="Ends of the ranges to compare, mm: 35.1,91.5. The whole curve without.")
+    ] = "",
+    loss_rise: Annotated[float, typer.Option(help="A valley fits within this part of the least loss.")] = 0.1,
+    convexity: Convexity = "reached",
+    noise: Noise = "white",
+    out_folder: Annotated[Path | None, typer.Option("--out", help="Also write the answer and a figure here.")] = None,
+    as_json: AsJson = False,
+    seed: Seed = 0,
+) -> None:
+    """How long the valley of the loss is, over one range or several, whether they meet, and what to measure next."""
+    from bayesmembrane.inference.valleys import valleys as run
+    from bayesmembrane.reporting.valley_section import valley_table, write_valleys
+
+    measurement, claim = _asked(curve, specimen, material, effects, None, convexity, noise)
+    ends = [1e-3 * end for end in numbers(ranges_mm, "--ranges-mm")] if ranges_mm else []
+    with log.status(f"Following the valleys of {claim.label()}"):
+        found = run(measurement, claim, ends, rise=loss_rise, seed=seed)
+    document = found.summary()
+    if out_folder is not None:
+        document["files"] = [str(f) for f in write_valleys(found, out_folder)]
+
+    def show() -> None:
+        shown = valley_table([found])
+        table(shown.caption, [c.head for c in shown.columns], shown.cells())
+        for sentence in found.sentences:
+            out.print(sentence)
+        for valley in found.ranges:
+            rows = [[t.test, f"{100 * t.reduction:.0f} %"] for t in valley.next_tests[:5]]
+            table(f"What to measure next, from data up to {1e3 * valley.end:.4g} mm", ["test", "shorter by"], rows)
+
+    answer(document, as_json, show)
+
+
+@app.command()
+def compare(
+    curve: Curve,
+    specimen: SpecimenFile,
+    materials: Annotated[str, typer.Option("--materials", help="By commas; yeoh+prestretch adds an effect to one.")],
+    effects: Annotated[str, typer.Option("--effects", help="Physical effects beside every material, by commas.")] = "",
+    max_deflection_mm: MaxDeflection = None,
+    ranges_mm: Annotated[
+        str, typer.Option("--ranges-mm", help="Compare on several ranges, by their ends in mm: 35.1,91.5.")
+    ] = "",
+    convexity: Convexity = "reached",
+    noise: Noise = "white",
+    ess: Annotated[float, typer.Option(help="Wanted effective sample size of the worst parameter.")] = 1000.0,
+    out_folder: Annotated[Path, typer.Option("--out", help="Folder of the runs.")] = Path("chains"),
+    as_json: AsJson = False,
+    seed: Seed = 0,
+) -> None:
+    """Which materials the data support, by two estimators of the evidence, with prediction beside it."""
+    from bayesmembrane.inference.comparison import claimed, compare_ranges, ranges_of
+    from bayesmembrane.reporting.comparison_section import evidence_table
+
+    claims = claimed(materials, effects, noise, convexity)
+    if ranges_mm and max_deflection_mm is not None:
+        raise SettingsError("the range is given twice", "--ranges-mm, --max-deflection-mm", "give one of them")
+    ends = numbers(ranges_mm, "--ranges-mm") if ranges_mm else [max_deflection_mm] if max_deflection_mm else []
+    ranges = ranges_of(_measurement(curve, specimen), [1e-3 * end for end in ends])
+    try:
+        with _lines() as tell:
+            found = compare_ranges(ranges, claims, seed, out=out_folder, ess=ess, progress=tell)
+    except KeyboardInterrupt:
+        log.print(f"Interrupted; what is finished is stored in {out_folder}. The same command resumes it: {_command()}")
+        raise typer.Exit(130) from None
+    answers = {name: c.summary() for name, c in found.items()}
+    document = {**list(answers.values())[-1], "ranges": [{"range": n, **a} for n, a in answers.items()]}
+
+    def show() -> None:
+        for name, comparison in found.items():
+            shown = evidence_table({name: comparison})
+            table(shown.caption, [c.head for c in shown.columns], shown.cells())
+            for sentence in (comparison.reason, comparison.sentence, comparison.survival):
+                if sentence:
+                    out.print(sentence)
+
+    answer(document, as_json, show)
+
+
+@app.command()
 def report(
     folders: Annotated[list[Path], typer.Argument(help="Run folders.", metavar="DIR...")],
     out_folder: Annotated[Path, typer.Option("--out", help="Folder of the page.")] = Path("reports/report"),

@@ -19,12 +19,15 @@ from bayesmembrane.errors import SettingsError, StorageError
 from bayesmembrane.inference.published import Compared
 from bayesmembrane.inference.reconstruction_result import Reconstruction
 from bayesmembrane.inference.run import Run
+from bayesmembrane.inference.valleys_result import Valleys
 from bayesmembrane.reporting import figures, sentences, tables
 from bayesmembrane.reporting.figures import Picture
 from bayesmembrane.reporting.reading import read
 from bayesmembrane.reporting.style import spoken
 from bayesmembrane.reporting.style import title as material_title
 from bayesmembrane.reporting.tables import Table
+from bayesmembrane.reporting.valley_figures import valley_picture
+from bayesmembrane.reporting.valley_section import alternative_text, next_table, valley_table
 from bayesmembrane.reporting.view import Shown
 
 GENERATOR = "bayesmembrane report"
@@ -61,6 +64,7 @@ def write_report(
     fits: Sequence[Compared] | None = None,
     title: str | None = None,
     cache: Tally | None = None,
+    valleys: Sequence[Valleys] | None = None,
 ) -> Path:
     """Write ``out/index.html`` and ``out/report.json`` about one run or several, and return the page's path.
 
@@ -72,6 +76,7 @@ def write_report(
     fits : our optima beside the paper's, from `inference.published.compare_with_paper`
     title : of the page; made of the specimens' names unless given
     cache : what the curve cache did while all this was computed
+    valleys : of some materials, from `inference.valleys`; shown in a section of their own
 
     A report of an earlier time is replaced, any other file is not: `StorageError`. The same error, or `DataError`,
     names a folder that holds no run; `SettingsError` says that there is none at all.
@@ -81,7 +86,7 @@ def write_report(
     for name in (PAGE, TWIN):
         _refuse_foreign(out / name)
     shown = [read(run) for run in runs]
-    return write_shown(shown, out, reconstruction, fits or (), title, cache)
+    return write_shown(shown, out, reconstruction, fits or (), title, cache, valleys)
 
 
 def write_shown(
@@ -91,6 +96,7 @@ def write_shown(
     compared: Sequence[Compared] = (),
     title: str | None = None,
     cache: Tally | None = None,
+    valleys: Sequence[Valleys] | None = None,
 ) -> Path:
     """As `write_report`, of runs that have been read."""
     shown = sorted(shown, key=lambda s: (s.digest.end, s.data_hash, s.hypothesis.curve_size, s.name))
@@ -102,6 +108,7 @@ def write_shown(
     parts = [_data(shown, reconstruction), _curves(shown), _comparison(shown, compared)]
     broken = [s for s in shown if s.digest.specimens]
     parts += [_break_points(broken)] if broken else []
+    parts += [_valleys(valleys)] if valleys else []
     parts += [_reconstruction(reconstruction)] if reconstruction is not None else []
     parts += [_run(s, _of(s, compared)) for s in shown]
     parts += [_checks(shown), _made(shown, cache)]
@@ -312,6 +319,21 @@ def _break_points(shown: Sequence[Shown]) -> Section:
         )
         blocks += [Block("list", lines=tuple(lines)), _table(tables.break_table(group))]
     return Section("break-points", "Break points: a prediction for other specimens", tuple(blocks))
+
+
+def _valleys(found: Sequence[Valleys]) -> Section:
+    blocks = [_table(valley_table(found))]
+    for f in found:
+        blocks.append(Block("heading", f.hypothesis.material.title))
+        caption = (
+            "Films that fit nearly as well as the best one, over the membrane parameters; the loss is the Euclidean "
+            "norm of the residual (N), without convexity prior."
+        )
+        picture = valley_picture(f)
+        blocks.append(Block("figure", picture=picture, alt=alternative_text(f), caption=caption))
+        blocks.append(Block("list", lines=f.sentences))
+        blocks += [_table(next_table(v)) for v in f.ranges if v.next_tests]
+    return Section("valleys", "Valleys of the loss", tuple(blocks))
 
 
 def _reconstruction(found: Reconstruction) -> Section:
