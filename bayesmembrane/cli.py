@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -435,6 +435,24 @@ def _bar(label: str) -> Iterator[Callable[[Progress], None]]:
     with Bars(*columns, console=log) as bars:
         task = bars.add_task(label, total=1.0, text="finding starts")
         yield lambda p: bars.update(task, completed=share(p), text=told(p))
+
+
+@contextmanager
+def _lines() -> Iterator[Callable[[str, str], None]]:
+    """A line on stderr for each label, with what is being done for it."""
+    from rich.progress import Progress as Lines
+    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TextColumn("{task.fields[text]}"))
+    with Lines(*columns, TimeElapsedColumn(), console=log) as lines:
+        tasks: dict[str, Any] = {}
+
+        def tell(label: str, text: str) -> None:
+            if label not in tasks:
+                tasks[label] = lines.add_task(label, total=None, text=text)
+            lines.update(tasks[label], text=text)
+
+        yield tell
 
 
 def _command() -> str:

@@ -1,7 +1,7 @@
 """What is computed for one hypothesis of a comparison, and kept beside its run so that it is computed once.
 
-nested.json, bridge.json, loo.json, widths.json, modes.json, range.json lie in the folder of the run, each with the key
-of what it was made from.
+nested.json, again.json, bridge.json, loo.json, widths.json, modes.json, range.json lie in the folder of the run, each
+with the key of what it was made from.
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ import hashlib
 import json
 import os
 import tempfile
+import tomllib
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +23,15 @@ from bayesmembrane.errors import DataError, SettingsError, StorageError
 from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.inference import storage
 from bayesmembrane.inference.evidence_bridge import bridge
+from bayesmembrane.inference.evidence_convexity import ByMode, by_convexity
 from bayesmembrane.inference.evidence_nested import nested
-from bayesmembrane.inference.evidence_sensitivity import ByMode, Widened, by_convexity, prior_widths
+from bayesmembrane.inference.evidence_sensitivity import Widened, prior_widths
 from bayesmembrane.inference.evidence_target import Estimate, PosteriorTarget
+from bayesmembrane.inference.initial import starting_points
 from bayesmembrane.inference.posterior import Posterior
 from bayesmembrane.inference.predictive_comparison import LeaveOneOut, LeaveRangeOut, leave_one_out, leave_range_out
 from bayesmembrane.inference.prior import Mass
-from bayesmembrane.inference.run import Run, sample
+from bayesmembrane.inference.run import Run, load_run, sample
 from bayesmembrane.inference.sampling import Progress, Settings
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.parameters import Array
@@ -35,7 +39,8 @@ from bayesmembrane.parameters import Array
 Tell = Callable[[str, str], None]
 """(label of a hypothesis, what is being done for it)."""
 
-MODE_ESS = 400.0
+AGAIN = 1_000_003  # added to the seed
+STARTS = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +50,7 @@ class Job:
     label : as tables name it
     whole : the measurement that ``measurement`` is the first part of, if the rest is to be predicted
     out : folder of all runs, None: nothing is stored
-    modes : whether evidence under every convexity mode is wanted, which takes a second sampling
+    modes : whether evidence under every convexity mode is wanted
     """
 
     label: str
@@ -102,13 +107,29 @@ def climb(job: Job, tell: Tell) -> Climbed:
             return Climbed(None, Mass(0.0, mass.sd), _no_mass(job.hypothesis))
 
         def make() -> dict[str, Any]:
-            target = PosteriorTarget(posterior)
-            return asdict(nested(target, job.seed, tell=lambda text: tell(job.label, text)))
+            return asdict(_nested(posterior, job.seed, lambda text: tell(job.label, text)))
 
-        found = _kept(_folder(job), "nested", _asked(job)["fingerprint"], make)
+        found = _kept(folder_of(job), "nested", _asked(job)["fingerprint"], make)
     except (SettingsError, DataError) as error:
         return Climbed(None, None, str(error))
     return Climbed(_estimate(found), mass, "")
+
+
+def _nested(posterior: Posterior, seed: int, tell: Callable[[str], None]) -> Estimate:
+    """Nested sampling that begins around every valley that a descent from prior draws finds."""
+    rng = np.random.default_rng([seed, 7])
+    starts = starting_points(posterior, rng, 2, STARTS, Counter()).reshape(-1, posterior.size)
+    return nested(PosteriorTarget(posterior), seed, tell=tell, around=starts)
+
+
+def climb_again(job: Job, tell: Tell) -> Estimate:
+    """Nested sampling with another seed."""
+    posterior = Posterior(job.hypothesis, job.measurement)
+
+    def make() -> dict[str, Any]:
+        return asdict(_nested(posterior, job.seed + AGAIN, lambda text: tell(job.label, f"again: {text}")))
+
+    return _estimate(_kept(folder_of(job), "again", _asked(job)["fingerprint"], make))
 
 
 def walk(job: Job, tell: Tell) -> Sampled:
@@ -143,13 +164,15 @@ def _from_draws(job: Job, run: Run, tell: Tell) -> Sampled:
     if job.whole is not None:
         whole = job.whole
         rest = kept("range", "the rest", lambda: asdict(leave_range_out(posterior, draws, whole)), whole.data_hash)
-    modes = _modes(job, run, _estimate(found), tell) if job.modes else ()
+    modes = []
+    if job.modes:
+        modes = kept("modes", "convexity modes", lambda: _modes(posterior, run, _estimate(found), job.seed))
     return Sampled(
         bridge=_estimate(found),
         loo=LeaveOneOut(**_arrays(loo, "pointwise", "pareto_k"), refitted=tuple(loo["refitted"])),
         rest=None if rest is None else LeaveRangeOut(**_arrays(rest, "deflection", "predicted", "sd")),
         widths=tuple(Widened(**_numbers(w)) for w in widths),
-        modes=modes,
+        modes=tuple(ByMode(**m) for m in modes),
         run=run.path,
         evaluations=int(run.status["evaluations"]),
         seconds=float(run.status["seconds"]),
@@ -164,6 +187,9 @@ def _run(job: Job, tell: Tell) -> Run:
     def progress(p: Progress) -> None:
         tell(job.label, f"sampling: ESS {p.ess:.0f} of {p.wanted:.0f}")
 
+    folder = folder_of(job)
+    if folder is not None and _serves(folder, _asked(job)):
+        return load_run(folder)
     run = sample(job.measurement, job.hypothesis, seed=job.seed, out=job.out, settings=job.settings, progress=progress)
     if run.interrupted:
         raise KeyboardInterrupt
@@ -186,23 +212,10 @@ def _widths(posterior: Posterior, draws: Array, worth: float, seed: int) -> tupl
     return prior_widths(posterior, draws, worth, seed)
 
 
-def _modes(job: Job, run: Run, found: Estimate, tell: Tell) -> tuple[ByMode, ...]:
-    """Evidence under every convexity mode, from a run without any."""
-    if job.hypothesis.convexity != "none":
-        free = replace(job, hypothesis=replace(job.hypothesis, convexity="none"), ess=min(job.ess, MODE_ESS))
-        run = _run(free, lambda label, text: tell(label, f"without convexity, {text}"))
-    posterior = Posterior(run.hypothesis, job.measurement)
-    key = f"{run.settings['fingerprint']} {run.status['evaluations']}"
-
-    def make() -> list[dict[str, Any]]:
-        estimate = found if run.hypothesis == job.hypothesis else _bridged(posterior, run, job.seed)
-        masses = posterior.prior.masses(job.measurement, job.seed)
-        worth = float(run.status["ess_bulk"])
-        return [
-            asdict(m) for m in by_convexity(posterior, run.draws(), worth, estimate.log_evidence, estimate.sd, masses)
-        ]
-
-    return tuple(ByMode(**m) for m in _kept(run.path, "modes", key, make))
+def _modes(posterior: Posterior, run: Run, found: Estimate, seed: int) -> list[dict[str, Any]]:
+    masses = {mode: Mass(m["value"], m["sd"]) for mode, m in run.status["prior_mass"].items()}
+    rows = by_convexity(posterior, run.draws(), found.log_evidence, found.sd, masses, seed)
+    return [asdict(row) for row in rows]
 
 
 # ---- kept beside the run ---------------------------------------------------------------------------------------------
@@ -212,12 +225,32 @@ def _asked(job: Job) -> dict[str, Any]:
     return storage.describe(job.measurement, job.hypothesis, job.settings, job.seed)
 
 
-def _folder(job: Job) -> Path | None:
-    """The folder that the run of this job has, or will have."""
+def folder_of(job: Job) -> Path | None:
+    """The folder that the run of this job has, or will have: one with the same data, hypothesis, seed and code.
+
+    A finished run may be worth more draws than were asked for, and may go by any name.
+    """
     if job.out is None:
         return None
     asked = _asked(job)
+    for path in sorted(job.out.glob(f"*/{storage.ASKED}")):
+        if _serves(path.parent, asked):
+            return path.parent
     return storage.claim(job.out / storage.run_name(job.measurement, job.hypothesis, asked), asked)
+
+
+def _serves(folder: Path, asked: dict[str, Any]) -> bool:
+    """Whether a folder holds a finished run that answers what is asked."""
+    try:
+        held = tomllib.loads((folder / storage.ASKED).read_text(encoding="utf-8"))
+        same = all(held[part] == asked[part] for part in ("seed", "hypothesis", "code"))
+        same = same and held["data"]["sha256"] == asked["data"]["sha256"]
+        if not same or (folder / storage.CHAINS).exists():
+            return False
+        status = json.loads((folder / storage.STATUS).read_text(encoding="utf-8"))
+        return bool(status["ess_bulk"] >= asked["sampling"]["ess"])
+    except (OSError, ValueError, KeyError):
+        return False
 
 
 def _kept(folder: Path | None, name: str, key: str, make: Callable[[], Any]) -> Any:

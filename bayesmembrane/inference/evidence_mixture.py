@@ -106,9 +106,8 @@ def widened(g: Mixture, x: Array, share: float = 0.1, factor: float = 2.0) -> Mi
     centre, root = _whitening(x)
     scatter = np.linalg.cholesky(root @ root.T)
     weights = np.append(g.log_weights + np.log1p(-share), np.log(share))
-    return Mixture(
-        weights, np.vstack([g.means, centre]), np.concatenate([g.roots, factor * scatter[None]]), min(g.degrees, 10.0)
-    )
+    roots = np.concatenate([g.roots, factor * scatter[None]])
+    return Mixture(weights, np.vstack([g.means, centre]), roots, min(g.degrees, 10.0))
 
 
 def _whitening(x: Array) -> tuple[Array, Array]:

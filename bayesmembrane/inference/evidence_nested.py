@@ -11,15 +11,20 @@ import numpy as np
 from dynesty import NestedSampler
 from dynesty.bounding import UnitCube
 from dynesty.internal_samplers import InternalSampler, SamplerReturn, tune_slice
+from scipy.special import gammaln, logsumexp, stdtrit
 
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.inference.evidence_target import Estimate, Problem, Target
 from bayesmembrane.parameters import Array
 
-LEAST_LIVE, MOST_LIVE = 120, 4000
-PILOTS, THEN, MOST_RUNS = 2, 2, 10
+PILOT_LIVE, PILOT_PER_DIMENSION = 150, 30
+LEAST_LIVE, PER_DIMENSION, MOST_LIVE = 80, 15, 4000
+TOLERANCE = 0.13
+WIDER, DEGREES = 1.4, 3.0  # how much broader than the posterior the later runs begin, and with which tails
+LOG_NORM = float(gammaln(0.5 * (DEGREES + 1)) - gammaln(0.5 * DEGREES) - 0.5 * np.log(np.pi * DEGREES))
+PILOTS, THEN, MOST_RUNS = 2, 1, 12
 REMAINING = 0.2  # ln Z that may be left in the live points when they are added
-QUEUE = 0.12  # of the live points are proposed at once: those that fall behind meanwhile are lost
+QUEUE = 0.25  # of the live points are proposed at once: those that fall behind meanwhile are lost
 SHRINK = 0.3  # of ln(volume) between two fits of the bounds
 SLICES = 5  # for each dimension (W. J. Handley et al., MNRAS 453 (2015) 4384)
 PER_SLICE = 5.5  # evaluations that a slice takes
@@ -30,13 +35,24 @@ MOST_CUTS = 100  # of an interval, after which the start is kept: below that lie
 Tell = Callable[[str], None]
 
 
-def nested(target: Target, seed: int, tolerance: float = 0.13, tell: Tell | None = None) -> Estimate:
+def nested(
+    target: Target,
+    seed: int,
+    tolerance: float = TOLERANCE,
+    tell: Tell | None = None,
+    around: Array | None = None,
+) -> Estimate:
     """ln Z = ln of the integral of L dX over the prior volume X, by live points that climb the likelihood.
 
-    Two small independent runs tell how many live points are needed for a standard error of ``tolerance``, and two more
-    hold them; others follow while the scatter between runs says that it was not enough. A run of N live points has the
-    error sqrt(H / N) for information H; their mean weighs them by it, and its error is inflated by the root of
-    chi^2 / (R - 1) of R runs where that is above 1.
+    Two independent runs climb from the prior. What they find makes a density q, broad and with heavy tails, from which
+    the others climb L p0 / q: Z is the same, but the way is shorter, and the error smaller with it (X. Chen,
+    M. P. Hobson, S. Das, P. Gelderblom, Stat. Comput. 29 (2019) 835). They hold as many live points as a standard error
+    of ``tolerance`` takes; more runs follow while the scatter between all says that it was not enough. A run of N live
+    points has the error sqrt(H / N) for information H; their mean weighs them by it, and its error is inflated by the
+    root of chi^2 / (R - 1) of R runs where that is above 1.
+
+    Where points (n, k) ``around`` all of the posterior are known, however roughly, q is made of them, and nothing
+    climbs from the prior. Any q gives the same Z; one that leaves out a mode makes it unlikely to be found.
 
     Each run replaces its worst live point by one drawn from the prior above its likelihood: uniformly from ellipsoids
     around the live points (bounds enlarged by bootstrap) while that is efficient, by random slices otherwise.
@@ -48,43 +64,86 @@ def nested(target: Target, seed: int, tolerance: float = 0.13, tell: Tell | None
     """
     problem = Problem(target)
     rngs = np.random.default_rng([seed, 5]).spawn(MOST_RUNS)
-    live = max(LEAST_LIVE, 20 * problem.size)
-    found: list[tuple[float, float]] = []
-    for i, rng in enumerate(rngs):
-        if i >= PILOTS:
-            live = _needed(found, live, tolerance, max(1, PILOTS + THEN - i))
-        found.append(_run(problem, live, rng))
+    found: list[_Run] = []
+    if around is None:
+        from_prior = max(PILOT_LIVE, PILOT_PER_DIMENSION * problem.size)
+        found = [_run(problem, from_prior, rng) for rng in rngs[:PILOTS]]
+        closer = _Closer(
+            problem, *(np.concatenate(part) for part in zip(*((r.x, r.weight) for r in found), strict=True))
+        )
+    else:
+        closer = _Closer(problem, around, np.ones(len(around)))
+    live = max(LEAST_LIVE, PER_DIMENSION * problem.size)
+    for i, rng in enumerate(rngs[PILOTS:]):
+        if i > 0:  # the first tells what it takes
+            live = _needed(found, live, tolerance)
+        found.append(_run(closer, live, rng))
         value, sd = _together(found)
         if tell is not None:
             tell(f"nested sampling, run {len(found)}: {value:.2f} +- {sd:.2f}")
         if len(found) >= PILOTS + THEN and sd <= tolerance:
             break
-    return Estimate(value, sd, problem.evaluations, problem.seconds, tuple(z for z, _ in found))
+    return Estimate(value, sd, problem.evaluations, problem.seconds, tuple(r.log_evidence for r in found))
 
 
-def _needed(found: list[tuple[float, float]], live: int, tolerance: float, runs: int) -> int:
-    """Live points for each of ``runs`` runs, so that the own errors of all together come down to ``tolerance``."""
-    own = np.array([sd for _, sd in found])
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """ln Z of one run with its own error, and its points x (M, k) with their weights (M,), which add up to one."""
+
+    log_evidence: float
+    sd: float
+    x: Array
+    weight: Array
+
+
+def _needed(found: list[_Run], live: int, tolerance: float) -> int:
+    """Live points for one more run, so that the own errors of all together come down to ``tolerance``."""
+    own = np.array([r.sd for r in found])
     missing = tolerance**-2 - np.sum(own**-2)
-    return int(np.clip(live * missing / runs * own[-1] ** 2, LEAST_LIVE, MOST_LIVE))
+    return int(np.clip(live * missing * own[-1] ** 2, LEAST_LIVE, MOST_LIVE))
 
 
-def _together(found: list[tuple[float, float]]) -> tuple[float, float]:
-    """(weighted mean, standard error) of runs (ln Z, own error)."""
-    z, own = np.array(found).T
+def _together(found: list[_Run]) -> tuple[float, float]:
+    """(weighted mean, standard error) of runs."""
+    z, own = np.array([(r.log_evidence, r.sd) for r in found]).T
     w = own**-2
     mean = float(w @ z / np.sum(w))
     scatter = float(w @ (z - mean) ** 2 / max(1, len(z) - 1))
     return mean, float(np.sqrt(max(1.0, scatter) / np.sum(w)))
 
 
-def _run(problem: Problem, live: int, rng: np.random.Generator) -> tuple[float, float]:
-    """(ln Z, its standard error) of one run with ``live`` points."""
+class _Closer(Problem):
+    """The same integral with q in the place of the prior and L p0 / q in that of the likelihood.
+
+    q(x) = prod_i t(z_i) / |R| with z = R^-1 (x - m): m and R R^T are the mean and the enlarged covariance of x (n, k).
+    """
+
+    def __init__(self, problem: Problem, x: Array, weight: Array) -> None:
+        self.target, self.problem = problem.target, problem
+        w = weight / np.sum(weight)
+        self.mean = w @ x
+        d = x - self.mean
+        scale = np.maximum(np.sqrt(w @ (d * d)), 1e-12 * np.maximum(np.abs(self.mean), 1e-100))
+        covariance = (d / scale).T @ (w[:, None] * (d / scale))
+        values, vectors = np.linalg.eigh(covariance)
+        self.root = WIDER * scale[:, None] * vectors * np.sqrt(np.maximum(values, 1e-10))
+        self.log_volume = float(np.linalg.slogdet(self.root)[1])
+
+    def from_cube(self, u: Array) -> tuple[Array, Array]:
+        z = stdtrit(DEGREES, np.clip(u, 1e-15, 1 - 1e-15))
+        x = np.asarray(self.mean + z @ self.root.T)
+        log_q = np.sum(LOG_NORM - 0.5 * (DEGREES + 1) * np.log1p(z * z / DEGREES), axis=1) - self.log_volume
+        return x, self.problem.log_posterior(x) - log_q
+
+
+def _run(problem: Problem, live: int, rng: np.random.Generator) -> _Run:
+    """One run with ``live`` points."""
     start = problem.prior_draws(rng, live)
     points = [start.u[:live], start.x[:live], start.log_likelihood[:live].copy()]
     if np.ptp(points[2]) == 0:
         # A likelihood that is constant where it is not zero has nothing to climb.
-        return float(points[2][0] + np.log(start.part)), start.log_part_sd
+        value = float(points[2][0] + np.log(start.part))
+        return _Run(value, start.log_part_sd, points[1], np.full(live, 1 / live))
     queue = max(8, int(QUEUE * live))
     with warnings.catch_warnings():
         # What dynesty warns of (inefficient ellipsoids, plateaus) is met by slices, and judged by the scatter.
@@ -107,7 +166,8 @@ def _run(problem: Problem, live: int, rng: np.random.Generator) -> tuple[float, 
     r = sampler.results
     information = float(r.information[-1])
     value = float(r.logz[-1] + np.log(start.part) - 0.5 * information / live)
-    return value, float(np.hypot(r.logzerr[-1], start.log_part_sd))
+    weight = np.exp(r.logwt - logsumexp(r.logwt))
+    return _Run(value, float(np.hypot(r.logzerr[-1], start.log_part_sd)), np.asarray(r.samples), weight)
 
 
 def _never(_: Array) -> Any:

@@ -1,22 +1,22 @@
-"""What ln Z would be under other priors: of another width, and under the other convexity modes."""
+"""What ln Z would be under priors of another width, from the draws that there are."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bayesmembrane.forward import Forward, Solve
-from bayesmembrane.hypothesis import CONVEXITY, Hypothesis
+from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.inference.posterior import Posterior
-from bayesmembrane.inference.prior import Mass
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.mechanics import api
-from bayesmembrane.parameters import Array, Normal, Prior, Uniform
+from bayesmembrane.parameters import Array, Prior, Uniform
 
 FACTORS = (0.5, 1.0, 2.0)
 SURVEYED = 2048
+WIDTHS = ("sd", "spread", "scale")  # what priors call their width, if it is one number
 Ratio = Callable[[int, float], tuple[float, float]]
 
 LEAST_ESS = 100.0
@@ -75,11 +75,12 @@ def prior_widths(
 
 def scaled(prior: Prior, factor: float) -> Prior | None:
     """The prior ``factor`` times as wide about its middle; None for a kind that has no width."""
-    if isinstance(prior, Normal):
-        return replace(prior, sd=factor * prior.sd)
     if isinstance(prior, Uniform):
         middle, half = 0.5 * (prior.low + prior.high), 0.5 * (prior.high - prior.low)
         return replace(prior, low=middle - factor * half, high=middle + factor * half)
+    for width in WIDTHS:
+        if hasattr(prior, width):
+            return replace(prior, **{width: factor * getattr(prior, width)})
     return None
 
 
@@ -125,57 +126,3 @@ def _masses(hypothesis: Hypothesis, measurement: Measurement, widest: float, see
         return float(np.log(m1 / m0)), float(np.std(pull) / np.sqrt(len(pull)))
 
     return ratio
-
-
-# ---- convexity modes -------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class ByMode:
-    """ln Z under one convexity mode, from draws of a posterior whose prior allows more.
-
-    Attributes
-    ----------
-    mode : `CONVEXITY`
-    log_evidence, sd : with the prior renormalised by its mass; None where it cannot be said
-    part : part of the wider posterior that meets the mode
-    mass, mass_sd : part of the prior that meets it
-    reason : "" or why there is no number, as a sentence
-    """
-
-    mode: str
-    log_evidence: float | None
-    sd: float | None
-    part: float
-    mass: float
-    mass_sd: float
-    reason: str
-
-
-def by_convexity(
-    posterior: Posterior,
-    draws: Array,
-    effective: float,
-    log_evidence: float,
-    sd: float,
-    masses: Mapping[str, Mass],
-) -> tuple[ByMode, ...]:
-    """Z_mode = Z part_mode / mass_mode, for draws (B, k) of ``posterior``, whose own mode is "none".
-
-    ``log_evidence`` and ``sd`` are those of ``posterior``, ``masses`` those of `JointPrior.masses`, and ``effective``
-    is what the draws are worth.
-    """
-    prediction = posterior.forward(draws)
-    found = []
-    for mode in CONVEXITY:
-        part, mass = float(np.mean(posterior.prior.inside(prediction, mode))), masses[mode]
-        if part == 0.0:
-            most = log_evidence - np.log(effective) - np.log(mass.value)
-            why = f"None of {len(draws)} draws meets it: ln Z is below {most:.1f} or so."
-            found.append(ByMode(mode, None, None, part, mass.value, mass.sd, why))
-            continue
-        error = np.sqrt((1 - part) / part / effective)
-        total = float(np.sqrt(sd**2 + error**2 + (mass.sd / mass.value) ** 2))
-        value = log_evidence + float(np.log(part) - np.log(mass.value))
-        found.append(ByMode(mode, value, total, part, mass.value, mass.sd, ""))
-    return tuple(found)

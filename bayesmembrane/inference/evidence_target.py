@@ -12,6 +12,8 @@ from bayesmembrane.errors import SettingsError
 from bayesmembrane.inference.posterior import Posterior
 from bayesmembrane.parameters import Array
 
+HOPELESS = 50_000  # draws of the prior of which none is possible
+
 
 class Target(Protocol):
     """Z = integral of exp(log_likelihood(x)) exp(log_prior(x)) dx over R^k: anything with these four.
@@ -78,6 +80,15 @@ class Estimate:
     parts: tuple[float, ...] = ()
 
 
+def averaged(a: Estimate, b: Estimate) -> Estimate:
+    """Mean of two independent estimates with weights 1 / sd^2; its error is inflated if they scatter by more."""
+    w = np.array([a.sd, b.sd]) ** -2.0
+    z = np.array([a.log_evidence, b.log_evidence])
+    mean = float(w @ z / np.sum(w))
+    sd = float(np.sqrt(max(1.0, float(w @ (z - mean) ** 2)) / np.sum(w)))
+    return Estimate(mean, sd, a.evaluations + b.evaluations, a.seconds + b.seconds, (*a.parts, *b.parts))
+
+
 class Problem:
     """A target with its bookkeeping: both logarithms at once, evaluations counted, answers checked."""
 
@@ -134,7 +145,7 @@ class Problem:
         found: list[tuple[Array, Array, Array]] = []
         tried = good = 0
         while good < count:
-            if tried >= most or (tried >= 100_000 and good == 0):
+            if tried >= most or (tried >= HOPELESS and good == 0):
                 raise SettingsError(
                     f"prior and likelihood are both positive at only {good} of {tried} draws of the prior",
                     remedy="choose a prior from which the data can be reached",

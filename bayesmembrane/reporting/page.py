@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import groupby
 from pathlib import Path
@@ -16,11 +16,13 @@ import numpy as np
 
 from bayesmembrane.cache import Tally
 from bayesmembrane.errors import SettingsError, StorageError
+from bayesmembrane.inference.comparison_result import Comparison
 from bayesmembrane.inference.published import Compared
 from bayesmembrane.inference.reconstruction_result import Reconstruction
 from bayesmembrane.inference.run import Run
 from bayesmembrane.inference.valleys_result import Valleys
-from bayesmembrane.reporting import figures, sentences, tables
+from bayesmembrane.reporting import comparison_section, figures, sentences, tables
+from bayesmembrane.reporting.comparison_figures import comparison_picture
 from bayesmembrane.reporting.figures import Picture
 from bayesmembrane.reporting.reading import read
 from bayesmembrane.reporting.style import spoken
@@ -65,6 +67,8 @@ def write_report(
     title: str | None = None,
     cache: Tally | None = None,
     valleys: Sequence[Valleys] | None = None,
+    comparison: Mapping[str, Comparison] | None = None,
+    paper: comparison_section.Paper | None = None,
 ) -> Path:
     """Write ``out/index.html`` and ``out/report.json`` about one run or several, and return the page's path.
 
@@ -77,6 +81,8 @@ def write_report(
     title : of the page; made of the specimens' names unless given
     cache : what the curve cache did while all this was computed
     valleys : of some materials, from `inference.valleys`; shown in a section of their own
+    comparison : by range, from `inference.comparison`; shown in a section of its own
+    paper : losses (N) of the paper's optima by range and material, whose ranking is shown beside ours
 
     A report of an earlier time is replaced, any other file is not: `StorageError`. The same error, or `DataError`,
     names a folder that holds no run; `SettingsError` says that there is none at all.
@@ -86,7 +92,7 @@ def write_report(
     for name in (PAGE, TWIN):
         _refuse_foreign(out / name)
     shown = [read(run) for run in runs]
-    return write_shown(shown, out, reconstruction, fits or (), title, cache, valleys)
+    return write_shown(shown, out, reconstruction, fits or (), title, cache, valleys, comparison, paper)
 
 
 def write_shown(
@@ -97,6 +103,8 @@ def write_shown(
     title: str | None = None,
     cache: Tally | None = None,
     valleys: Sequence[Valleys] | None = None,
+    comparison: Mapping[str, Comparison] | None = None,
+    paper: comparison_section.Paper | None = None,
 ) -> Path:
     """As `write_report`, of runs that have been read."""
     shown = sorted(shown, key=lambda s: (s.digest.end, s.data_hash, s.hypothesis.curve_size, s.name))
@@ -106,6 +114,7 @@ def write_shown(
     warnings = [*sentences.warnings(cases), *_solver_warnings(shown)]
     told = sentences.answer(cases)
     parts = [_data(shown, reconstruction), _curves(shown), _comparison(shown, compared)]
+    parts += [_evidence(comparison, paper or {})] if comparison else []
     broken = [s for s in shown if s.digest.specimens]
     parts += [_break_points(broken)] if broken else []
     parts += [_valleys(valleys)] if valleys else []
@@ -258,6 +267,27 @@ def _comparison(shown: Sequence[Shown], compared: Sequence[Compared]) -> Section
         if len(runs) > 1:
             blocks.append(_forest(runs, material))
     return Section("comparison", "Comparison", tuple(blocks))
+
+
+def _evidence(found: Mapping[str, Comparison], paper: comparison_section.Paper) -> Section:
+    caption = (
+        "Left: evidence ln Z of each hypothesis minus that of the best, by both estimators; right: expected log "
+        "predictive density of points left out, minus that of the best. Both without unit, to scale within 3 and logarithmic "
+        "beyond; whiskers are two standard errors."
+    )
+    picture = Block(
+        "figure", picture=comparison_picture(found), alt=comparison_section.alternative_text(found), caption=caption
+    )
+    made = (
+        comparison_section.evidence_table(found),
+        comparison_section.ranking_table(found, paper),
+        comparison_section.modes_table(found),
+        comparison_section.widths_table(found),
+    )
+    told = Block("list", lines=tuple(comparison_section.comparison_sentences(found, paper)))
+    return Section(
+        "evidence", "Which model, and how sure", (told, picture, *(_table(t) for t in made if t is not None))
+    )
 
 
 def _forest(runs: Sequence[Shown], label: str) -> Block:
