@@ -135,7 +135,7 @@ class Composition:
             more = effect.excess(p, given, self.path)
             excess = more if excess is None else excess + more
         virgin, slope = law(given, excess)
-        force, state = virgin, State(self.path, given, virgin)
+        force, state = virgin, State(self.path, given, virgin, slope)
         for effect, p in self._acting(Carried, x):
             force = effect.carried(p, force, state)
         memory = self._acting(Memory, x)

@@ -120,6 +120,10 @@ Effects act in this order, in whatever order they are named, and each is one fil
   with the largest deflection m so far. One first loading to D ends at G = 1; c is the part that grows on when it is
   repeated.
 - One-sided effects have their null value as a bound.
+- Not here: the weight of a disc that hangs on the load cell is a constant, `force_offset`. Wrinkling: of 2000 films
+  drawn from the priors, clamped with stretch 1 and 1.03, none with a convex energy had a state with P1 > 0 > P2 up to
+  91.5 mm (Mooney-Rivlin films that are not convex had); a film that was clamped loose wrinkles until it is taut, which
+  reads as a shifted zero.
 
 ## Signatures
 

@@ -121,11 +121,13 @@ class State:
     path : the protocol
     deflection : (B, N) m, what is left for the film; the film is slack where it is not positive
     force : (B, N) N, of a film without memory at this deflection; 0 where it is slack
+    slope : (B, N) N/m, its derivative
     """
 
     path: Path
     deflection: Array
     force: Array
+    slope: Array
 
     @cached_property
     def reached(self) -> Array:
