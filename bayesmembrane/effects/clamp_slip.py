@@ -16,6 +16,8 @@ class ClampSlip(Slack):
     """Free length L (1 + slip G), with the growth G of the test (1 after a first loading to its full range).
 
     What has slid out stays out: the film is slack until the longer film is taut.
+    On an annulus of 10 and 35 mm a length s that slides out of the outer clamp acts as slip = 0.80 s / L, to a tenth of
+    its effect (Yeoh film, 12 to 70 mm, against the exact solution: tests/reference/test_slip.py).
     """
 
     name: ClassVar[str] = "clamp_slip"
