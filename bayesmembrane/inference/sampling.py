@@ -15,6 +15,7 @@ from emcee.autocorr import integrated_time
 
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.inference.emulator import Emulator, emulate
+from bayesmembrane.inference.evidence_mixture import Mixture, fit_mixture
 from bayesmembrane.inference.initial import starting_points
 from bayesmembrane.inference.posterior import Posterior, tally
 from bayesmembrane.parameters import Array
@@ -27,7 +28,7 @@ GROWTH = 1.25  # a look costs little, but nothing is learned from looking at eve
 FIRST_LESSON, NEXT_LESSON = 100, 2
 """The proposal is learned from the chains after so many steps, and anew after so many times as many while fewer than
 half of the autocorrelation times are there. What came before never counts: only a fixed proposal makes a chain."""
-LEARNED_SHARE = 0.6
+WALK_SHARE, JUMP_SHARE, LEARN_FROM = 0.4, 0.3, 2000
 
 
 @dataclass(frozen=True)
@@ -253,19 +254,27 @@ def _walkers(posterior: Posterior, settings: Settings) -> int:
     return settings.walkers or 16 * -(-4 * posterior.size // 16)
 
 
-def learned(posterior: Posterior, chains: Chains) -> Emulator | None:
-    """The emulator on which proposals walk, from the later half of what all ensembles walked until the last lesson.
+def learned(posterior: Posterior, chains: Chains) -> tuple[Emulator | None, Mixture | None]:
+    """What proposals are made from, learned from the later part of what all ensembles walked until the last lesson.
 
-    It follows from the chains alone, so that a run that was interrupted learns the same again.
+    An emulator of the curves to walk on, and t-distributions to jump to: one is right where curves are smooth in the
+    parameters, the other where they are not but the posterior is compact. None where there is nothing to learn from.
+    Both follow from the chains alone, so that a run that was interrupted learns the same again.
     """
     if not chains.lessons:
-        return None
+        return None, None
     end = chains.lessons[-1]
-    x = chains.x[:, end // 4 : end].reshape(-1, chains.x.shape[-1])
-    try:
-        return emulate(posterior, x, np.random.default_rng(end))
-    except np.linalg.LinAlgError:
-        return None
+    x, rng = chains.x[:, end // 4 : end].reshape(-1, chains.x.shape[-1]), np.random.default_rng(end)
+    found: list[Any] = []
+    for learn in (
+        lambda: emulate(posterior, x, rng),
+        lambda: fit_mixture(x[rng.permutation(len(x))[:LEARN_FROM]], rng),
+    ):
+        try:
+            found.append(learn())
+        except np.linalg.LinAlgError:
+            found.append(None)
+    return found[0], found[1]
 
 
 def _next_lesson(chains: Chains) -> int:
@@ -273,8 +282,10 @@ def _next_lesson(chains: Chains) -> int:
     return int(NEXT_LESSON * chains.lessons[-1]) if chains.lessons else FIRST_LESSON
 
 
-def _sampler(posterior: Posterior, walkers: int, counts: Counter[str], emulator: Emulator | None) -> Any:
-    """An ensemble that proposes by differential evolution, snooker and stretch, and by walks on an emulator.
+def _sampler(
+    posterior: Posterior, walkers: int, counts: Counter[str], known: tuple[Emulator | None, Mixture | None]
+) -> Any:
+    """An ensemble that proposes by differential evolution, snooker and stretch, and from what was ``known`` by then.
 
     The first two suit curved valleys; differential evolution with gamma = 1 jumps between valleys.
     """
@@ -284,25 +295,49 @@ def _sampler(posterior: Posterior, walkers: int, counts: Counter[str], emulator:
         counts.update(tally(e.outcome))
         return e.log_posterior
 
-    share = 1.0 if emulator is None else 1 - LEARNED_SHARE
-    moves = [
+    emulator, mixture = known
+    moves: list[tuple[Any, float]] = []
+    if emulator is not None:
+        moves.append((emcee.moves.MHMove(_walking(emulator)), WALK_SHARE))
+    if mixture is not None:
+        moves.append((emcee.moves.MHMove(_jumping(mixture)), JUMP_SHARE))
+    share = 1 - sum(weight for _, weight in moves)
+    moves += [
         (emcee.moves.DEMove(), 0.6 * share),
         (emcee.moves.DEMove(gamma0=1.0), 0.1 * share),
         (emcee.moves.DESnookerMove(), 0.1 * share),
         (emcee.moves.StretchMove(), 0.2 * share),
     ]
-    if emulator is not None:
-        moves.append((emcee.moves.MHMove(_surrogate(emulator)), LEARNED_SHARE))
     return emcee.EnsembleSampler(walkers, posterior.size, log_probability, moves=moves, vectorize=True)
 
 
-def _surrogate(emulator: Emulator) -> Callable[[Array, Any], tuple[Array, Array]]:
+Proposal = Callable[[Array, Any], tuple[Array, Array]]
+
+
+def _walking(emulator: Emulator) -> Proposal:
     """The proposal of a Metropolis-Hastings move: where a walk on the emulator ends, and its factor."""
 
     def propose(x: Array, random: Any) -> tuple[Array, Array]:
-        return emulator.walk(x, np.random.default_rng(random.randint(2**31, size=4)))
+        return emulator.walk(x, _generator(random))
 
     return propose
+
+
+def _jumping(mixture: Mixture) -> Proposal:
+    """The proposal y ~ g whatever the place x, with the factor ln g(x) - ln g(y).
+
+    W. K. Hastings, Biometrika 57 (1970) 97.
+    """
+
+    def propose(x: Array, random: Any) -> tuple[Array, Array]:
+        y = mixture.draw(_generator(random), len(x))
+        return y, mixture.log_density(x) - mixture.log_density(y)
+
+    return propose
+
+
+def _generator(random: Any) -> np.random.Generator:
+    return np.random.default_rng(random.randint(2**31, size=4))
 
 
 def _start(posterior: Posterior, settings: Settings, seed: int, counts: Counter[str]) -> Chains:
