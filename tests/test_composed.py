@@ -87,7 +87,7 @@ def test_relaxation_is_the_convolution() -> None:
     f = force(m, "viscoelastic", x=np.array([g, tau, decades]))
     clock = m.path.clock
     knots, values = np.concatenate([[0.0], clock]), np.concatenate([[0.0], direct("yeoh", d)])
-    times = tau * 10 ** (decades * (np.array([0.125, 0.375, 0.625, 0.875]) - 0.5))
+    times = tau * 10 ** (decades * np.linspace(-5 / 12, 5 / 12, 6))
     fine = np.unique(np.concatenate([np.linspace(a, b, 400) for a, b in itertools.pairwise(knots)]))
     rate = np.diff(np.interp(fine, knots, values))
     middle = 0.5 * (fine[1:] + fine[:-1])

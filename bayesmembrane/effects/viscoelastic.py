@@ -12,12 +12,12 @@ from bayesmembrane.effects.base import EffectParameter, Memory
 from bayesmembrane.parameters import Array, HalfNormal, LogNormal
 from bayesmembrane.protocol import Path
 
-TERMS = 4
+TERMS = 6
 
 
 @dataclass(frozen=True)
 class Viscoelastic(Memory):
-    """F(t) = F_e(t) - strength int (1 - sum_i exp(-(t - s) / time_i) / n) dF_e(s), n = 4.
+    """F(t) = F_e(t) - strength int (1 - sum_i exp(-(t - s) / time_i) / n) dF_e(s), n = 6.
 
     The times are evenly spread in log time within ``decades`` decades around ``time``: one relaxation time if it is
     zero, a broad spectrum if not. F_e is the instantaneous force. Without times the clock is the distance
@@ -36,7 +36,7 @@ class Viscoelastic(Memory):
             "strength", "-", "part of the instantaneous force that relaxes", HalfNormal(0.2), (0.0, 0.98), 0.0
         ),
         EffectParameter("time", "s", "middle relaxation time", LogNormal(30.0, 1.5), (0.05, 2e4)),
-        EffectParameter("decades", "-", "width of the spectrum of times", HalfNormal(1.0), (0.0, 4.0)),
+        EffectParameter("decades", "-", "width of the spectrum of times", HalfNormal(1.0), (0.0, 6.0)),
     )
 
     def remember(self, p: Array, force: Array, path: Path) -> Array:
