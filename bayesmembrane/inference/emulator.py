@@ -94,7 +94,7 @@ def emulate(posterior: Emulated, x: Array, rng: np.random.Generator) -> Emulator
     if len(x) < LEAST_DRAWS:
         return None
     centre, root = np.mean(x, axis=0), _root(x)
-    inverse = np.linalg.inv(root)
+    inverse: Array = np.asarray(np.linalg.inv(root), dtype=float)
     z = (x - centre) @ inverse.T
     terms, coefficients = _best(z, force, lambda f, held: _misfit(posterior.given(f, x[held]), truth[held]))
     emulator = Emulator(posterior, centre, root, inverse, terms, coefficients, -np.inf, x)

@@ -18,7 +18,7 @@ from bayesmembrane.inference.posterior import Posterior
 from bayesmembrane.inference.prior import Mass
 from bayesmembrane.parameters import Array
 
-ROUNDS, EACH, LAST = 3, 1000, 3000
+ROUNDS, EACH, LAST = 3, 600, 2000
 KNOWN, STARTS = 1000, 64  # draws of the own mode, and starts without one, that the first proposal is fitted to
 LEAST_ESS, LARGEST_SHARE = 100.0, 0.1  # of the weights that a number may stand on
 WIDEST_MASS = 0.3  # standard error of ln mass

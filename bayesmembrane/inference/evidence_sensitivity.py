@@ -104,7 +104,8 @@ def _masses(hypothesis: Hypothesis, measurement: Measurement, widest: float, see
     wide = [scaled(p, widest) or p for p in priors]
     rng = np.random.default_rng([seed, 3])
     x = np.stack([p.draw(rng, SURVEYED) for p in wide], axis=1)
-    prediction = Forward(hypothesis, measurement, measurement.deflection, solve)(x)
+    only = {"reached": "convex", "elliptic": "elliptic"}.get(hypothesis.convexity, "all")
+    prediction = Forward(hypothesis, measurement, measurement.deflection, solve)(x, only=only)
     margin = prediction.margin(hypothesis.convexity, hypothesis)
     inside = margin > 0 if hypothesis.convexity == "elliptic" else margin >= 0
     base = np.stack([p.log_density(x[:, j]) for j, p in enumerate(priors)], axis=1)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import interp1d
 
 from bayesmembrane.errors import SettingsError
@@ -44,13 +45,14 @@ from bayesmembrane.registry import materials
 RISE = 0.1
 """The valley holds what fits within this part of the least loss, unless asked otherwise."""
 
-FLOOR = 61
+FLOOR, FLOOR_OF_MANY = 121, 61
 COARSE, ALONG, ACROSS = 41, 81, 41
 SDS = 4.0
 MAP = {3: 13}
 MAP_OF_MANY = 9
 WIDER = 1.0  # of the least loss: how far profiles of one or two parameters, and the band around a floor, go
 AGAIN = 3
+JUMP = 10.0  # a step of the floor this many times the median one leads to another basin
 SAME = 1e-3  # relative: an open end's loss this close to a simpler material's is that material
 
 
@@ -111,8 +113,9 @@ def _valley(surface: Surface, rise: float, seed: int, draws: Array | None) -> Va
     metric = metric_of(chart)
     spectra = tuple(_spectrum(surface, best, s) for s in _metrics(metric))
     along = _along(lines, spectra[0])
-    floor_z, floor_loss = floor(surface, lines[along], FLOOR, best)
+    floor_z, floor_loss = floor(surface, lines[along], FLOOR if best.size <= 2 else FLOOR_OF_MANY, best)
     inside = floor_loss <= (least + rise * least) * (1 + 1e-6)
+    inside[inside] = _connected(floor_z[inside], best)
     floor_z, floor_loss = floor_z[inside], floor_loss[inside]
     k = best.size
     maps = pair_maps(surface, best, lines, MAP.get(k, MAP_OF_MANY)) if k > 2 else ()
@@ -158,6 +161,16 @@ def _lines(surface: Surface, start: Array, rise: float) -> tuple[Array, float, l
         if np.array_equal(start, best):
             break
     return best, least, lines
+
+
+def _connected(line: Array, best: Array) -> NDArray[np.bool_]:
+    """(M,) True for the part of the floor around the optimum that does not jump: beyond a jump lies another basin."""
+    if len(line) < 3:
+        return np.ones(len(line), dtype=bool)
+    step = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    jump = step > np.maximum(JUMP * np.median(step), 1e-6)
+    piece = np.concatenate([[0], np.cumsum(jump)])
+    return np.asarray(piece == piece[int(np.argmin(np.linalg.norm(line - best, axis=1)))])
 
 
 def _metrics(main: Metric) -> tuple[Metric, ...]:

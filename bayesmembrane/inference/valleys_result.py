@@ -17,6 +17,8 @@ from bayesmembrane.inference.valleys_profile import PairMap, Profile
 from bayesmembrane.inference.valleys_surface import Chart
 from bayesmembrane.parameters import Array
 
+DIP = 1e-6  # relative: a minimum along the floor must be this much lower than its neighbours
+
 
 @dataclass(frozen=True)
 class Metric:
@@ -136,6 +138,16 @@ class Valley:
         length = float(arc_length(metric.places(self.floor))[-1])
         return length if np.isfinite(length) else None
 
+    @property
+    def basins(self) -> list[tuple[Array, float]]:
+        """Other minima (p, loss) along the floor's profile, outside the connected part that is the valley."""
+        p = self.profiles[self.along]
+        low, high = sorted(e.value for e in p.ends)
+        inner = p.loss[1:-1]
+        dips = np.flatnonzero((inner < p.loss[:-2] * (1 - DIP)) & (inner < p.loss[2:] * (1 - DIP))) + 1
+        found = [(self.chart.natural(p.points[i]), float(p.loss[i])) for i in dips]
+        return [(at, loss) for at, loss in found if not low <= at[self.along] <= high]
+
     def share(self, mode: str) -> float:
         """Part of the floor's length that the convexity mode leaves."""
         places = self.metric.places(self.floor)
@@ -184,6 +196,7 @@ class Valley:
             },
             "open_end": self.open_end,
             "limit": self.limit,
+            "other_basins": [{**dict(zip(names, p, strict=True)), "loss_N": loss} for p, loss in self.basins],
             "kept_by_convexity": {mode: self.share(mode) for mode in CONVEXITY},
             "profiles": {names[p.index]: self._profile(p) for p in self.profiles},
             "maps": [self._map(m, names) for m in self.maps],

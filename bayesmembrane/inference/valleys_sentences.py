@@ -10,7 +10,6 @@ from bayesmembrane.inference.valleys_profile import End
 from bayesmembrane.inference.valleys_result import Valley
 from bayesmembrane.parameters import Array
 
-DIP = 1e-6  # relative: a minimum along the floor must be this much lower than its neighbours
 CLOSE = 2.0  # posterior standard deviations within which two valleys count as compatible
 
 
@@ -79,18 +78,12 @@ def _open_end(v: Valley, i: int, end: End, far: str) -> str:
 
 def _basins(v: Valley) -> list[str]:
     """Other minima along the floor: an optimiser may stop there."""
-    p = v.profiles[v.along]
-    inner = p.loss[1:-1]
-    low = np.flatnonzero((inner < p.loss[:-2] * (1 - DIP)) & (inner < p.loss[2:] * (1 - DIP))) + 1
-    told = []
-    for i in low:
-        if p.loss[i] > v.best_loss + v.rise:
-            at = v.chart.natural(p.points[i])
-            told.append(
-                f"{_range(v)} the floor has a second basin near ({point(v, at)}) with a loss of {p.loss[i]:.3g} N, in "
-                "which an optimiser may stop."
-            )
-    return told
+    return [
+        f"{_range(v)} the loss has another basin near ({point(v, natural)}) with {loss:.3g} N, "
+        f"{100 * (loss / v.best_loss - 1):.2g} % above the least, in which an optimiser may stop; it is no part of the "
+        "length."
+        for natural, loss in v.basins
+    ]
 
 
 def _nothing_needed(v: Valley) -> list[str]:

@@ -26,6 +26,7 @@ WIDE = 2.0  # a parameter is followed over this many times the central range of 
 ITERATIONS = 60
 ROUND_OFF = 1e-12  # relative change of a parameter at which its root is found
 SECANTS = 12
+PROBE, NOT_HIGHER = 1e-4, 1e-7  # first step of the secant method, and how much higher a root's loss may be, relative
 
 
 def unaided(
@@ -205,35 +206,32 @@ class Surface:
             z[single], size[single] = self._rooted(z[single], size[single], np.argmin(held[single], axis=1))
         return z, size
 
-    def _rooted(self, z: Array, size: Array, free: NDArray[np.intp]) -> tuple[Array, Array]:
+    def _rooted(self, z: Array, norm: Array, free: NDArray[np.intp]) -> tuple[Array, Array]:
         """Zeros of the slope J_f^T r in the one free parameter f (M,), by the secant method from a near minimum.
 
         A descent stops when the loss stops falling, and there the parameter is only good to the root of that.
         """
         rows = np.arange(len(z))
 
-        def slope(at: Array) -> tuple[Array, Array, Array]:
+        def slope(at: Array) -> tuple[Array, Array]:
             r, j = self.batch(at)
-            jf = j[rows, :, free]
-            return np.sum(jf * r, axis=1), np.sum(jf * jf, axis=1), np.linalg.norm(r, axis=1)
+            return np.sum(j[rows, :, free] * r, axis=1), np.linalg.norm(r, axis=1)
 
-        g, curvature, _ = slope(z)
-        # A parameter without influence has no root to look for.
-        step = np.where(curvature > 0, -g / np.where(curvature > 0, curvature, 1.0), 0.0)
-        old = z.copy()
-        best, least = z.copy(), size.copy()
+        size = np.maximum(np.abs(z[rows, free]), 1e-2)
+        old, new = z.copy(), z.copy()
+        new[rows, free] += PROBE * size
+        g, _ = slope(old)
+        best, least, flattest = z.copy(), norm.copy(), np.abs(g)
         for _ in range(SECANTS):
-            new = old.copy()
-            new[rows, free] += step
-            h, _, norm = slope(new)
-            take = np.isfinite(norm) & (norm <= least * (1 + 1e-9))
-            best[take], least[take] = new[take], norm[take]
+            h, length = slope(new)
+            # Losses near a minimum differ by round-off only: the slope tells which point is nearer.
+            take = (length <= norm * (1 + NOT_HIGHER)) & (np.abs(h) < flattest)
+            best[take], least[take], flattest[take] = new[take], length[take], np.abs(h[take])
             with np.errstate(all="ignore"):
-                following = -h * (new[rows, free] - old[rows, free]) / (h - g)
-            small = np.abs(step) <= ROUND_OFF * np.maximum(np.abs(new[rows, free]), 1e-3)
-            stays = small | ~np.isfinite(following) | ~take
-            old, g = np.where(stays[:, None], old, new), np.where(stays, g, h)
-            step = np.where(stays, 0.0, following)
-            if np.all(stays):
+                step = -h * (new[rows, free] - old[rows, free]) / (h - g)
+            step = np.where(np.isfinite(step), np.clip(step, -0.1 * size, 0.1 * size), 0.0)
+            if np.all(np.abs(step) <= ROUND_OFF * size):
                 break
+            old, g, new = new, h, new.copy()
+            new[rows, free] += step
         return best, least

@@ -140,7 +140,7 @@ def test_interrupted_and_continued_is_never_stopped() -> None:
     settings = Settings(ess=500, chunk=100)
     whole = run_ensembles(Normal(), settings, 0, chains=start(Normal()))  # type: ignore[arg-type]
     assert whole.status == "converged"
-    broken = run_ensembles(Normal(stop_after=700), settings, 0, chains=start(Normal()))  # type: ignore[arg-type]
+    broken = run_ensembles(Normal(stop_after=450), settings, 0, chains=start(Normal()))  # type: ignore[arg-type]
     assert broken.status == "interrupted"
     assert 1 < broken.chains.steps < whole.chains.steps
     resumed = run_ensembles(Normal(), settings, 0, chains=broken.chains)  # type: ignore[arg-type]

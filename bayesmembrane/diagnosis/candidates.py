@@ -1,0 +1,176 @@
+"""What could explain the curve: a material with some effects, refitted, with its evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from bayesmembrane.diagnosis.whitening import OwnNoise
+from bayesmembrane.effects.base import Effect
+from bayesmembrane.forward import Solve
+from bayesmembrane.hypothesis import Hypothesis
+from bayesmembrane.inference.descent import descend
+from bayesmembrane.inference.objective import Objective, apart
+from bayesmembrane.measurement import Measurement
+from bayesmembrane.mechanics import api
+from bayesmembrane.parameters import Array, HalfNormal
+from bayesmembrane.registry import components
+
+ITERATIONS, SANE = 40, 3
+SIZES = (0.1, 0.6)  # of the expected size of an effect: where searches for it start
+NEAR_BOUND = 1e-3  # of the expected size, or of the width of the bounds
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One hypothesis at its most probable parameters, under the measurement's own noise.
+
+    hypothesis : material and effects
+    x : (k,) coordinates
+    residual : (N,) N, measured less fitted
+    slopes : (N, k) dF/dx there
+    log_evidence : Laplace approximation of ln Z, up to a constant that all candidates share
+    at_bound : names of coordinates at a bound
+    """
+
+    hypothesis: Hypothesis
+    x: Array
+    residual: Array
+    slopes: Array
+    log_evidence: float
+    at_bound: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its effects."""
+        return tuple(e.name for e in self.hypothesis.effects)
+
+    @property
+    def label(self) -> str:
+        return self.hypothesis.label()
+
+    @cached_property
+    def parameters(self) -> dict[str, float]:
+        """Effect parameters by full name, SI."""
+        n = self.hypothesis.material_size
+        names = self.hypothesis.names[n : self.hypothesis.curve_size]
+        return {name: float(v) for name, v in zip(names, self.x[n:], strict=True)}
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Fits hypotheses to one measurement under one noise; ``weight`` is the part of the points that count on their own
+    where correlation is left over, n_eff / N = (1 - r1) / (1 + r1).
+    """
+
+    measurement: Measurement
+    noise: OwnNoise
+    seed: int = 0
+    solve: Solve = api.solve
+    weight: float = 1.0
+
+    def fit(self, hypothesis: Hypothesis, starts: Sequence[Array] = (), sane: bool = True) -> Candidate | None:
+        """The best of all searches: from ``starts`` (k,), and from draws of the prior brought to their best modulus.
+
+        None if no film of this hypothesis reaches the data.
+        """
+        objective = Objective(hypothesis, self.measurement, "euclidean", self.solve)
+        centre, spread = prior_moments(hypothesis)
+        rows = [np.asarray(s, dtype=float) for s in starts]
+        if sane or not rows:
+            pool, _ = objective.pool(np.random.default_rng(self.seed))
+            rows += apart(pool, objective.spread, SANE)
+        root = np.sqrt(self.weight)
+
+        def residuals(x: Array) -> tuple[Array, Array]:
+            r, j = self._white(objective, x)
+            pull = np.broadcast_to(np.diag(1 / spread), (len(x), *(2 * [spread.size])))
+            return (
+                np.concatenate([root * r, (x - centre) / spread], axis=1),
+                np.concatenate([root * j, pull], axis=1),
+            )
+
+        x, size = descend(residuals, np.array(rows), objective.low, objective.high, ITERATIONS)
+        if not np.any(np.isfinite(size)):
+            return None
+        return self._candidate(objective, x[int(np.argmin(size))], float(np.min(size)))
+
+    def _white(self, objective: Objective, x: Array) -> tuple[Array, Array]:
+        """Whitened residuals (B, N) and slopes (B, N, k); a start without a curve is nan, and only that one."""
+        r, j = objective.batch(x)
+        wide = np.moveaxis(np.concatenate([r[:, :, None], j], axis=2), 1, 0)
+        white = np.full(wide.shape, np.nan)
+        good = np.all(np.isfinite(wide), axis=(0, 2))
+        white[:, good] = self.noise.white(wide[:, good])
+        white = np.moveaxis(white, 0, 1)
+        return white[:, :, 0], white[:, :, 1:]
+
+    def _candidate(self, objective: Objective, x: Array, size: float) -> Candidate:
+        hypothesis = objective.hypothesis
+        r, j = objective.batch(x[None, :])
+        slopes = np.where(np.isfinite(j[0]), j[0], 0.0)
+        _, spread = prior_moments(hypothesis)
+        white = np.sqrt(self.weight) * self.noise.white(slopes)
+        _, log_det = np.linalg.slogdet(np.eye(x.size) + spread * (white.T @ white) * spread[:, None])
+        # A half-normal prior is twice as dense on the side that is allowed.
+        halves = sum(isinstance(p.prior, HalfNormal) for p in objective.parameters)
+        log_evidence = -0.5 * size**2 - 0.5 * log_det + halves * np.log(2.0)
+        return Candidate(hypothesis, x, -r[0], slopes, float(log_evidence), _at_bound(objective, x))
+
+    def starts_with(self, base: Candidate, effect: Effect) -> list[Array]:
+        """Starts for ``base`` with one more effect: small and middling, both signs where both are allowed."""
+        signs = (1.0,) if effect.size.one_sided else (1.0, -1.0)
+        out = []
+        for sign in signs:
+            for share in SIZES:
+                theta = effect.typical.copy()
+                theta[0] = (effect.size.null or 0.0) + sign * share * effect.size.scale
+                out.append(np.concatenate([base.x, effect.within_bounds(theta)]))
+        return out
+
+
+def with_effects(hypothesis: Hypothesis, effects: Sequence[Effect]) -> Hypothesis:
+    """The hypothesis with more effects."""
+    return replace(hypothesis, effects=(*hypothesis.effects, *effects))
+
+
+def available(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
+    """Effects of the library that can occur in this test, can be told from the material, and are not there yet."""
+    found: list[Effect] = [cls() for cls in components("effects").values()]
+    have = {e.name for e in hypothesis.effects}
+    rig, path = measurement.rig.name, measurement.path
+    return [e for e in found if e.name not in have and not e.absorbed and not e.unavailable(rig, path)]
+
+
+def absorbed(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
+    """Effects that the material absorbs without trace."""
+    have = {e.name for e in hypothesis.effects}
+    found: list[Effect] = [cls() for cls in components("effects").values()]
+    rig, path = measurement.rig.name, measurement.path
+    return [e for e in found if e.name not in have and e.absorbed and not e.unavailable(rig, path)]
+
+
+def prior_moments(hypothesis: Hypothesis) -> tuple[Array, Array]:
+    """Centre and spread (k,) of the normal prior that stands for the proper one: a size is centred at its null."""
+    centre, spread = [], []
+    for p in hypothesis.parameters[: hypothesis.curve_size]:
+        null = getattr(p, "null", None)
+        centre.append(float(p.prior.quantile(0.5)) if null is None else null)
+        spread.append(float(p.prior.distribution().std()) if null is None else p.scale)  # type: ignore[attr-defined]
+    return np.array(centre), np.array(spread)
+
+
+def _at_bound(objective: Objective, x: Array) -> tuple[str, ...]:
+    """Coordinates at a bound that is not simply the absence of an effect."""
+    out = []
+    for i, p in enumerate(objective.parameters):
+        low, high = p.bounds
+        tolerance = NEAR_BOUND * (high - low)
+        null = getattr(p, "null", None)
+        for bound in (low, high):
+            if abs(x[i] - bound) <= tolerance and bound != null:
+                out.append(p.name)
+    return tuple(out)

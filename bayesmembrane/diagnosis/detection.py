@@ -1,0 +1,103 @@
+"""Is anything missing? Three tests, since each is blind where another sees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lombscargle
+
+from bayesmembrane.diagnosis.candidates import Candidate
+from bayesmembrane.diagnosis.saturated import LackOfFit, lack_of_fit
+from bayesmembrane.diagnosis.scores import ScoreTest, Signature, score_test
+from bayesmembrane.diagnosis.whitening import OwnNoise, orthonormal
+from bayesmembrane.measurement import Measurement
+from bayesmembrane.parameters import Array
+
+LEVEL = 0.01
+"""A curve is adequate unless the smallest p-value, times the number of tests, lies below this."""
+LEAST_WAVES, FEWEST = 4.0, 60  # waves over the range, and points, for a periodicity to be looked for
+SLOWEST_PART = 0.06  # of the frequencies: what the smooth reference has removed is no evidence
+
+
+@dataclass(frozen=True)
+class Periodicity:
+    """The highest peak of a periodogram of what no smooth curve explains, and its probability in noise.
+
+    against : "time" or "deflection"
+    period : s or m (points, where there are no times)
+    share : part of the variance in the peak
+    """
+
+    against: str
+    period: float
+    share: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Detection:
+    """What the tests say of one model. ``p_value`` is the smallest, corrected for their number."""
+
+    lack_of_fit: LackOfFit
+    score: ScoreTest
+    periodicity: Periodicity | None
+
+    @property
+    def p_value(self) -> float:
+        every = [self.lack_of_fit.p_value, self.score.p_value]
+        if self.periodicity is not None:
+            every.append(self.periodicity.p_value)
+        return float(min(1.0, len(every) * min(every)))
+
+    @property
+    def adequate(self) -> bool:
+        """True if nothing is seen to be missing."""
+        return self.p_value > LEVEL
+
+
+def detect(
+    measurement: Measurement,
+    model: Candidate,
+    basis: Array,
+    found: Sequence[Signature],
+    noise: OwnNoise,
+    rng: np.random.Generator,
+) -> Detection:
+    """Lack of fit, largest score and periodicity of one model, with a correlation that allows for its error."""
+    careful = noise.cautious()
+    return Detection(
+        lack_of_fit(model.residual, model.slopes, basis, careful),
+        score_test(model.residual, found, careful, rng),
+        periodicity(measurement, model.residual, np.column_stack([basis, model.slopes]), careful),
+    )
+
+
+def periodicity(measurement: Measurement, residual: Array, basis: Array, noise: OwnNoise) -> Periodicity | None:
+    """Fisher's test for the largest ordinate of a periodogram against time and against deflection.
+
+    For m ordinates of white noise P(share >= g) <= m (1 - g)^(m - 1) (R. A. Fisher, Proc. R. Soc. A 125 (1929) 54).
+    None for a curve too short to show waves.
+    """
+    n = residual.size
+    if n < FEWEST:
+        return None
+    white, q = noise.white(residual), orthonormal(noise.white(basis))
+    rest = white - q @ (q.T @ white)
+    t = np.arange(n, dtype=float) if measurement.time is None else measurement.time
+    found = [_peak(t, rest, "time"), _peak(measurement.deflection, rest, "deflection")]
+    best = min(found, key=lambda f: f.p_value)
+    return Periodicity(best.against, best.period, best.share, min(1.0, len(found) * best.p_value))
+
+
+def _peak(place: Array, rest: Array, against: str) -> Periodicity:
+    span = float(np.ptp(place))
+    # As many frequencies as half the points could tell apart, were they evenly spaced.
+    waves = np.arange(max(LEAST_WAVES, SLOWEST_PART * rest.size / 2), rest.size / 2)
+    if span == 0 or waves.size < 2:
+        return Periodicity(against, np.inf, 0.0, 1.0)
+    power = np.asarray(lombscargle(place - place.min(), rest, 2 * np.pi * waves / span))
+    share = float(power.max() / power.sum())
+    p = min(1.0, waves.size * (1 - share) ** (waves.size - 1))
+    return Periodicity(against, span / float(waves[int(np.argmax(power))]), share, float(p))

@@ -1,0 +1,382 @@
+"""What a curve says of the model it was given: adequate, or what is missing, or that this cannot be told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from bayesmembrane.diagnosis.candidates import Candidate, Search, absorbed, available
+from bayesmembrane.diagnosis.description import describe
+from bayesmembrane.diagnosis.detection import Detection, detect
+from bayesmembrane.diagnosis.heldout import Error, HeldOut, error_of, held_out, own_sd, validate
+from bayesmembrane.diagnosis.saturated import reference_basis
+from bayesmembrane.diagnosis.scores import Signature, angle, signatures, smallest_sizes
+from bayesmembrane.diagnosis.separation import Experiment, experiments
+from bayesmembrane.diagnosis.trace import (
+    DECISIVE,
+    EARNED_SHARE,
+    EARNS,
+    NEAR,
+    NEAR_DECISIVE,
+    Judged,
+    Tell,
+    Tracer,
+    effective_weight,
+    ranked,
+)
+from bayesmembrane.diagnosis.whitening import OwnNoise, gaps_of, own_noise
+from bayesmembrane.diagnosis.wording import sentence_of
+from bayesmembrane.errors import SettingsError
+from bayesmembrane.forward import Solve
+from bayesmembrane.hypothesis import Hypothesis
+from bayesmembrane.inference.posterior import enough_points
+from bayesmembrane.measurement import Measurement
+from bayesmembrane.mechanics import api
+from bayesmembrane.parameters import Array
+
+VERDICTS = ("adequate", "named", "ambiguous", "material", "unknown")
+SPARE = 3  # points beyond the parameters, at least
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The answer.
+
+    Attributes
+    ----------
+    verdict : one of `VERDICTS`
+    effects : names; of a pair both, of an ambiguous answer all in the set
+    material : the better energy if that is the verdict, else ""
+    sentence : what an engineer should read
+    detection : tests of the model as given
+    null, best : the model as given, and the most probable one
+    ranking : every candidate that was refitted, the most probable first
+    members : the candidates that the verdict rests on
+    confounded : (effect, effect, degrees) that this protocol cannot separate
+    noise : the measurement's own
+    power : by effect, the smallest |size| that this measurement would have shown, SI
+    absorbed : sentences on what the material absorbs without trace
+    before, after : errors in sample
+    validation : errors on points that were set aside, or None
+    experiments : what to measure next where rivals are left
+    """
+
+    verdict: str
+    effects: tuple[str, ...]
+    material: str
+    sentence: str
+    detection: Detection
+    null: Candidate
+    best: Candidate
+    ranking: tuple[Judged, ...]
+    members: tuple[Judged, ...]
+    confounded: tuple[tuple[str, str, float], ...]
+    noise: OwnNoise
+    power: Mapping[str, float]
+    absorbed: tuple[str, ...]
+    before: Error
+    after: Error
+    validation: HeldOut | None
+    experiments: tuple[Experiment, ...]
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """The model that the verdict asks for; the given one where nothing can be named."""
+        return self.best.hypothesis if self.verdict in ("named", "material") else self.null.hypothesis
+
+    def summary(self) -> dict[str, Any]:
+        """Plain values for the JSON answer of ``diagnose``."""
+        reference = self.null.log_evidence
+        return {
+            "verdict": self.verdict,
+            "effects": list(self.effects),
+            "material": self.material,
+            "sentence": self.sentence,
+            "p_value": self.detection.p_value,
+            "tests": {
+                "lack_of_fit": {
+                    "ratio": self.detection.lack_of_fit.ratio,
+                    "p_value": self.detection.lack_of_fit.p_value,
+                },
+                "score": asdict(self.detection.score),
+                "periodicity": None if self.detection.periodicity is None else asdict(self.detection.periodicity),
+            },
+            "ranking": [
+                {
+                    "effect": "+".join(j.candidate.names) or j.candidate.hypothesis.material.name,
+                    "material": j.candidate.hypothesis.material.name,
+                    "log_bayes_factor": j.log_evidence - reference,
+                    "parameters": j.candidate.parameters,
+                    "unexplained": j.unexplained,
+                    "explains": j.explains,
+                    "at_bound": list(j.candidate.at_bound),
+                }
+                for j in self.ranking
+            ],
+            "confounded": [{"effects": [a, b], "degrees": round(v, 2)} for a, b, v in self.confounded],
+            "error": {
+                "before": asdict(self.before),
+                "after": asdict(self.after),
+                "heldout_before": None if self.validation is None else asdict(self.validation.before),
+                "heldout_after": None if self.validation is None else asdict(self.validation.after),
+                "heldout": "nothing" if self.validation is None else self.validation.where,
+                "chosen_without_heldout": None if self.validation is None else self.validation.chosen,
+            },
+            "noise": {"sd_N": self.noise.sd, "rho": self.noise.rho, "stated": self.noise.stated},
+            "smallest_visible": dict(self.power),
+            "absorbed": list(self.absorbed),
+            "next_measurements": [
+                {"what": e.what, "separation": None if np.isinf(e.separation) else e.separation, "sentence": e.sentence}
+                for e in self.experiments
+            ],
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What the candidates come to."""
+
+    verdict: str
+    members: tuple[Judged, ...]
+
+
+def diagnose(
+    measurement: Measurement,
+    hypothesis: Hypothesis,
+    *,
+    seed: int = 0,
+    solve: Solve = api.solve,
+    tell: Tell | None = None,
+) -> Diagnosis:
+    """Whether ``hypothesis`` leaves structure in the residual, and which effect, pair or other energy explains it.
+
+    Raises `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
+    """
+    say: Tell = tell or (lambda _: None)
+    _enough(measurement, hypothesis)
+    rng = np.random.default_rng([seed, 7])
+    basis = reference_basis(measurement)
+    search, null = _null(measurement, hypothesis, basis, seed, solve, say)
+    effects = available(measurement, hypothesis)
+    found = signatures(measurement, null, effects, search.noise, solve)
+    say("testing the residual")
+    detection = detect(measurement, null, basis, found, search.noise, rng)
+    tracer = Tracer(search, basis, null)
+    everything: list[Judged] = [tracer.judged(null)]
+    verdict = Verdict("adequate", (everything[0],))
+    if not detection.adequate:
+        tracer, verdict, everything = _traced(tracer, effects, found, rng, say)
+    return _told(tracer, detection, verdict, everything, found, seed, say)
+
+
+def _enough(measurement: Measurement, hypothesis: Hypothesis) -> None:
+    enough_points(hypothesis, measurement)
+    least = hypothesis.curve_size + SPARE
+    if len(measurement) < least:
+        raise SettingsError(
+            f"{len(measurement)} points leave too little to tell what {hypothesis.label()} misses",
+            remedy=f"use at least {least} points, or a material with fewer parameters",
+        )
+
+
+def _null(
+    measurement: Measurement, hypothesis: Hypothesis, basis: Array, seed: int, solve: Solve, say: Tell
+) -> tuple[Search, Candidate]:
+    """The model as given, fitted; first with the reference's noise, then with one that knows the model's slopes."""
+    say(f"fitting {hypothesis.label()}")
+    search = Search(measurement, own_noise(measurement, basis), seed, solve)
+    null = search.fit(hypothesis)
+    if null is None:
+        raise SettingsError(
+            f"no {hypothesis.label()} film reaches the data", remedy="use a shorter range or another material"
+        )
+    search = replace(search, noise=own_noise(measurement, np.column_stack([basis, null.slopes])))
+    return search, search.fit(hypothesis, [null.x], sane=False) or null
+
+
+# ---- what explains it ------------------------------------------------------------------------------------------------
+
+
+def _traced(
+    tracer: Tracer, effects: Sequence[Any], found: Sequence[Signature], rng: np.random.Generator, say: Tell
+) -> tuple[Tracer, Verdict, list[Judged]]:
+    """(tracer with the noise of the best model, verdict, every candidate)."""
+    visible = {f.effect.name for f in found}
+    singles = tracer.singles([e for e in effects if e.name in visible], say)
+    others: list[Judged] = []
+    if not singles:
+        others = tracer.materials(say)
+        return tracer, _without_effects(tracer, others), others
+    tracer, singles = _renewed(tracer, singles)
+    best, pairs = singles[0], []
+    if _more_is_missing(tracer, best, effects, rng):
+        pairs = tracer.pairs(singles, [e for e in effects if e.name in visible], say)
+        pairs = [p for p in pairs if _earns(tracer, p, singles)]
+        if pairs:
+            tracer, pairs = _renewed(tracer, pairs)
+            singles = tracer.again(singles)
+    explaining = [j for j in pairs or singles if j.explains]
+    if not explaining or all(tracer.single_valued(j.candidate) for j in _rivals(tracer, explaining)):
+        others = tracer.materials(say)
+    every = ranked([*pairs, *singles, *others, tracer.judged(tracer.null)])
+    return tracer, _decide(tracer, explaining, others), every
+
+
+def _renewed(tracer: Tracer, judged: list[Judged]) -> tuple[Tracer, list[Judged]]:
+    """Noise and weight from the best candidate, which misses less than the null model, and all candidates fitted anew.
+
+    Misfit looks like noise that remembers: what the best model leaves is closer to the truth.
+    """
+    best = judged[0].candidate
+    basis = np.column_stack([tracer.basis, best.slopes])
+    noise = own_noise(tracer.measurement, basis)
+    weight = effective_weight(noise.white(best.residual))
+    search = replace(tracer.search, noise=noise, weight=weight)
+    null = search.fit(tracer.null.hypothesis, [tracer.null.x], sane=False) or tracer.null
+    tracer = replace(tracer, search=search, null=null)
+    return tracer, tracer.again(judged)
+
+
+def _more_is_missing(tracer: Tracer, best: Judged, effects: Sequence[Any], rng: np.random.Generator) -> bool:
+    """True if the best single effect leaves structure behind."""
+    if not best.explains:
+        return True
+    rest = [e for e in effects if e.name not in best.candidate.names]
+    found = signatures(tracer.measurement, best.candidate, rest, tracer.search.noise, tracer.search.solve)
+    left = detect(tracer.measurement, best.candidate, tracer.basis, found, tracer.search.noise, rng)
+    return not left.adequate
+
+
+def _earns(tracer: Tracer, pair: Judged, singles: Sequence[Judged]) -> bool:
+    """True if the second effect is worth its parameters, and takes away a part of the misfit that matters."""
+    parts = [j for j in singles if set(j.candidate.names) <= set(pair.candidate.names)]
+    if not parts:
+        return False
+    first = max(parts, key=lambda j: j.log_evidence)
+    null = tracer.judged(tracer.null).fit.chi2
+    share = (first.fit.chi2 - pair.fit.chi2) / max(null - pair.fit.chi2, 1e-300)
+    return pair.log_evidence > first.log_evidence + EARNS and share >= EARNED_SHARE
+
+
+def _rivals(tracer: Tracer, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
+    """Those that the evidence does not put out of reach of the best; look-alikes are put out of reach later."""
+    if not explaining:
+        return ()
+    best = explaining[0]
+    out = [best]
+    for j in explaining[1:]:
+        behind = best.log_evidence - j.log_evidence
+        if behind < DECISIVE or (behind < NEAR_DECISIVE and _near(tracer, best, j)):
+            out.append(j)
+    return tuple(out)
+
+
+def _near(tracer: Tracer, a: Judged, b: Judged) -> bool:
+    """True if the traces of two candidates, as fitted, make less than `NEAR` degrees."""
+    return angle(_trace(tracer, a.candidate), _trace(tracer, b.candidate), fold=False) < NEAR
+
+
+def _trace(tracer: Tracer, candidate: Candidate) -> Array:
+    """(N,) whitened: what the candidate takes away from the null model's residual."""
+    return tracer.search.noise.white(tracer.null.residual - candidate.residual)
+
+
+def _decide(tracer: Tracer, explaining: Sequence[Judged], others: Sequence[Judged]) -> Verdict:
+    """The verdict from the effects that explain the curve and the energies that may do so."""
+    energies = [j for j in others if j.explains]
+    if not explaining:
+        return _without_effects(tracer, others)
+    rivals = _rivals(tracer, explaining)
+    single_valued = all(tracer.single_valued(j.candidate) for j in rivals)
+    if single_valued and energies and energies[0].log_evidence > rivals[0].log_evidence - DECISIVE:
+        return Verdict("material", (energies[0],))
+    if single_valued and len(rivals[0].candidate.names) > 1:
+        # Two effects that follow the deflection alone imitate a strain energy that is not among those known.
+        return Verdict("unknown", rivals)
+    return Verdict("named" if len(rivals) == 1 else "ambiguous", rivals)
+
+
+def _without_effects(tracer: Tracer, others: Sequence[Judged]) -> Verdict:
+    energies = [j for j in others if j.explains]
+    return Verdict("material", (energies[0],)) if energies else Verdict("unknown", ())
+
+
+# ---- what is said of it ----------------------------------------------------------------------------------------------
+
+
+def _told(
+    tracer: Tracer,
+    detection: Detection,
+    verdict: Verdict,
+    everything: Sequence[Judged],
+    found: Sequence[Signature],
+    seed: int,
+    say: Tell,
+) -> Diagnosis:
+    measurement, search, null = tracer.measurement, tracer.search, tracer.null
+    known = verdict.verdict in ("named", "ambiguous", "material")
+    best = verdict.members[0].candidate if known else null
+    effects = tuple(dict.fromkeys(n for j in verdict.members for n in j.candidate.names)) if known else ()
+    material = best.hypothesis.material.name if verdict.verdict == "material" else ""
+    say("checking on points that were set aside")
+    mask, where = held_out(measurement)
+
+    def restricted(keep: Any) -> OwnNoise:
+        part = measurement.select(keep)
+        return own_noise(part, reference_basis(part)) if search.noise.stated else _thinned(search.noise, part)
+
+    rivals = [j.candidate for j in everything[:3]] if known else []
+    validation = validate(search, mask, where, null, best, rivals, restricted)
+    members = [j.candidate for j in verdict.members]
+    undecided = verdict.verdict == "ambiguous"
+    nexts = experiments(measurement, members, search.noise.sd, search.solve) if undecided else []
+    sd = own_sd(measurement, search.noise)
+    waves = detection.periodicity
+    power = smallest_sizes(found, detection.score.critical)
+    shape = describe(measurement, null.residual, waves)
+    lost = tuple(e.absorbed for e in absorbed(measurement, null.hypothesis))
+    before = error_of(null.residual, sd, null.x.size)
+    after = error_of(best.residual, sd, best.x.size)
+    sentence = sentence_of(verdict.verdict, members, null, detection, before, after, shape, power, nexts)
+    return Diagnosis(
+        verdict=verdict.verdict,
+        effects=effects,
+        material=material,
+        sentence=sentence,
+        detection=detection,
+        null=null,
+        best=best,
+        ranking=tuple(everything),
+        members=verdict.members,
+        confounded=_confounded(found),
+        noise=search.noise,
+        power=power,
+        absorbed=lost,
+        before=before,
+        after=after,
+        validation=validation,
+        experiments=tuple(nexts),
+    )
+
+
+def _thinned(noise: OwnNoise, part: Measurement) -> OwnNoise:
+    """The same inferred noise for a part of the points."""
+    return replace(noise, gaps=gaps_of(part))
+
+
+def _confounded(found: Sequence[Signature]) -> tuple[tuple[str, str, float], ...]:
+    """Pairs of effects whose signatures come nearer than `NEAR` degrees for some shapes."""
+    nearest: dict[tuple[str, str], float] = {}
+    for a, b in combinations(found, 2):
+        if a.effect.name == b.effect.name:
+            continue
+        one, two = sorted((a.effect.name, b.effect.name))
+        fold = not (a.one_sided and b.one_sided)
+        sign = (a.one_sided or 1) * (b.one_sided or 1)
+        degrees = angle(a.direction, sign * b.direction, fold)
+        nearest[one, two] = min(nearest.get((one, two), 90.0), degrees)
+    return tuple((a, b, v) for (a, b), v in sorted(nearest.items(), key=lambda i: i[1]) if v < NEAR)

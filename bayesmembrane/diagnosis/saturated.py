@@ -1,0 +1,100 @@
+"""A reference that no physics could beat: smooth curves in deflection and on every leg, whatever they mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.stats import chi2, f
+
+from bayesmembrane.diagnosis.whitening import OwnNoise, orthonormal
+from bayesmembrane.measurement import Measurement
+from bayesmembrane.parameters import Array
+
+SPLINE, PER_LEG = 20, 6
+SHARE = 3  # points for each column of the reference, at least
+SHORT_LEG = 12  # points; a shorter leg gets a constant only
+REVERSAL = 0.05  # of a leg: how fast its start may relax
+
+
+@dataclass(frozen=True)
+class LackOfFit:
+    """F = [(RSS - RSS_saturated) / (p - k)] / s^2 of a model, and what is its probability if nothing is missing.
+
+    ratio : F; 1 is what an adequate model has
+    p_value : P(F >= ratio)
+    chi2 : RSS over the noise's own variance
+    dof : N - k
+    """
+
+    ratio: float
+    p_value: float
+    chi2: float
+    dof: int
+
+    @property
+    def reduced_chi2(self) -> float:
+        """chi^2 / (N - k), by the measurement's own noise."""
+        return self.chi2 / max(self.dof, 1)
+
+
+def reference_basis(measurement: Measurement) -> Array:
+    """(N, p): B-splines in the deflection, and on each leg Legendre polynomials and a quick relaxation at its start.
+
+    There are never more columns than a third of the points: splines come first, then what tells legs apart.
+    """
+    d = measurement.deflection
+    room = max(len(measurement) // SHARE, 1)
+    columns = [splines(d, min(SPLINE, room, max(np.unique(d).size // 2, 1)))]
+    starts = np.flatnonzero(np.diff(measurement.leg.astype(int))) + 1
+    legs = np.split(np.arange(d.size), starts)
+    if len(legs) > 1:
+        each = PER_LEG if columns[0].shape[1] + PER_LEG * len(legs) <= 2 * room else 1
+        columns += [_on_leg(d, leg, each) for leg in legs]
+    return np.concatenate(columns, axis=1)
+
+
+def splines(d: Array, count: int) -> Array:
+    """Cubic B-splines of ``count`` degrees of freedom with knots at quantiles of the deflections (N,)."""
+    if count < 4:
+        return np.vander((d - d.mean()) / max(np.ptp(d), 1e-12), count)
+    inner = np.quantile(np.unique(d), np.linspace(0, 1, count - 2)[1:-1])
+    low, high = float(d.min()), float(d.max())
+    knots = np.concatenate([[low] * 4, inner, [high] * 4])
+    return np.asarray(BSpline.design_matrix(np.clip(d, low, high), knots, 3).toarray())
+
+
+def _on_leg(d: Array, leg: NDArray[np.intp], count: int) -> Array:
+    out = np.zeros((d.size, count))
+    if count == 1 or leg.size < SHORT_LEG:
+        out[leg, 0] = 1.0
+        return out
+    s = np.linspace(0.0, 1.0, leg.size)
+    way = np.abs(d[leg] - d[leg[0]])
+    if way[-1] > 0:
+        s = way / way.max()
+    out[leg, :-1] = legvander(2 * s - 1, count - 2)
+    out[leg, -1] = np.exp(-s / REVERSAL)
+    return out
+
+
+def lack_of_fit(residual: Array, slopes: Array, basis: Array, noise: OwnNoise) -> LackOfFit:
+    """How much of ``residual`` (N,) the reference (N, p), together with the model's ``slopes`` (N, k), explains.
+
+    The saturated residual sets the scale where the noise is inferred; where it is stated, that does.
+    """
+    r, k = noise.white(residual), slopes.shape[1]
+    q = orthonormal(noise.white(np.column_stack([basis, slopes])))
+    rss, rest = float(r @ r), float(np.sum((r - q @ (q.T @ r)) ** 2))
+    n, p = r.size, q.shape[1]
+    extra = max(p - k, 1)
+    if noise.stated:
+        # Everything that is left counts: the noise is known.
+        value, dof = rss, max(n - k, 1)
+        return LackOfFit(value / dof, float(chi2.sf(value, dof)), rss, n - k)
+    scale = max(rest / max(n - p, 1), 1e-300)
+    ratio = max(rss - rest, 0.0) / extra / scale
+    return LackOfFit(float(ratio), float(f.sf(ratio, extra, max(n - p, 1))), rss, n - k)

@@ -1,0 +1,155 @@
+"""Which effect, which pair, or which other material explains what a model lacks: everything is refitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayesmembrane.diagnosis.candidates import Candidate, Search, with_effects
+from bayesmembrane.diagnosis.saturated import SPLINE, LackOfFit, lack_of_fit, splines
+from bayesmembrane.diagnosis.whitening import orthonormal
+from bayesmembrane.effects.base import Effect
+from bayesmembrane.hypothesis import Hypothesis
+from bayesmembrane.measurement import Measurement
+from bayesmembrane.parameters import Array
+from bayesmembrane.registry import materials
+
+DECISIVE = 4.0
+"""ln of the Bayes factor beyond which a rival is out."""
+NEAR_DECISIVE, NEAR = 8.0, 20.0  # the same for rivals whose trace makes less than so many degrees with the winner's
+UNEXPLAINED, LEVEL = 0.12, 0.01
+"""A model explains the curve if lack of fit is not significant, or no more than this part of it is left."""
+BEAM, EARNS, EARNED_SHARE = 4, 5.0, 0.08  # of pairs: how many singles are followed, ln K and part of chi^2 to gain
+SINGLE_VALUED = 0.02  # part of a signature that deflection alone does not explain
+LEAST_WEIGHT = 0.05
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A candidate and how well it fits."""
+
+    candidate: Candidate
+    fit: LackOfFit
+    unexplained: float
+
+    @property
+    def explains(self) -> bool:
+        """True if what is left is noise, or little beside what was there."""
+        return self.fit.p_value > LEVEL or self.unexplained <= UNEXPLAINED
+
+    @property
+    def log_evidence(self) -> float:
+        return self.candidate.log_evidence
+
+
+@dataclass(frozen=True, eq=False)
+class Tracer:
+    """Refits candidates beside ``null`` and judges them.
+
+    basis : (N, p) the saturated reference
+    """
+
+    search: Search
+    basis: Array
+    null: Candidate
+
+    @property
+    def measurement(self) -> Measurement:
+        return self.search.measurement
+
+    def judged(self, candidate: Candidate) -> Judged:
+        """Its lack of fit, and the part of the null model's that is left."""
+        careful = self.search.noise.cautious()
+        fit = lack_of_fit(candidate.residual, candidate.slopes, self.basis, careful)
+        before = lack_of_fit(self.null.residual, self.null.slopes, self.basis, careful)
+        left = max(fit.ratio - 1, 0.0) / max(before.ratio - 1, 1e-12) if before.ratio > 1 else 0.0
+        return Judged(candidate, fit, float(left))
+
+    def singles(self, effects: Sequence[Effect], tell: Tell) -> list[Judged]:
+        """The null model with each effect, refitted; the most probable first."""
+        out = []
+        for effect in effects:
+            tell(f"refitting with {effect.title}")
+            hypothesis = with_effects(self.null.hypothesis, [effect])
+            found = self.search.fit(hypothesis, self.search.starts_with(self.null, effect))
+            if found is not None:
+                out.append(self.judged(found))
+        return ranked(out)
+
+    def pairs(self, singles: Sequence[Judged], effects: Sequence[Effect], tell: Tell) -> list[Judged]:
+        """The best few single effects, each with every other effect; the most probable pair first.
+
+        The first effect of a pair is often not the best single one: hence several are followed.
+        """
+        out: dict[frozenset[str], Judged] = {}
+        for first in singles[:BEAM]:
+            for effect in effects:
+                key = frozenset((*first.candidate.names, effect.name))
+                if effect.name in first.candidate.names:
+                    continue
+                tell("refitting pairs: " + " with ".join(sorted(key)))
+                hypothesis = with_effects(first.candidate.hypothesis, [effect])
+                starts = self.search.starts_with(first.candidate, effect)
+                found = self.search.fit(hypothesis, starts, sane=False)
+                if found is None:
+                    continue
+                judged = self.judged(found)
+                if key not in out or judged.log_evidence > out[key].log_evidence:
+                    out[key] = judged
+        return ranked(out.values())
+
+    def materials(self, tell: Tell) -> list[Judged]:
+        """The other strain energies, with the effects of the null model; the most probable first."""
+        out = []
+        base: Hypothesis = self.null.hypothesis
+        for name, kind in materials().items():
+            if name == base.material.name:
+                continue
+            tell(f"trying the energy {kind.title}")
+            found = self.search.fit(replace(base, material=kind))
+            if found is not None:
+                out.append(self.judged(found))
+        return ranked(out)
+
+    def again(self, judged: Iterable[Judged]) -> list[Judged]:
+        """The same candidates fitted anew from where they are, with the search's present noise and weight."""
+        out = []
+        for j in judged:
+            found = self.search.fit(j.candidate.hypothesis, [j.candidate.x], sane=False)
+            out.append(self.judged(found) if found is not None else j)
+        return ranked(out)
+
+    def single_valued(self, candidate: Candidate) -> bool:
+        """True if its effects change the curve by a function of deflection alone, on this path."""
+        n = candidate.hypothesis.material_size
+        d = self.measurement.deflection
+        smooth = orthonormal(_smooth(d))
+        for slope in candidate.slopes[:, n:].T:
+            size = float(np.linalg.norm(slope))
+            rest = slope - smooth @ (smooth.T @ slope)
+            if size > 0 and float(np.linalg.norm(rest)) > SINGLE_VALUED**0.5 * size:
+                return False
+        return True
+
+
+def ranked(judged: Iterable[Judged]) -> list[Judged]:
+    """The most probable first."""
+    return sorted(judged, key=lambda j: -j.log_evidence)
+
+
+def effective_weight(residual_white: Array) -> float:
+    """n_eff / N = (1 - r1) / (1 + r1) of whitened residuals (N,), at most 1: what correlation is left."""
+    if residual_white.size < 3:
+        return 1.0
+    r = residual_white - residual_white.mean()
+    scale = float(r @ r)
+    r1 = float(r[1:] @ r[:-1]) / scale if scale > 0 else 0.0
+    return float(np.clip((1 - r1) / (1 + r1), LEAST_WEIGHT, 1.0))
+
+
+def _smooth(d: Array) -> Array:
+    return splines(d, min(SPLINE, max(np.unique(d).size // 3, 4)))

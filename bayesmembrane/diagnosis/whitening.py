@@ -1,0 +1,116 @@
+"""The measurement's own noise: how large, how long it remembers, and residuals freed from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import minimize_scalar
+
+from bayesmembrane.measurement import Measurement
+from bayesmembrane.parameters import Array
+
+LARGEST_RHO = 0.97
+TRIALS = np.linspace(0.0, LARGEST_RHO, 25)
+CURVED = 0.02  # step in rho at which the curvature of the likelihood is taken
+SMALLEST_SD = 1e-9  # of the largest force: a perfect curve still has a noise
+
+
+@dataclass(frozen=True, eq=False)
+class OwnNoise:
+    """e ~ N(0, S): what the load cell does on its own, free of anything that a model may lack.
+
+    sd : N, of one point; with a given covariance the root mean square of its diagonal
+    rho, rho_sd : correlation of neighbours a median step apart, and its standard error; 0 where the noise is given
+    gaps : (N - 1,) steps between points over their median
+    root : (N, N) Cholesky factor of a covariance that the measurement states, or None
+    dof : degrees of freedom behind ``sd``; inf where it is given
+    """
+
+    sd: float
+    rho: float
+    rho_sd: float
+    gaps: Array
+    root: Array | None
+    dof: float
+
+    @property
+    def stated(self) -> bool:
+        """True if the measurement states its noise."""
+        return self.root is not None
+
+    def white(self, values: Array) -> Array:
+        """L^-1 v along the first axis of v (N, ...), with S = L L^T: noise becomes N(0, 1)."""
+        if self.root is not None:
+            flat = values.reshape(len(values), -1)
+            return np.asarray(solve_triangular(self.root, flat, lower=True)).reshape(values.shape)
+        return decorrelated(values, self.rho, self.gaps) / self.sd
+
+    def cautious(self) -> OwnNoise:
+        """With a correlation larger by its standard error: one that is plugged in makes tests optimistic."""
+        if self.stated:
+            return self
+        rho = min(self.rho + self.rho_sd, LARGEST_RHO)
+        return replace(self, rho=rho)
+
+
+def decorrelated(values: Array, rho: float, gaps: Array) -> Array:
+    """(v_i - phi_i v_(i-1)) / sqrt(1 - phi_i^2) with phi = rho^gap: AR(1) noise of unit variance becomes white."""
+    phi = rho**gaps if rho > 0 else np.zeros(gaps.size)
+    phi = phi.reshape(-1, *(1,) * (values.ndim - 1))
+    out = np.array(values, dtype=float)
+    out[1:] = (values[1:] - phi * values[:-1]) / np.sqrt(1 - phi**2)
+    return out
+
+
+def gaps_of(measurement: Measurement) -> Array:
+    """(N - 1,) steps between neighbours over the median step: of time, or else of the distance travelled."""
+    place = measurement.deflection if measurement.time is None else measurement.time
+    gap = np.abs(np.diff(place))
+    middle = float(np.median(gap)) if gap.size else 1.0
+    return np.asarray(np.maximum(gap / middle, 1e-3)) if middle > 0 else np.ones(gap.size)
+
+
+def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
+    """Noise that the measurement states, or else what ``basis`` (N, p) leaves, by restricted maximum likelihood.
+
+    For AR(1) noise e the restricted likelihood of rho, sd maximised away, is
+    -1/2 [(N - p) ln RSS + ln |R| + ln |B^T R^-1 B|] (D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320).
+    """
+    gaps, covariance = gaps_of(measurement), measurement.noise_covariance
+    if covariance is not None:
+        sd = float(np.sqrt(np.mean(np.diag(covariance))))
+        return OwnNoise(sd, 0.0, 0.0, gaps, np.asarray(np.linalg.cholesky(covariance), dtype=float), np.inf)
+    y = measurement.force
+    q = orthonormal(basis)
+
+    def fit(rho: float) -> tuple[float, float]:
+        """(-2 ln L, RSS) at one correlation."""
+        white = decorrelated(np.column_stack([y, q]), rho, gaps)
+        r = np.linalg.qr(white[:, 1:], mode="r")
+        rest = white[:, 0] - white[:, 1:] @ np.linalg.lstsq(white[:, 1:], white[:, 0], rcond=None)[0]
+        rss = float(rest @ rest)
+        phi = rho**gaps if rho > 0 else np.zeros(gaps.size)
+        log_det = float(np.sum(np.log1p(-(phi**2)))) + 2 * float(np.sum(np.log(np.abs(np.diag(r)))))
+        return (y.size - q.shape[1]) * np.log(max(rss, 1e-300)) + log_det, rss
+
+    values = [fit(rho)[0] for rho in TRIALS]
+    best = int(np.argmin(values))
+    low, high = TRIALS[max(best - 1, 0)], TRIALS[min(best + 1, TRIALS.size - 1)]
+    rho = float(minimize_scalar(lambda v: fit(v)[0], bounds=(low, high), method="bounded").x)
+    rho = 0.0 if fit(0.0)[0] <= fit(rho)[0] else rho
+    middle = min(max(rho, CURVED), LARGEST_RHO - CURVED)
+    bend = (fit(middle - CURVED)[0] - 2 * fit(middle)[0] + fit(middle + CURVED)[0]) / CURVED**2
+    dof = y.size - q.shape[1]
+    error = float(np.sqrt(2 / bend)) if bend > 0 else 1 / np.sqrt(dof)
+    sd = np.sqrt(fit(rho)[1] / dof)
+    floor = SMALLEST_SD * float(np.max(np.abs(y)))
+    return OwnNoise(max(float(sd), floor), rho, min(error, 0.3), gaps, None, float(dof))
+
+
+def orthonormal(basis: Array, tolerance: float = 1e-9) -> Array:
+    """(N, rank) orthonormal columns that span those of ``basis`` (N, p), each scaled to unit length first."""
+    length = np.linalg.norm(basis, axis=0)
+    u, s, _ = np.linalg.svd(basis[:, length > 0] / length[length > 0], full_matrices=False)
+    return np.asarray(u[:, s > tolerance * (s[0] if s.size else 1.0)])

@@ -1,0 +1,105 @@
+"""The verdict as sentences that an engineer can act on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from bayesmembrane.diagnosis.candidates import Candidate
+from bayesmembrane.diagnosis.detection import Detection
+from bayesmembrane.diagnosis.heldout import Error
+from bayesmembrane.diagnosis.separation import Experiment
+from bayesmembrane.registry import components
+
+SHOWN = 3
+SCALES = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "N": (1e3, "mN"), "N/s": (1e3, "mN/s"), "-": (1.0, "")}
+
+
+def sentence_of(
+    verdict: str,
+    members: Sequence[Candidate],
+    null: Candidate,
+    detection: Detection,
+    before: Error,
+    after: Error,
+    shape: str,
+    power: Mapping[str, float],
+    nexts: Sequence[Experiment],
+) -> str:
+    """What to read first: the verdict, how sure, how large, and what to do."""
+    title = null.hypothesis.material.title
+    have = " with " + " and ".join(e.title for e in null.hypothesis.effects) if null.hypothesis.effects else ""
+    if verdict == "adequate":
+        return (
+            f"{title}{have} describes the curve to within its noise (p = {detection.p_value:.2g}; "
+            f"{1e3 * before.rmse_N:.3g} mN root mean square). Nothing is seen to be missing. {_power(null, power)}"
+        ).strip()
+    start = f"{title}{have} misses something (p = {_p(detection.p_value)}): "
+    error = (
+        f"The residual falls from {1e3 * before.rmse_N:.3g} to {1e3 * after.rmse_N:.3g} mN root mean square, "
+        f"{after.reduced_chi2:.2f} in reduced chi-square."
+    )
+    if verdict == "named":
+        return f"{start}{_effects(members[0], null)}. {error}{_bounds(members[0])}{_signature(members[0], null)}"
+    if verdict == "material":
+        better = members[0].hypothesis.material.title
+        return (
+            f"{start}the energy {better} explains it without any added effect, better than or as well as an effect of "
+            f"the instrument would. {error}{_bounds(members[0])} Use {better}, or show by another test that the family "
+            f"is right before an instrument is blamed."
+        )
+    if verdict == "ambiguous":
+        names = "; or ".join(_effects(m, null) for m in members)
+        advice = f" To tell them apart: {nexts[0].sentence}." if nexts else ""
+        return f"{start}this measurement cannot tell which of these it is: {names}. {error}{advice}"
+    if members:
+        names = " with ".join(e.title for e in members[0].hypothesis.effects)
+        return (
+            f"{start}{names} would imitate it, but together they follow the deflection alone, as a strain energy that "
+            f"is not known here would do just as well. No name is given. {shape}"
+        )
+    return f"{start}no known effect, no pair of effects and no other energy explains it. {shape}"
+
+
+def _effects(candidate: Candidate, null: Candidate) -> str:
+    """Titles and sizes of the effects that a candidate adds."""
+    have = {e.name for e in null.hypothesis.effects}
+    values = candidate.parameters
+    words = []
+    for effect in candidate.hypothesis.effects:
+        if effect.name in have:
+            continue
+        p = effect.size
+        words.append(f"{effect.title} ({p.name} {size_in_words(values[f'{effect.name}.{p.name}'], p.unit)})")
+    return " and ".join(words)
+
+
+def size_in_words(value: float, unit: str) -> str:
+    """A value in SI in the unit that people read."""
+    factor, shown = SCALES.get(unit, (1.0, unit))
+    return f"{factor * value:.3g} {shown}".strip()
+
+
+def _signature(candidate: Candidate, null: Candidate) -> str:
+    have = {e.name for e in null.hypothesis.effects}
+    told = [e.signature for e in candidate.hypothesis.effects if e.name not in have]
+    return " " + " ".join(told)
+
+
+def _bounds(candidate: Candidate) -> str:
+    if not candidate.at_bound:
+        return ""
+    return f" An estimate lies at its bound ({', '.join(candidate.at_bound)}): take it as a limit, not as a value."
+
+
+def _power(null: Candidate, power: Mapping[str, float]) -> str:
+    """The smallest sizes that would have shown, for the effects that are easiest to see relative to what is usual."""
+    known = components("effects")
+    relative = sorted((size / known[n]().size.scale, n, size) for n, size in power.items() if np.isfinite(size))
+    words = [f"{known[n].title} of {size_in_words(size, known[n]().size.unit)}" for _, n, size in relative[:SHOWN]]
+    return f"It would have shown {', '.join(words)} or more." if words else ""
+
+
+def _p(value: float) -> str:
+    return "< 0.0001" if value < 1e-4 else f"{value:.2g}"
