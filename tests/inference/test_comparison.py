@@ -8,13 +8,15 @@ import pytest
 
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.hypothesis import hypothesis
-from bayesmembrane.inference import comparison_jobs
-from bayesmembrane.inference.comparison import compare
+from bayesmembrane.inference import comparison, comparison_jobs
+from bayesmembrane.inference.comparison import claimed, compare, ranges_of
+from bayesmembrane.inference.comparison_jobs import Climbed, Sampled
 from bayesmembrane.inference.comparison_result import Row, ranked
 from bayesmembrane.inference.evidence import BRIDGE, NESTED, together
+from bayesmembrane.inference.evidence_sensitivity import Widened
 from bayesmembrane.inference.evidence_target import Estimate
 from bayesmembrane.inference.predictive_comparison import LeaveOneOut
-from bayesmembrane.inference.prior import JointPrior, Mass
+from bayesmembrane.inference.prior import Mass
 from bayesmembrane.measurement import Measurement, Specimen
 from bayesmembrane.mechanics import api
 from bayesmembrane.registry import material
@@ -98,15 +100,12 @@ def test_a_damaged_result_is_made_again(tmp_path):
 
 def test_a_hypothesis_that_cannot_be_fitted_does_not_spoil_the_others(monkeypatch):
     """One whose prior has no mass, one with more parameters than points: each has a row that says why."""
-    survey = JointPrior.survey
+    mass = comparison_jobs._mass
 
-    def empty_for_gent(self, *args, **options):
-        masses, inside = survey(self, *args, **options)
-        if self.hypothesis.material.name != "gent":
-            return masses, inside
-        return {m: Mass(2e-4, 2e-4) for m in masses}, inside[:0]
+    def none_for_gent(posterior, seed):
+        return Mass(0.0, 5e-4) if posterior.hypothesis.material.name == "gent" else mass(posterior, seed)
 
-    monkeypatch.setattr(JointPrior, "survey", empty_for_gent)
+    monkeypatch.setattr(comparison_jobs, "_mass", none_for_gent)
     m = film("neo_hookean", (7.0,), 0.03).select(np.arange(4))
     claims = [hypothesis(n) for n in ("neo_hookean", "gent", "ogden")]
     found = compare(m, claims, seed=405, out=None, ess=200, modes=False, workers=1)
@@ -175,3 +174,47 @@ def test_probabilities_follow_the_evidence():
     assert with_unknown.agreed
     assert with_unknown.rows[2].posterior_probability is None
     assert with_unknown.rows[0].posterior_probability == pytest.approx(rows[0].posterior_probability)
+
+
+def test_another_look_is_taken_where_chance_may_have_parted_the_estimators(monkeypatch):
+    """Nested sampling that is off by three of its errors is repeated, and both are averaged."""
+    once = Estimate(-10.3, 0.1, 5, 1.0, (-10.3,))
+    monkeypatch.setattr(
+        comparison_jobs, "_nested", lambda posterior, seed, tell: Estimate(-10.0, 0.1, 7, 1.0, (-10.0,))
+    )
+    monkeypatch.setattr(comparison, "climb", lambda job, tell: Climbed(once, Mass(1.0, 0.0), ""))
+    known = Sampled(Estimate(-10.0, 0.01, 1, 1.0), None, None, (), (), None, 1, 1.0, (), "")
+    monkeypatch.setattr(comparison, "walk", lambda job, tell: known)
+    (row_,) = compare(film(), [hypothesis("gent")], out=None, workers=1).rows
+    assert row_.evidence.log_evidence[NESTED] == pytest.approx(-10.15)
+    assert row_.evidence.log_evidence_sd[NESTED] == pytest.approx(0.15, abs=0.001)
+    assert row_.evidence.evaluations[NESTED] == 12
+    assert row_.evidence.agreed
+
+
+def test_the_ranking_is_said_to_survive_other_priors_or_not():
+    widths = (Widened("gent.ln_jm", 2.0, -1.0, 0.1, 500.0, ""),)
+    one, other = replace(row("one", -10, 5), widths=widths), row("other", -15, 3)
+    assert "stays first" in ranked([one, other]).survival
+    assert "falls to 4.0 at worst, with the prior of gent.ln_jm 2 times as wide" in ranked([one, other]).survival
+    rising = replace(other, widths=(replace(widths[0], change=6.0),))
+    assert "is lost by 1.0" in ranked([one, rising]).survival
+
+
+def test_hypotheses_are_named_with_their_effects():
+    plain, both = claimed("yeoh, gent+prestretch", "", "white", "reached")
+    assert plain.label() == "yeoh"
+    assert both.label() == "gent+prestretch"
+    assert [h.label() for h in claimed("yeoh,gent+prestretch", "prestretch", "white", "reached")] == [
+        "yeoh+prestretch",
+        "gent+prestretch",
+    ]
+
+
+def test_ranges_are_parts_of_the_whole():
+    whole = film()
+    found = ranges_of(whole, [0.03, 0.06])
+    assert list(found) == ["up to 30 mm", "up to 60 mm"]
+    assert found["up to 30 mm"].whole is whole
+    assert found["up to 60 mm"].whole is None
+    assert len(found["up to 30 mm"].measurement) == 5

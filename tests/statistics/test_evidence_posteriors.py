@@ -9,6 +9,7 @@ import pytest
 from bayesmembrane.demo import shipped_measurement
 from bayesmembrane.hypothesis import hypothesis
 from bayesmembrane.inference.evidence_bridge import bridge
+from bayesmembrane.inference.evidence_convexity import by_convexity
 from bayesmembrane.inference.evidence_nested import nested
 from bayesmembrane.inference.evidence_sensitivity import prior_widths, scaled
 from bayesmembrane.inference.evidence_target import PosteriorTarget
@@ -55,6 +56,21 @@ def test_nested_sampling_is_right_within_three_standard_errors(name):
     found = nested(PosteriorTarget(posterior(name)), 212, tolerance=0.15)
     assert found.sd <= 0.15
     assert abs(found.log_evidence - exact(name)) < 3 * found.sd
+
+
+def test_evidence_under_another_mode_comes_from_the_draws_of_one():
+    p = posterior("mooney_rivlin")
+    x, _, _ = sampled("mooney_rivlin")
+    masses = p.prior.masses(p.measurement, 213)
+    rows = {r.mode: r for r in by_convexity(p, x.reshape(-1, x.shape[-1]), exact("mooney_rivlin"), 0.0, masses, 1)}
+    wanted = exact("mooney_rivlin", "box") - np.log(masses["box"].value)
+    assert rows["box"].reason == ""
+    assert abs(rows["box"].log_evidence - wanted) < 3.5 * rows["box"].sd + 0.01
+    assert rows["reached"].log_evidence == pytest.approx(exact("mooney_rivlin") - np.log(masses["reached"].value))
+    # Whatever else is allowed adds to the integral that is not yet divided by the mass.
+    integral = {m: r.log_evidence + np.log(r.mass) for m, r in rows.items() if not r.reason}
+    assert integral["box"] <= integral["reached"] + 1e-9
+    assert integral.get("none", np.inf) >= integral["reached"] - 1e-9
 
 
 @pytest.mark.parametrize("name", ["gent", "mooney_rivlin"])
