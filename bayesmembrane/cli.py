@@ -311,8 +311,17 @@ def valleys(
         document["files"] = [str(f) for f in write_valleys(found, out_folder)]
 
     def show() -> None:
-        shown = valley_table([found])
-        table(shown.caption, [c.head for c in shown.columns], shown.cells())
+        whole = valley_table([found])
+        shown = [
+            i
+            for i, c in enumerate(whole.columns)
+            if c.key in ("end_mm", "loss_N", "length", "unit", "condition_number", "open")
+        ]
+        table(
+            f"Valleys of {claim.material.title} on {curve}",
+            [whole.columns[i].head for i in shown],
+            [[row[i] for i in shown] for row in whole.cells()],
+        )
         for sentence in found.sentences:
             out.print(sentence)
         for valley in found.ranges:

@@ -10,16 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from bayesmembrane.inference.valleys_posterior import Grid
-from bayesmembrane.inference.valleys_profile import PairMap
 from bayesmembrane.inference.valleys_result import Valley, Valleys
 from bayesmembrane.parameters import Array
 from bayesmembrane.reporting.figures import Picture, _encoded, _figure, _style
 from bayesmembrane.reporting.style import FAINT, INK, MUTED, with_unit
+from bayesmembrane.reporting.valley_pairs import RANGE_COLOURS, label, pairs, percent
 
-RANGE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9")
 HELD = 0.9
 DECADES = 1000.0  # how far an open end on a logarithmic axis is drawn past the closed one
 MOST_DOTS = 400
@@ -30,15 +28,11 @@ def valley_picture(found: Valleys, kind: str = "png") -> Picture:
     k = found.ranges[0].chart.size
     if k == 1:
         return _one(found, kind)
-    return _plane(found, kind) if k == 2 else _pairs(found, kind)
+    return _plane(found, kind) if k == 2 else pairs(found, kind)
 
 
-def _label(v: Valley) -> str:
-    return f"up to {1e3 * v.end:.4g} mm"
-
-
-def _percent(v: Valley) -> str:
-    return f"{100 * v.rise / v.best_loss:.3g} %"
+def _mode(v: Valley) -> str:
+    return "reached" if v.hypothesis.convexity == "none" else v.hypothesis.convexity
 
 
 # ---- one parameter ---------------------------------------------------------------------------------------------------
@@ -50,7 +44,7 @@ def _one(found: Valleys, kind: str) -> Picture:
         ax = figure.subplots()
         drawn = [(v, v.profiles[0], v.chart.natural(v.profiles[0].points)[:, 0]) for v in found.ranges]
         for (v, p, x), c in zip(drawn, RANGE_COLOURS, strict=False):
-            ax.plot(x, 100 * (p.loss / v.best_loss - 1), color=c, label=f"{_label(v)}: least loss {v.best_loss:.3g} N")
+            ax.plot(x, 100 * (p.loss / v.best_loss - 1), color=c, label=f"{label(v)}: least loss {v.best_loss:.3g} N")
             ax.plot(v.best[0], 0, "*", color=c, markersize=13, markeredgecolor="white")
         share = 100 * found.ranges[0].rise / found.ranges[0].best_loss
         ax.axhline(share, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
@@ -91,17 +85,18 @@ def _axes_order(v: Valley) -> tuple[int, int]:
 def _overview(ax: Axes, found: Valleys, order: tuple[int, int]) -> None:
     x, y = order
     for v, c in zip(found.ranges, RANGE_COLOURS, strict=False):
-        _levels(ax, v, order, c, fill=True)
+        _levels(ax, v, order, c)
         ax.plot(v.floor[:, x], v.floor[:, y], color=c, linewidth=2.6, zorder=4)
         _points(ax, v, order, c, labels=v is found.ranges[0])
     _limits(ax, [s for v in found.ranges for s in _corners(v, order)], found.ranges[0], order, 0.14)
     for v, c in zip(found.ranges, RANGE_COLOURS, strict=False):
         middle = v.floor[len(v.floor) // 2] if not v.open_end else v.floor[len(v.floor) // 6]
         ax.annotate(
-            f"{_label(v)}: least loss {v.best_loss:.3g} N",
+            f"{label(v)}: least loss {v.best_loss:.3g} N",
             (middle[x], middle[y]),
-            xytext=(12, 14),
+            xytext=(12, 14) if _across(ax, middle[[x, y]]) < 0.6 else (40, 52),
             textcoords="offset points",
+            ha="left" if _across(ax, middle[[x, y]]) < 0.6 else "center",
             color=c,
             fontweight="bold",
             zorder=8,
@@ -115,14 +110,14 @@ def _overview(ax: Axes, found: Valleys, order: tuple[int, int]) -> None:
         ax.annotate(
             text,
             tuple(_halfway(ax, one[[x, y]], two[[x, y]])),
-            xytext=(16, -26),
+            xytext=(-10, -36),
             textcoords="offset points",
-            ha="left",
+            ha="center",
             arrowprops={"arrowstyle": "-", "color": MUTED, "linewidth": 0.8},
             zorder=8,
             bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.5},
         )
-    rise = _percent(found.ranges[0])
+    rise = percent(found.ranges[0])
     ax.set_title(f"{found.hypothesis.material.title}: all films that fit within {rise} of the best loss")
     _axis_labels(ax, found.ranges[0], order)
 
@@ -133,10 +128,15 @@ def _halfway(ax: Axes, one: Array, two: Array) -> Array:
     return np.asarray(ax.transData.inverted().transform(np.mean(shown, axis=0)))
 
 
+def _across(ax: Axes, point: Array) -> float:
+    """Where a point lies on the width of the axes, from 0 to 1."""
+    return float(ax.transAxes.inverted().transform(ax.transData.transform(point))[0])
+
+
 def _zoom(ax: Axes, v: Valley, order: tuple[int, int], c: str) -> None:
     x, y = order
     assert v.band is not None
-    _levels(ax, v, order, c, fill=True)
+    _levels(ax, v, order, c)
     _hatch(ax, v, v.band, order)
     if v.spread.source == "draws":
         dots = v.chart.natural(v.spread.draws[:: max(1, len(v.spread.draws) // MOST_DOTS)])
@@ -151,12 +151,14 @@ def _zoom(ax: Axes, v: Valley, order: tuple[int, int], c: str) -> None:
     _limits(ax, inner, v, order, 0.25)
     _open_arrow(ax, v, order, c)
     number = v.spectra[0].condition_number
-    ratio = f", condition number {float(f'{number:.2g}'):,.0f}" if number < 1e9 else ""
-    ax.set_title(f"{_label(v)}{ratio}", color=c)
+    size = int(np.floor(np.log10(number))) if 0 < number < np.inf else 99
+    shown = f"{number:,.0f}" if size < 4 else rf"${number / 10.0**size:.1f}\times10^{{{size}}}$"
+    ratio = f", condition number {shown}" if size < 9 else ""
+    ax.set_title(f"{label(v)}{ratio}", color=c)
     _axis_labels(ax, v, order)
 
 
-def _levels(ax: Axes, v: Valley, order: tuple[int, int], c: str, fill: bool) -> None:
+def _levels(ax: Axes, v: Valley, order: tuple[int, int], c: str) -> None:
     """What lies within the stated rise, three times it, and twice the least loss."""
     assert v.band is not None
     p = v.band.natural
@@ -168,8 +170,7 @@ def _levels(ax: Axes, v: Valley, order: tuple[int, int], c: str, fill: bool) -> 
 
 
 def _hatch(ax: Axes, v: Valley, g: Grid, order: tuple[int, int]) -> None:
-    mode = _mode(v)
-    bad = (~g.convex(mode)).astype(float)
+    bad = (~g.convex(_mode(v))).astype(float)
     if np.any(bad > 0):
         ax.contourf(
             g.natural[:, :, order[0]], g.natural[:, :, order[1]], bad, levels=[0.5, 1.5], colors="none",
@@ -177,17 +178,12 @@ def _hatch(ax: Axes, v: Valley, g: Grid, order: tuple[int, int]) -> None:
         )  # fmt: skip
 
 
-def _mode(v: Valley) -> str:
-    return "reached" if v.hypothesis.convexity == "none" else v.hypothesis.convexity
-
-
 def _posterior(ax: Axes, v: Valley, order: tuple[int, int]) -> None:
     """The region of highest density that holds `HELD` of the posterior, over the band."""
     assert v.band is not None
     p = v.band.natural
     density = np.exp(v.band.log_posterior - np.max(v.band.log_posterior))
-    along = v.along
-    cells = np.abs(np.gradient(p[:, 0, along])[:, None] * np.gradient(p[:, :, 1 - along], axis=1))
+    cells = np.abs(np.gradient(p[:, 0, v.along])[:, None] * np.gradient(p[:, :, 1 - v.along], axis=1))
     weight = (density * cells).ravel()
     by_density = np.argsort(-density.ravel())
     inside = np.cumsum(weight[by_density]) / np.sum(weight)
@@ -221,7 +217,8 @@ def _open_arrow(ax: Axes, v: Valley, order: tuple[int, int], c: str) -> None:
     if not v.open_end or v.along != order[0]:
         return
     side = 1.0 if high.open else 0.0
-    at = float(np.interp(ax.get_xlim()[int(side)], np.sort(v.floor[:, order[0]]), _sorted(v.floor, order)))
+    line = v.floor[np.argsort(v.floor[:, order[0]])]
+    at = float(np.interp(ax.get_xlim()[int(side)], line[:, order[0]], line[:, order[1]]))
     goal = f"open: on to the {v.limit} film" if v.limit else "open: no end"
     ax.annotate(
         goal,
@@ -238,13 +235,8 @@ def _open_arrow(ax: Axes, v: Valley, order: tuple[int, int], c: str) -> None:
     )
 
 
-def _sorted(points: Array, order: tuple[int, int]) -> Array:
-    return np.asarray(points[np.argsort(points[:, order[0]]), order[1]])
-
-
 def _corners(v: Valley, order: tuple[int, int]) -> list[Array]:
-    x, y = order
-    return [v.floor[:, [x, y]], *(np.array([[p.natural[x], p.natural[y]]]) for p in v.published)]
+    return [v.floor[:, list(order)], *(np.array([p.natural])[:, list(order)] for p in v.published)]
 
 
 def _limits(ax: Axes, points: Sequence[Array], v: Valley, order: tuple[int, int], margin: float) -> None:
@@ -283,120 +275,7 @@ def _handles(ranges: Sequence[Valley]) -> list[Any]:
         Line2D([], [], color=INK, linewidth=1.3, linestyle=(0, (5, 2)), label=f"{100 * HELD:.0f} % of the posterior"),
         Patch(facecolor="none", edgecolor=INK, hatch="////", linewidth=0, label=f"not convex ({_mode(v)})"),
     ]
-    kept = v.published, any(w.band is not None and not np.all(w.band.convex(_mode(w))) for w in ranges)
-    dropped = {"published"} if not kept[0] else set()
-    dropped |= set() if kept[1] else {f"not convex ({_mode(v)})"}
-    return [h for h in handles if h.get_label() not in dropped]
-
-
-# ---- more than two ---------------------------------------------------------------------------------------------------
-
-
-def _pairs(found: Valleys, kind: str) -> Picture:
-    """A triangle of pairwise maps, with the profile of each parameter on its diagonal."""
-    k = found.ranges[0].chart.size
-    with _style({"font.size": 9 if k > 3 else 11, "axes.labelsize": 9 if k > 3 else 11}):
-        figure = _figure(max(1.55 * k, 6.4))
-        axes = figure.subplots(k, k, squeeze=False, sharex="col")
-        for i in range(k):
-            for j in range(k):
-                ax = axes[i][j]
-                if j > i:
-                    ax.set_axis_off()
-                elif i == j:
-                    _profile(ax, found, i)
-                else:
-                    _pair(ax, found, (j, i))
-                _trim(ax, found.ranges[0], i, j, k)
-        figure.legend(handles=_pair_handles(found), loc="upper right", bbox_to_anchor=(0.99, 0.93), fontsize=11)
-        rise = _percent(found.ranges[0])
-        figure.suptitle(
-            f"{found.hypothesis.material.title}: films within {rise} of the best loss, the other parameters adjusted",
-            fontweight="bold",
-            fontsize=12,
-        )
-        return _encoded(figure, kind)
-
-
-def _axis_values(v: Valley, i: int, z: Array) -> Array:
-    """Natural values of parameter i; magnitudes where it is logarithmic."""
-    wide = np.tile(v.best_z, (z.size, 1))
-    wide[:, i] = z
-    p = v.chart.natural(wide)[:, i]
-    return np.abs(p) if v.chart.log[i] else p
-
-
-def _profile(ax: Axes, found: Valleys, i: int) -> None:
-    for v, c in zip(found.ranges, RANGE_COLOURS, strict=False):
-        p = v.profiles[i]
-        ax.plot(_axis_values(v, i, p.points[:, i]), 100 * (p.loss / v.best_loss - 1), color=c, linewidth=1.6)
-        ax.axhline(100 * v.rise / v.best_loss, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
-    ax.set_ylim(0, 300 * found.ranges[0].rise / found.ranges[0].best_loss)
-    if found.ranges[0].chart.log[i]:
-        ax.set_xscale("log")
-
-
-def _pair(ax: Axes, found: Valleys, pair: tuple[int, int]) -> None:
-    for v, c in zip(found.ranges, RANGE_COLOURS, strict=False):
-        m = next(m for m in v.maps if m.pair == pair)
-        _map_levels(ax, v, m, c)
-        line = np.abs(v.floor) if np.any(v.chart.log) else v.floor
-        x, y = ((line if v.chart.log[c_] else v.floor)[:, c_] for c_ in pair)
-        ax.plot(x, y, color=c, linewidth=1.6, zorder=4)
-        best = [abs(v.best[c_]) if v.chart.log[c_] else v.best[c_] for c_ in pair]
-        ax.plot(*best, "*", color=c, markersize=10, markeredgecolor="white", zorder=6)
-    v = found.ranges[0]
-    for p in v.published:
-        at = [abs(p.natural[c_]) if v.chart.log[c_] else p.natural[c_] for c_ in pair]
-        ax.plot(*at, "D", markersize=4, markerfacecolor="white", markeredgecolor=INK, zorder=5)
-    if v.chart.log[pair[0]]:
-        ax.set_xscale("log")
-    if v.chart.log[pair[1]]:
-        ax.set_yscale("log")
-
-
-def _map_levels(ax: Axes, v: Valley, m: PairMap, c: str) -> None:
-    x, y = _axis_values(v, m.pair[0], m.first), _axis_values(v, m.pair[1], m.second)
-    share = np.where(np.isfinite(m.loss), m.loss / v.best_loss - 1, 10.0).T
-    rise = v.rise / v.best_loss
-    if np.min(share) < 3 * rise:
-        ax.contourf(x, y, share, levels=[-1.0, rise, 3 * rise], colors=[to_rgba(c, 0.5), to_rgba(c, 0.2)], zorder=2)
-
-
-def _trim(ax: Axes, v: Valley, i: int, j: int, k: int) -> None:
-    """Labels at the edges of the triangle only."""
-    names = [
-        with_unit(n, u) if not (v.chart.log[c] and v.chart.sign[c] < 0) else "-" + with_unit(n, u)
-        for c, (n, u) in enumerate(zip(v.chart.names, v.chart.units, strict=True))
-    ]
-    if i == k - 1:
-        ax.set_xlabel(names[j])
-    if j == 0 and i > 0:
-        ax.set_ylabel(names[i])
-    elif i == j:
-        ax.set_ylabel("loss + %")
-    else:
-        ax.tick_params(labelleft=False)
-    for axis, log in ((ax.xaxis, v.chart.log[j]), (ax.yaxis, i != j and v.chart.log[i])):
-        axis.set_minor_formatter(NullFormatter())
-        if not log:
-            axis.set_major_locator(MaxNLocator(3))
-        elif i != j or axis is ax.xaxis:
-            axis.set_major_locator(LogLocator(numticks=4))
-
-
-def _pair_handles(found: Valleys) -> list[Any]:
-    rise = found.ranges[0].rise / found.ranges[0].best_loss
-    handles: list[Any] = [
-        Line2D([], [], color=c, linewidth=2.4, marker="*", markersize=11, markeredgecolor="white",
-               label=f"{_label(v)}: least loss {v.best_loss:.3g} N (star), floor")
-        for v, c in zip(found.ranges, RANGE_COLOURS, strict=False)
-    ]  # fmt: skip
-    handles.append(Patch(facecolor=to_rgba(MUTED, 0.55), label=f"loss within {100 * rise:.3g} %"))
-    handles.append(Patch(facecolor=to_rgba(MUTED, 0.22), label=f"loss within {300 * rise:.3g} %"))
-    if found.ranges[0].published:
-        handles.append(
-            Line2D([], [], color=INK, marker="D", markerfacecolor="white", linestyle="none", markersize=5,
-                   label="published")
-        )  # fmt: skip
-    return handles
+    handles = (
+        handles if any(w.band is not None and not np.all(w.band.convex(_mode(w))) for w in ranges) else handles[:-1]
+    )
+    return handles if v.published else [h for h in handles if h.get_label() != "published"]

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
+from typer.testing import CliRunner
 
+from bayesmembrane.cli import app
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.hypothesis import hypothesis
 from bayesmembrane.inference.valleys import Valleys, valleys
 from bayesmembrane.inference.valleys_surface import Chart, Surface
-from bayesmembrane.measurement import Measurement
+from bayesmembrane.measurement import Measurement, Specimen, write_measurement
 from bayesmembrane.mechanics import api
+from bayesmembrane.mechanics.reference import force_curve
+from bayesmembrane.registry import material
+from bayesmembrane.rigs.annulus import Annulus
 
 Film = Callable[..., Measurement]
 
 
 @pytest.fixture(scope="module")
 def mooney() -> tuple[Measurement, Valleys]:
-    from bayesmembrane.measurement import Specimen
-    from bayesmembrane.mechanics.reference import force_curve
-    from bayesmembrane.registry import material
-    from bayesmembrane.rigs.annulus import Annulus
-
     # A Yeoh film from the slow solver: no Mooney-Rivlin film fits it exactly.
     at = np.linspace(0.004, 0.035, 8)
     force = force_curve(material("yeoh")(8.8, -0.6, 0.05), at, 0.010, 0.035, rtol=1e-9)
@@ -176,3 +178,22 @@ def test_slopes_over_the_parameters_are_differences_of_the_residual(name: str, f
         np.testing.assert_allclose(
             slopes[:, i], (both[0] - both[1]) / (2 * h[0, i]), rtol=2e-4, atol=1e-6 * np.max(np.abs(slopes[:, i]))
         )
+
+
+def test_a_film_with_an_effect_has_a_valley_too(film: Film) -> None:
+    m = film("mooney_rivlin", (6.0, 1.5), end=0.03, points=8, noise=0.003)
+    v = valleys(m, hypothesis("neo_hookean", ["zero_offset"], convexity="none")).ranges[0]
+    assert v.chart.names == ("neo_hookean.c1", "zero_offset.shift")
+    assert v.best_loss <= valleys(m, hypothesis("neo_hookean", convexity="none")).ranges[0].best_loss
+    assert len(v.floor) > 10
+
+
+def test_the_command_answers_with_the_promised_fields(film: Film, tmp_path: Path) -> None:
+    m = film("mooney_rivlin", (6.0, 1.5), end=0.03, points=8, noise=0.003)
+    write_measurement(m, tmp_path / "curve.csv", tmp_path / "film.toml")
+    asked = ["valleys", str(tmp_path / "curve.csv"), "--specimen", str(tmp_path / "film.toml")]
+    done = CliRunner().invoke(app, [*asked, "--material", "neo_hookean", "--ranges-mm", "20,30", "--json"])
+    assert done.exit_code == 0, done.output
+    answer = json.loads(done.stdout)
+    assert [r["max_deflection_mm"] for r in answer["ranges"]] == pytest.approx([1e3 * 0.03 / 8 * 5, 30])
+    assert set(answer["closest_approach"]) >= {"distance", "cross", "sentence"}
