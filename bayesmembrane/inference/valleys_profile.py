@@ -189,14 +189,16 @@ def _crossing(surface: Surface, inside: Array, outside: Array, size: float, i: i
     trial = 0.5 * (a[i] + b[i])
     wall = not np.isfinite(size)
     value = float("nan")
+    # Six parameters are dear, and where their valley ends needs fewer digits.
+    few = inside.size > 2
     for turn in range(ROUNDS):
-        if wall and turn >= ROUNDS_AT_A_WALL:
+        if (wall or few) and turn >= ROUNDS_AT_A_WALL:
             break
         start = a + (trial - a[i]) / (b[i] - a[i]) * (b - a) if not wall else a.copy()
         start[i] = trial
         found, norm = surface.minimise(start[None, :], held)
         value = float(norm[0])
-        if abs(value - limit) <= 1e-9 * limit:
+        if abs(value - limit) <= (5e-7 if few else 1e-9) * limit:
             return End(float(surface.chart.natural(found[0])[i]), value, False, None, "")
         if value <= limit:
             a = z = found[0]
