@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
 from bayesmembrane.diagnosis.whitening import OwnNoise
-from bayesmembrane.effects.base import Effect
+from bayesmembrane.effects.base import Effect, EffectParameter
 from bayesmembrane.forward import Solve
 from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.inference.descent import descend
 from bayesmembrane.inference.objective import Objective, apart
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.mechanics import api
-from bayesmembrane.parameters import Array, HalfNormal
+from bayesmembrane.parameters import Array, HalfNormal, Parameter
 from bayesmembrane.registry import components
 
 ITERATIONS, SANE = 40, 3
@@ -72,17 +72,22 @@ class Search:
     solve: Solve = api.solve
     weight: float = 1.0
 
-    def fit(self, hypothesis: Hypothesis, starts: Sequence[Array] = (), sane: bool = True) -> Candidate | None:
-        """The best of all searches: from ``starts`` (k,), and from draws of the prior brought to their best modulus.
+    def sane(self, hypothesis: Hypothesis) -> list[Array]:
+        """Starts (k,) from draws of the material's prior brought to their best modulus, without any effect.
 
-        None if no film of this hypothesis reaches the data.
+        The plain model bends the material until it imitates what is missing: searches must not only start there.
         """
+        plain = replace(hypothesis, effects=())
+        objective = Objective(plain, self.measurement, "euclidean", self.solve)
+        pool, _ = objective.pool(np.random.default_rng(self.seed))
+        nothing = np.concatenate([np.empty(0), *(e.null for e in hypothesis.effects)])
+        return [np.concatenate([x, nothing]) for x in apart(pool, objective.spread, SANE)]
+
+    def fit(self, hypothesis: Hypothesis, starts: Sequence[Array]) -> Candidate | None:
+        """The best of the searches from ``starts`` (k,); None if no film of this hypothesis reaches the data."""
         objective = Objective(hypothesis, self.measurement, "euclidean", self.solve)
         centre, spread = prior_moments(hypothesis)
         rows = [np.asarray(s, dtype=float) for s in starts]
-        if sane or not rows:
-            pool, _ = objective.pool(np.random.default_rng(self.seed))
-            rows += apart(pool, objective.spread, SANE)
         root = np.sqrt(self.weight)
 
         def residuals(x: Array) -> tuple[Array, Array]:
@@ -120,16 +125,20 @@ class Search:
         log_evidence = -0.5 * size**2 - 0.5 * log_det + halves * np.log(2.0)
         return Candidate(hypothesis, x, -r[0], slopes, float(log_evidence), _at_bound(objective, x))
 
-    def starts_with(self, base: Candidate, effect: Effect) -> list[Array]:
-        """Starts for ``base`` with one more effect: small and middling, both signs where both are allowed."""
-        signs = (1.0,) if effect.size.one_sided else (1.0, -1.0)
-        out = []
+
+def starts_with(bases: Sequence[Array], effect: Effect) -> list[Array]:
+    """Starts for ``bases`` (k,) with one more effect: from the first a small and a middling one, from the others a
+    small one, and both signs where both are allowed.
+    """
+    signs = (1.0,) if effect.size.one_sided else (1.0, -1.0)
+    out = []
+    for i, base in enumerate(bases):
         for sign in signs:
-            for share in SIZES:
+            for share in SIZES if i == 0 else SIZES[:1]:
                 theta = effect.typical.copy()
                 theta[0] = (effect.size.null or 0.0) + sign * share * effect.size.scale
-                out.append(np.concatenate([base.x, effect.within_bounds(theta)]))
-        return out
+                out.append(np.concatenate([base, effect.within_bounds(theta)]))
+    return out
 
 
 def with_effects(hypothesis: Hypothesis, effects: Sequence[Effect]) -> Hypothesis:
@@ -155,12 +164,16 @@ def absorbed(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
 
 def prior_moments(hypothesis: Hypothesis) -> tuple[Array, Array]:
     """Centre and spread (k,) of the normal prior that stands for the proper one: a size is centred at its null."""
-    centre, spread = [], []
-    for p in hypothesis.parameters[: hypothesis.curve_size]:
-        null = getattr(p, "null", None)
-        centre.append(float(p.prior.quantile(0.5)) if null is None else null)
-        spread.append(float(p.prior.distribution().std()) if null is None else p.scale)  # type: ignore[attr-defined]
-    return np.array(centre), np.array(spread)
+    found = [_moments(p) for p in hypothesis.parameters[: hypothesis.curve_size]]
+    centre, spread = np.array(found).T
+    return centre, spread
+
+
+@cache
+def _moments(p: Parameter) -> tuple[float, float]:
+    if isinstance(p, EffectParameter) and p.null is not None:
+        return p.null, p.scale
+    return float(p.prior.quantile(0.5)), float(p.prior.distribution().std())
 
 
 def _at_bound(objective: Objective, x: Array) -> tuple[str, ...]:

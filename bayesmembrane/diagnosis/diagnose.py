@@ -189,13 +189,13 @@ def _null(
     """The model as given, fitted; first with the reference's noise, then with one that knows the model's slopes."""
     say(f"fitting {hypothesis.label()}")
     search = Search(measurement, own_noise(measurement, basis), seed, solve)
-    null = search.fit(hypothesis)
+    null = search.fit(hypothesis, search.sane(hypothesis))
     if null is None:
         raise SettingsError(
             f"no {hypothesis.label()} film reaches the data", remedy="use a shorter range or another material"
         )
     search = replace(search, noise=own_noise(measurement, np.column_stack([basis, null.slopes])))
-    return search, search.fit(hypothesis, [null.x], sane=False) or null
+    return search, search.fit(hypothesis, [null.x]) or null
 
 
 # ---- what explains it ------------------------------------------------------------------------------------------------
@@ -236,7 +236,7 @@ def _renewed(tracer: Tracer, judged: list[Judged]) -> tuple[Tracer, list[Judged]
     noise = own_noise(tracer.measurement, basis)
     weight = effective_weight(noise.white(best.residual))
     search = replace(tracer.search, noise=noise, weight=weight)
-    null = search.fit(tracer.null.hypothesis, [tracer.null.x], sane=False) or tracer.null
+    null = search.fit(tracer.null.hypothesis, [tracer.null.x]) or tracer.null
     tracer = replace(tracer, search=search, null=null)
     return tracer, tracer.again(judged)
 
@@ -252,11 +252,12 @@ def _more_is_missing(tracer: Tracer, best: Judged, effects: Sequence[Any], rng: 
 
 
 def _earns(tracer: Tracer, pair: Judged, singles: Sequence[Judged]) -> bool:
-    """True if the second effect is worth its parameters, and takes away a part of the misfit that matters."""
-    parts = [j for j in singles if set(j.candidate.names) <= set(pair.candidate.names)]
-    if not parts:
-        return False
-    first = max(parts, key=lambda j: j.log_evidence)
+    """True if two effects are worth their parameters beside every single one, and take away misfit that matters.
+
+    An effect whose textbook form differs a little from the machine's leaves something that a second effect could take:
+    that is no second effect.
+    """
+    first = singles[0]
     null = tracer.judged(tracer.null).fit.chi2
     share = (first.fit.chi2 - pair.fit.chi2) / max(null - pair.fit.chi2, 1e-300)
     return pair.log_evidence > first.log_evidence + EARNS and share >= EARNED_SHARE

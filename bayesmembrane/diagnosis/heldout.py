@@ -99,7 +99,7 @@ def validate(
     part = Search(whole.select(~mask), restricted(~mask), search.seed, search.solve, search.weight)
     fits = {}
     for candidate in {c.label: c for c in (before, after, *rivals)}.values():
-        found = part.fit(candidate.hypothesis, [candidate.x], sane=False)
+        found = part.fit(candidate.hypothesis, [candidate.x])
         if found is not None:
             fits[candidate.label] = found
     if before.label not in fits or after.label not in fits:

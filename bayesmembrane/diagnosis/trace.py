@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayesmembrane.diagnosis.candidates import Candidate, Search, with_effects
+from bayesmembrane.diagnosis.candidates import Candidate, Search, starts_with, with_effects
 from bayesmembrane.diagnosis.saturated import SPLINE, LackOfFit, lack_of_fit, splines
 from bayesmembrane.diagnosis.whitening import orthonormal
 from bayesmembrane.effects.base import Effect
@@ -71,11 +71,11 @@ class Tracer:
 
     def singles(self, effects: Sequence[Effect], tell: Tell) -> list[Judged]:
         """The null model with each effect, refitted; the most probable first."""
-        out = []
+        out, bases = [], [self.null.x, *self.search.sane(self.null.hypothesis)]
         for effect in effects:
             tell(f"refitting with {effect.title}")
             hypothesis = with_effects(self.null.hypothesis, [effect])
-            found = self.search.fit(hypothesis, self.search.starts_with(self.null, effect))
+            found = self.search.fit(hypothesis, starts_with(bases, effect))
             if found is not None:
                 out.append(self.judged(found))
         return ranked(out)
@@ -93,8 +93,7 @@ class Tracer:
                     continue
                 tell("refitting pairs: " + " with ".join(sorted(key)))
                 hypothesis = with_effects(first.candidate.hypothesis, [effect])
-                starts = self.search.starts_with(first.candidate, effect)
-                found = self.search.fit(hypothesis, starts, sane=False)
+                found = self.search.fit(hypothesis, starts_with([first.candidate.x], effect))
                 if found is None:
                     continue
                 judged = self.judged(found)
@@ -110,7 +109,8 @@ class Tracer:
             if name == base.material.name:
                 continue
             tell(f"trying the energy {kind.title}")
-            found = self.search.fit(replace(base, material=kind))
+            other = replace(base, material=kind)
+            found = self.search.fit(other, self.search.sane(other))
             if found is not None:
                 out.append(self.judged(found))
         return ranked(out)
@@ -119,7 +119,7 @@ class Tracer:
         """The same candidates fitted anew from where they are, with the search's present noise and weight."""
         out = []
         for j in judged:
-            found = self.search.fit(j.candidate.hypothesis, [j.candidate.x], sane=False)
+            found = self.search.fit(j.candidate.hypothesis, [j.candidate.x])
             out.append(self.judged(found) if found is not None else j)
         return ranked(out)
 

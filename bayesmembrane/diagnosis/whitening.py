@@ -87,12 +87,11 @@ def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
 
     def fit(rho: float) -> tuple[float, float]:
         """(-2 ln L, RSS) at one correlation."""
-        white = decorrelated(np.column_stack([y, q]), rho, gaps)
-        r = np.linalg.qr(white[:, 1:], mode="r")
-        rest = white[:, 0] - white[:, 1:] @ np.linalg.lstsq(white[:, 1:], white[:, 0], rcond=None)[0]
-        rss = float(rest @ rest)
+        # The last diagonal entry of R is what y has beyond the span of the others.
+        r = np.diag(np.linalg.qr(decorrelated(np.column_stack([q, y]), rho, gaps), mode="r"))
+        rss = float(r[-1] ** 2)
         phi = rho**gaps if rho > 0 else np.zeros(gaps.size)
-        log_det = float(np.sum(np.log1p(-(phi**2)))) + 2 * float(np.sum(np.log(np.abs(np.diag(r)))))
+        log_det = float(np.sum(np.log1p(-(phi**2)))) + 2 * float(np.sum(np.log(np.abs(r[:-1]))))
         return (y.size - q.shape[1]) * np.log(max(rss, 1e-300)) + log_det, rss
 
     values = [fit(rho)[0] for rho in TRIALS]
