@@ -97,4 +97,5 @@ def _finished(ax: Axes, count: int, least: float) -> None:
     ax.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}".replace("-", "\u2212")))
     ax.minorticks_off()
     ax.grid(axis="x", color=FAINT, linewidth=0.5)
+    ax.set_xlim(min(1.6 * least, -1.5), 1.5)
     ax.tick_params(axis="y", length=0)
