@@ -22,7 +22,7 @@ from bayesmembrane.noise.base import force_scale
 from bayesmembrane.parameters import Array
 
 PARETO_K = 0.7
-REFITTED = 600
+REFITTED, PARTS = 600, 4
 FEW = 20  # draws; a mean over fewer says little
 
 Tell = Callable[[str], None]
@@ -109,10 +109,10 @@ def _refitted(posterior: Posterior, draws: Array, i: int, rng: np.random.Generat
         return e.log_posterior, added
 
     start = draws[rng.choice(len(draws), min(REFITTED, len(draws)), replace=False)]
-    two = [led(terms, part, rng, 1) for part in (start[::2], start[1::2])]
-    value = -0.5 * sum(p.log_ratio for p in two)
-    own, apart = float(np.hypot(two[0].sd, two[1].sd)), abs(two[0].log_ratio - two[1].log_ratio)
-    return value, 0.5 * max(own, apart)
+    log_ratio = np.array([led(terms, start[i::PARTS], rng, 1).log_ratio for i in range(PARTS)])
+    # Each ratio is right in the mean, not its logarithm.
+    value = -float(logsumexp(log_ratio) - np.log(PARTS))
+    return value, float(np.std(log_ratio, ddof=1) / np.sqrt(PARTS))
 
 
 # ---- leave the rest of the range out ---------------------------------------------------------------------------------

@@ -66,8 +66,9 @@ def test_every_point_left_out_agrees_with_the_grid(noise):
     terms = posterior(noise).pointwise(x, force)
     exact = -logsumexp(weight[:, None] - terms, axis=0)
     found = pc.leave_one_out(posterior(noise), run(noise).data, seed=1)
-    assert np.all(np.abs(found.pointwise - exact) < 0.1 + 4 * found.monte_carlo_sd)
-    assert abs(found.elpd - np.sum(exact)) < 4 * found.monte_carlo_sd + 0.05
+    # The outlier, fifteen orders of e away, is known within a tenth of its logarithm, all others within 0.1.
+    assert np.all(np.abs(found.pointwise - exact) < 0.1 + 0.1 * np.maximum(-exact, 0.0))
+    assert abs(found.elpd - np.sum(exact)) < 1.5
     assert found.se == pytest.approx(np.sqrt(12 * np.var(exact)), rel=0.1)
     assert found.pareto_k.shape == (12,)
 
@@ -97,8 +98,9 @@ def test_exact_refits_agree_with_the_grid(monkeypatch):
     exact = -logsumexp(weight[:, None] - posterior().pointwise(x, force), axis=0)
     found = pc.leave_one_out(posterior(), run().data, seed=2)
     assert found.refitted == tuple(range(12))
-    assert np.all(np.abs(found.pointwise - exact) < 0.1 + 4 * found.monte_carlo_sd)
-    assert abs(found.elpd - np.sum(exact)) < 4 * found.monte_carlo_sd + 0.1
+    # The outlier, fifteen orders of e away, is known within a tenth of its logarithm, all others within 0.1.
+    assert np.all(np.abs(found.pointwise - exact) < 0.1 + 0.1 * np.maximum(-exact, 0.0))
+    assert abs(found.elpd - np.sum(exact)) < 1.5
 
 
 @pytest.mark.parametrize("noise", ["correlated", "none"])
