@@ -7,7 +7,7 @@ import tempfile
 import time
 import zipfile
 from collections import OrderedDict
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -34,21 +34,39 @@ Entry = dict[str, Array]
 
 @dataclass
 class Tally:
-    """What the cache did: films found (of them, entries read from disk), solved, passed by; entries found damaged."""
+    """What the cache did.
+
+    hits, from_disk : films found, and entries read from disk for them
+    misses, bypassed, rebuilt : films solved and kept, films solved directly, entries found damaged
+    spared : calls that needed no solution at all
+    """
 
     hits: int = 0
     from_disk: int = 0
     misses: int = 0
     bypassed: int = 0
     rebuilt: int = 0
+    spared: int = 0
     seconds_looking: float = 0.0
     seconds_solving: float = 0.0
 
     @property
     def seconds_saved(self) -> float:
-        """Hits times the mean time that a miss took, less the time spent looking."""
+        """At least: spared calls times the mean time that one film took, less the time spent looking.
+
+        Not hits times that time: films of one call would have been solved side by side. The first film of a process
+        includes the loading of compiled code.
+        """
         cost = self.seconds_solving / self.misses if self.misses else 0.0
-        return self.hits * cost - self.seconds_looking
+        return self.spared * cost - self.seconds_looking
+
+    def since(self, earlier: Tally) -> Tally:
+        """What was done after ``earlier``, a copy of this tally."""
+        return Tally(**{f.name: getattr(self, f.name) - getattr(earlier, f.name) for f in fields(self)})
+
+    def summary(self) -> dict[str, float]:
+        """Plain values, the time saved among them."""
+        return {**asdict(self), "seconds_saved": self.seconds_saved}
 
 
 @dataclass
@@ -104,6 +122,7 @@ class CachedSolver:
         curves = _rescale(asked, gd, list(found.values()), [place[key] for key in keys])
         self.tally.misses += len(missing)
         self.tally.hits += len(keys) - len(missing)
+        self.tally.spared += not missing
         self.tally.seconds_looking += looked - begun + time.perf_counter() - done
         self.tally.seconds_solving += done - looked
         return curves

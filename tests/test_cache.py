@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import subprocess
 import sys
@@ -90,6 +91,19 @@ def test_a_posterior_of_one_modulus_solves_once():
     remembered = CachedSolver()
     assert_same(remembered(NeoHookean, films, FIFTEEN, **RADII), solve(NeoHookean, films, FIFTEEN, **RADII), 1e-9)
     assert (remembered.tally.misses, remembered.tally.hits, remembered.tally.bypassed) == (1, 299, 0)
+
+
+def test_the_tally_counts_what_was_done_since():
+    remembered = CachedSolver()
+    remembered(NeoHookean, [7.5], FIFTEEN, **RADII)
+    before = dataclasses.replace(remembered.tally)
+    remembered(NeoHookean, [[7.5], [8.5]], FIFTEEN, **RADII)
+    remembered(NeoHookean, [7.5], 0.5 * FIFTEEN, **RADII)
+    done = remembered.tally.since(before)
+    assert (done.hits, done.misses, done.spared) == (2, 1, 1)
+    cost = remembered.tally.seconds_solving / 2
+    assert remembered.tally.seconds_saved == pytest.approx(cost - remembered.tally.seconds_looking)
+    assert done.summary()["seconds_saved"] == done.seconds_saved
 
 
 def test_draws_that_never_repeat_pass_by(tmp_path):

@@ -2,14 +2,15 @@
 
 run.toml       what was asked: data, hypothesis, settings, seed, versions, fingerprint
 posterior.nc   arviz InferenceData: posterior, prior, log_likelihood, posterior_predictive, observed_data,
-               constant_data, sample_stats; a chain is an ensemble
+               constant_data (the means of the ensembles over the whole walk among it), sample_stats; a chain is
+               an ensemble
 status.json    what came out, written last
 chains.npz     only where a run was interrupted: everything needed to go on as if it had not been
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,19 +18,21 @@ from typing import Any
 import arviz
 import numpy as np
 
+from bayesmembrane.cache import CachedSolver, Tally
 from bayesmembrane.forward import Solve
 from bayesmembrane.hypothesis import Hypothesis, from_settings
 from bayesmembrane.inference import storage
 from bayesmembrane.inference.crosscheck import crosscheck
 from bayesmembrane.inference.goodness import dominates, dominates_sentence, goodness
 from bayesmembrane.inference.posterior import Posterior, failure_sentence
-from bayesmembrane.inference.sampling import Callback, Sampled, Settings, run_ensembles
+from bayesmembrane.inference.sampling import Callback, Chains, Sampled, Settings, run_ensembles
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.mechanics import api
 from bayesmembrane.parameters import Array
 
 MOST_DRAWS, LONG, DRAWS_IF_LONG = 4000, 100, 1000
 PRIOR_DRAWS = 500
+WALK_STEPS = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +104,7 @@ def sample(
     Raises `SettingsError` for hypotheses that the data cannot reach, `StorageError` if the folder cannot be written
     or belongs to something else.
     """
-    settings = settings or Settings(ess=ess)
+    settings, cached = settings or Settings(ess=ess), _tally(solve)
     posterior = Posterior(hypothesis, measurement, solve)
     asked = storage.describe(measurement, hypothesis, settings, seed)
     name = name or storage.run_name(measurement, hypothesis, asked)
@@ -111,6 +114,8 @@ def sample(
     before = storage.read_chains(folder) if folder is not None else None
     sampled = run_ensembles(posterior, settings, seed, progress, before)
     run = _assemble(posterior, sampled, settings, seed, name, folder, asked)
+    if cached is not None and (now := _tally(solve)) is not None:
+        run.status["cache"] = now.since(cached).summary()
     if folder is not None:
         storage.write_run(folder, asked, run.data, run.status, sampled.chains if run.interrupted else None)
     return run
@@ -121,6 +126,11 @@ def load_run(path: str | Path) -> Run:
     path = Path(path)
     settings, status, data = storage.read_run(path)
     return Run(path.name, path, settings, status, data)
+
+
+def _tally(solve: Solve) -> Tally | None:
+    """A copy of what the cache did so far; None if there is no cache."""
+    return replace(solve.tally) if isinstance(solve, CachedSolver) else None
 
 
 def _assemble(
@@ -142,6 +152,7 @@ def _assemble(
 
     data = storage.inference_data(
         measurement,
+        _walk(sampled.chains),
         posterior=named(hypothesis, measurement, flat, shape),
         prior=named(hypothesis, measurement, prior, (1, len(prior))) if len(prior) else None,
         log_likelihood={"force": folded(posterior.pointwise(flat, evaluation.force))},
@@ -157,6 +168,12 @@ def _assemble(
     }
     status["sentences"] = [*_sentences(sampled, settings, status), *status.pop("_more")]
     return Run(name, folder, asked, status, data)
+
+
+def _walk(chains: Chains) -> dict[str, Array]:
+    """Means over the walkers of each ensemble at `WALK_STEPS` steps at most, burn-in included."""
+    at = np.unique(np.linspace(0, chains.steps - 1, WALK_STEPS).round().astype(int))
+    return {"ensemble_mean": chains.x[:, at].mean(axis=2), "ensemble_step": at.astype(float)}
 
 
 def named(hypothesis: Hypothesis, measurement: Measurement, x: Array, shape: tuple[int, ...]) -> dict[str, Array]:

@@ -10,7 +10,7 @@ import re
 import tempfile
 import tomllib
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -25,13 +25,15 @@ from bayesmembrane.errors import StorageError
 from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.inference.sampling import Chains, Settings
 from bayesmembrane.measurement import Measurement, Provenance, Specimen
+from bayesmembrane.parameters import Array
 from bayesmembrane.protocol import Path as Motion
 from bayesmembrane.registry import component
 
 ASKED, POSTERIOR, STATUS, CHAINS = "run.toml", "posterior.nc", "status.json", "chains.npz"
 PACKAGES = ("bayesmembrane", "numpy", "scipy", "numba", "emcee", "arviz")
-# What the answer of a run depends on; reports and the command line are not among it.
 MOTION = ("deflection", "time", "across")
+OPTIONAL = ("time", "force_sd", "covariance", "across")
+# What the answer of a run depends on; reports and the command line are not among it.
 FLOORS = (
     *("noise", "materials", "mechanics", "rigs", "effects", "inference"),
     *("protocol.py", "hypothesis.py", "composed.py", "forward.py"),
@@ -214,10 +216,13 @@ def read_chains(folder: Path) -> Chains | None:
 # ---- InferenceData ---------------------------------------------------------------------------------------------------
 
 
-def inference_data(measurement: Measurement, **groups: Any) -> Any:
-    """arviz InferenceData with ``groups``, the measured curve and all that `measurement_of` needs."""
-    constant = {"deflection": measurement.deflection}
-    for name in ("time", "force_sd", "covariance", "across"):
+def inference_data(measurement: Measurement, walk: Mapping[str, Array] | None = None, **groups: Any) -> Any:
+    """arviz InferenceData with ``groups``, the measured curve, all that `measurement_of` needs, and a ``walk``.
+
+    walk : ``ensemble_mean`` (E, T, k) means over the walkers at the steps ``ensemble_step`` (T,)
+    """
+    constant = {"deflection": measurement.deflection, **(walk or {})}
+    for name in OPTIONAL:
         values = getattr(measurement, name)
         if values is not None:
             constant[name] = values
@@ -227,6 +232,7 @@ def inference_data(measurement: Measurement, **groups: Any) -> Any:
         constant["places"] = measurement.on_path.astype(float)
     dims = {n: ["point"] for n in ("force", "curve", "deflection", "time", "force_sd", "across", "places")}
     dims |= {f"motion_{n}": ["station"] for n in MOTION}
+    dims |= {"ensemble_mean": ["ensemble", "step", "coordinate"], "ensemble_step": ["step"]}
     data = arviz.from_dict(
         **groups,
         observed_data={"force": measurement.force},
@@ -248,9 +254,14 @@ def measurement_of(data: Any) -> Measurement:
     """The measurement that `inference_data` stored."""
     about = json.loads(data.constant_data.attrs["measurement"])
     rig = component("rigs", about["rig"]["kind"])(**about["rig"]["lengths"])
-    arrays = {k: np.asarray(data.constant_data[k].values, dtype=float) for k in data.constant_data.data_vars}
-    motion = {n: arrays.pop(f"motion_{n}") for n in MOTION if f"motion_{n}" in arrays}
-    places = arrays.pop("places").astype(int) if motion else None
+    held = data.constant_data.data_vars
+
+    def array(name: str) -> Array:
+        return np.asarray(held[name].values, dtype=float)
+
+    arrays = {name: array(name) for name in ("deflection", *OPTIONAL) if name in held}
+    motion = {n: array(f"motion_{n}") for n in MOTION if f"motion_{n}" in held}
+    places = array("places").astype(int) if motion else None
     whole = (motion["deflection"], motion.get("time"), about["full_range"], motion.get("across")) if motion else None
     if "covariance" in arrays:
         arrays.pop("force_sd", None)

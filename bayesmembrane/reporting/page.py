@@ -6,7 +6,7 @@ import json
 import os
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -272,8 +272,8 @@ def _comparison(shown: Sequence[Shown], compared: Sequence[Compared]) -> Section
 def _evidence(found: Mapping[str, Comparison], paper: comparison_section.Paper) -> Section:
     caption = (
         "Left: evidence ln Z of each hypothesis minus that of the best, by both estimators; right: expected log "
-        "predictive density of points left out, minus that of the best. Both without unit, to scale within 3 and logarithmic "
-        "beyond; whiskers are two standard errors."
+        "predictive density of points left out, minus that of the best. Both without unit, to scale within 3 and "
+        "logarithmic beyond; whiskers are two standard errors."
     )
     picture = Block(
         "figure", picture=comparison_picture(found), alt=comparison_section.alternative_text(found), caption=caption
@@ -522,12 +522,8 @@ def _checks(shown: Sequence[Shown]) -> Section:
 
 def _made(shown: Sequence[Shown], cache: Tally | None) -> Section:
     blocks = [_table(tables.sampling_table(shown))]
-    caches = {f"{s.name}, {1e3 * s.digest.end:.4g} mm": dict(s.cache) for s in shown if s.cache}
-    if cache is not None:
-        caches["all together"] = {**asdict(cache), "seconds_saved": cache.seconds_saved}
-    if caches:
-        caption = "The curve cache: films found, solved, and passed by because their draws never repeat; times in s."
-        blocks.append(_table(tables.facts_table("cache", caption, caches)))
+    if cache is not None or any(s.cache for s in shown):
+        blocks.append(_table(tables.cache_table(shown, cache)))
     facts = _common([s.facts for s in shown])
     blocks.append(
         _table(

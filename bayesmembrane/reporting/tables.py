@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.cache import Tally
 from bayesmembrane.inference.posterior import Outcome
 from bayesmembrane.inference.published import Compared
 from bayesmembrane.parameters import Array
@@ -362,6 +363,36 @@ def outcomes_table(shown: Sequence[Shown]) -> Table:
         "iteration limit are failures of the numbers, the others are physics or prior."
     )
     return Table("outcomes", caption, columns, rows)
+
+
+def cache_table(shown: Sequence[Shown], total: Tally | None = None) -> Table:
+    """What the curve cache did in each run, beside the films that were solved directly; and in all."""
+    columns = (
+        Column("run", "material"),
+        Column("end_mm", "fitted up to (mm)"),
+        Column("hits", "found", ",d"),
+        Column("from_disk", "curves read from disk", ",d"),
+        Column("misses", "solved and kept", ",d"),
+        Column("bypassed", "solved directly", ",d"),
+        Column("rebuilt", "damaged, made anew", ",d"),
+        Column("seconds_looking", "looking up (s)", ".2g"),
+        Column("seconds_solving", "solving what is kept (s)", ".2g"),
+        Column("seconds_saved", "saved (s)", ".2g"),
+    )
+    keys = [c.key for c in columns[2:]]
+    rows: list[tuple[Value, ...]] = [
+        (s.name, 1e3 * s.digest.end, *(s.cache.get(k) for k in keys)) for s in shown if s.cache
+    ]
+    if total is not None:
+        summary = total.summary()
+        rows.append(("all work, predictions included", None, *(summary[k] for k in keys)))
+    caption = (
+        "The curve cache, in numbers of films: those found in it, those solved once and kept, and those solved "
+        "directly because draws of a material with shape parameters never repeat. Curves of a material without them are "
+        "scaled from one before the cache is asked. Saved: calls that needed no solution, times the mean time of one "
+        "film, less the time spent looking up; negative where nothing repeats."
+    )
+    return Table("cache", caption, columns, tuple(rows))
 
 
 def own_facts_table(shown: Sequence[Shown], common: Mapping[str, Any]) -> Table:

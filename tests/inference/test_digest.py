@@ -11,7 +11,9 @@ from bayesmembrane.inference.digest import FILE, Digest, digest, digest_draws, l
 from bayesmembrane.inference.published import BreakPoint
 from bayesmembrane.inference.run import Run, sample
 from bayesmembrane.inference.sampling import Settings
+from bayesmembrane.materials.gent import Gent
 from bayesmembrane.measurement import Measurement, Specimen
+from bayesmembrane.mechanics import solve
 from bayesmembrane.mechanics.api import force_curve
 from bayesmembrane.rigs.annulus import Annulus
 
@@ -42,6 +44,26 @@ def test_bands_are_quantiles_of_the_curves_and_the_end_of_the_fit_is_on_the_grid
     exact = force_curve("gent", (7.5, 40.0), found.deflection)[0]
     np.testing.assert_allclose(found.curve, np.broadcast_to(exact, found.curve.shape), rtol=1e-6)
     np.testing.assert_allclose(found.residual, 0.0, atol=1e-6)
+
+
+def test_bands_hold_the_truth_and_widen_beyond_the_fit() -> None:
+    """A film that is shot, fitted over two thirds of the range by the other solver."""
+
+    def shot(at: np.ndarray) -> np.ndarray:
+        return solve(Gent, [5.3, 14.0], at, inner_radius=0.010, outer_radius=0.035, solver="shooting").force[0]
+
+    at = np.linspace(5e-3, 0.09, 14)
+    force = shot(at) + 0.02 * np.random.default_rng(8).standard_normal(at.size)
+    part = Measurement(at, force, Annulus(0.010, 0.035), Specimen("film", 50e-6)).up_to(0.06)
+    claim = hypothesis("gent")
+    found = digest_draws(claim, part, sample(part, claim, seed=5).draws())
+    low, middle, high = found.curve
+    truth, inner = shot(found.deflection), ~found.beyond
+    sd = (high - low) / (2 * 1.645)
+    assert np.all(np.abs(truth - middle)[inner] < 3 * sd[inner])
+    assert np.all((found.repeat[0][inner] <= low[inner]) & (high[inner] <= found.repeat[2][inner]))
+    width = (high - low) / middle
+    assert width[-1] > 3 * np.max(width[inner][-5:])
 
 
 def test_a_new_measurement_carries_the_stated_noise_and_the_inferred_one() -> None:

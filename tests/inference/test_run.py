@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from bayesmembrane.cache import CachedSolver
 from bayesmembrane.errors import StorageError
 from bayesmembrane.forward import predict
 from bayesmembrane.hypothesis import hypothesis
@@ -100,6 +101,33 @@ def test_inference_data_is_complete(stored: Run) -> None:
     noise = stored.hypothesis.noise.bind(stored.measurement)
     pointwise = noise.pointwise(stored.measurement.force - p.force, stored.hypothesis.noise_coordinates(x))
     assert data.log_likelihood["force"].values.reshape(count, -1) == pytest.approx(pointwise, rel=1e-4, abs=1e-4)
+
+
+def test_the_whole_walk_is_stored_in_means(stored: Run) -> None:
+    """Burn-in included, thinned; and the measurement is read back without it."""
+    means, steps = (stored.data.constant_data[n].values for n in ("ensemble_mean", "ensemble_step"))
+    assert means.shape == (2, steps.size, 3)
+    assert steps.size <= 500
+    assert (steps[0], steps[-1]) == (0, stored.status["steps"] - 1)
+    kept = means[:, steps >= stored.status["burn"]].mean(axis=(0, 1))
+    x = stored.draws()
+    assert np.all(np.abs(kept - x.mean(axis=0)) < 0.3 * x.std(axis=0))
+
+
+def test_what_the_cache_did_is_stored(film, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    curve, short = film("neo_hookean", (7.5,), noise=0.02, seed=1), Settings(ess=1.0, chunk=30, most_steps=30)
+    cached = CachedSolver()
+    first = sample(curve, hypothesis("neo_hookean"), settings=short, solve=cached, out=tmp_path)
+    again = sample(curve, hypothesis("neo_hookean"), settings=short, solve=cached, seed=1)
+    plain = sample(curve, hypothesis("neo_hookean"), settings=short)
+    assert "cache" not in plain.status
+    assert first.status["cache"]["misses"] > 0
+    assert again.status["cache"]["misses"] == 0  # a film that is known already, whatever its modulus
+    assert again.status["cache"]["hits"] > 0
+    assert cached.tally.hits == first.status["cache"]["hits"] + again.status["cache"]["hits"]
+    assert np.allclose(first.draws(), plain.draws(), rtol=1e-6)
+    assert first.path is not None
+    assert load_run(first.path).status["cache"] == first.status["cache"]
 
 
 def test_a_finished_run_is_not_sampled_again(stored: Run, monkeypatch: pytest.MonkeyPatch) -> None:

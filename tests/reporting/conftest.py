@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bayesmembrane.cache import Tally
 from bayesmembrane.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.inference.digest import digest, digest_draws
 from bayesmembrane.inference.goodness import goodness
@@ -78,7 +79,7 @@ def show(material: str, center: tuple[float, ...], measurement: Measurement, dom
         dominated=dominated,
         outcomes={"ok": 50000, "not convex": 7600},
         masses={"reached": (0.6, 0.01), "box": (0.2, 0.01), "elliptic": (0.9, 0.01)},
-        cache={"hits": 3, "misses": 1},
+        cache=Tally(hits=3, misses=1, bypassed=70).summary(),
         crosscheck={"draws": 16, "largest": 3e-8, "at_mm": 12.0, "compared": 128, "missing": 0},
         facts={"seed": 0, "version of numpy": "2", "folder": material},
     )

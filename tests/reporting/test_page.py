@@ -172,9 +172,11 @@ def test_the_twin_holds_the_tables_as_numbers(whole: Path) -> None:
     assert any(s.startswith("Up to 35 mm") for s in twin["answer"])
 
 
-def test_the_cache_is_told(page: Page) -> None:
-    assert "all together: hits" in page.text
-    assert "seconds saved" in page.text
+def test_the_cache_is_told(whole: Path, page: Page) -> None:
+    yeoh, _, total = json.loads((whole.parent / TWIN).read_text(encoding="utf-8"))["tables"]["cache"]
+    assert (yeoh["hits"], yeoh["misses"], yeoh["bypassed"]) == (3, 1, 70)
+    assert (total["hits"], total["misses"]) == (2, 1)
+    assert "solved directly" in page.text
 
 
 def test_a_stored_run_is_reported_twice_into_the_same_folder(tmp_path: Path, stored: Run) -> None:
