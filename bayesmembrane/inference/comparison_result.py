@@ -184,8 +184,10 @@ def survival(rows: Sequence[Row]) -> str:
         return ""
     first, second = fitted[:2]
     lead = _best(first)[0] - _best(second)[0]
-    known = [(r, w) for r in fitted for w in r.widths if w.factor != 1.0 and not w.reason]
-    unknown = sum(1 for r in fitted for w in r.widths if w.factor != 1.0 and w.reason)
+    # The prior of the noise is the same for all: changing it for one alone would say nothing.
+    changed = [(r, w) for r in fitted for w in r.widths if w.factor != 1.0 and not w.parameter.startswith("noise.")]
+    known = [(r, w) for r, w in changed if not w.reason]
+    unknown = len(changed) - len(known)
     if not known:
         return "What other widths of the priors would do to ln Z cannot be said from these draws."
     # The first can fall, and any other can rise.
