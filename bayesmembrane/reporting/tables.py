@@ -388,9 +388,9 @@ def cache_table(shown: Sequence[Shown], total: Tally | None = None) -> Table:
         rows.append(("all work, predictions included", None, *(summary[k] for k in keys)))
     caption = (
         "The curve cache, in numbers of films: those found in it, those solved once and kept, and those solved "
-        "directly because draws of a material with shape parameters never repeat. Curves of a material without them are "
-        "scaled from one before the cache is asked. Saved: calls that needed no solution, times the mean time of one "
-        "film, less the time spent looking up; negative where nothing repeats."
+        "directly because draws of a material with shape parameters never repeat; curves of a material without them "
+        "are scaled from one before the cache is asked. Saved: calls that needed no solution, times the mean time of "
+        "one film, less the time spent looking up; negative where nothing repeats."
     )
     return Table("cache", caption, columns, tuple(rows))
 
