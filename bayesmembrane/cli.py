@@ -378,8 +378,104 @@ def compare(
 
 
 @app.command()
+def diagnose(
+    curve: Curve,
+    specimen: SpecimenFile,
+    material: Material,
+    effects: Effects = "",
+    max_deflection_mm: MaxDeflection = None,
+    convexity: Convexity = "reached",
+    noise: Noise = "white",
+    as_json: AsJson = False,
+    seed: Seed = 0,
+) -> None:
+    """Whether the model misses something, which effect or energy explains it, or that this cannot be told."""
+    from bayesmembrane.diagnosis.diagnose import diagnose as run
+
+    measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
+    with log.status(f"Diagnosing {claim.label()}") as status:
+        found = run(measurement, claim, seed=seed, tell=status.update)
+    document = found.summary()
+    answer(document, as_json, lambda: _shown(document))
+
+
+@app.command()
+def loop(
+    curve: Curve,
+    specimen: SpecimenFile,
+    material: Material,
+    effects: Effects = "",
+    max_deflection_mm: MaxDeflection = None,
+    convexity: Convexity = "reached",
+    noise: Noise = "white",
+    ess: Annotated[float, typer.Option(help="Wanted effective sample size of the worst parameter.")] = 1000.0,
+    out_folder: Annotated[Path, typer.Option("--out", help="Folder of the runs.")] = Path("chains"),
+    report_folder: Annotated[Path, typer.Option("--report", help="Folder of the page.")] = Path("reports/loop"),
+    as_json: AsJson = False,
+    seed: Seed = 0,
+) -> None:
+    """Calibrate, diagnose, add what is missing, calibrate again, until adequate or abstaining; and report."""
+    from bayesmembrane.diagnosis.loop import loop as run
+    from bayesmembrane.inference.digest import digest
+    from bayesmembrane.reporting.page import write_report
+
+    measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
+    try:
+        with _lines() as tell:
+            found = run(
+                measurement, claim, seed=seed, out=out_folder, ess=ess, tell=lambda text: tell(claim.label(), text)
+            )
+    except KeyboardInterrupt:
+        log.print(f"Interrupted; the runs are stored in {out_folder}. The same command resumes: {_command()}")
+        raise typer.Exit(130) from None
+    runs = list({str(s.run.path): s.run for r in found.rounds for s in (r.before, r.after)}.values())
+    for stored in runs:
+        digest(stored)
+    page = write_report([r.path for r in runs if r.path is not None], report_folder, loops=[found])
+    document = {
+        "rounds": [r.summary() for r in found.rounds],
+        "sentence": found.sentence,
+        "left": None if found.left is None else found.left.sentence,
+        "report": str(page),
+    }
+
+    def show() -> None:
+        for number, round_ in enumerate(document["rounds"], 1):
+            out.print(f"Round {number}")
+            _shown(round_)
+        out.print(f"The report lies in {page}")
+
+    answer(document, as_json, show)
+
+
+def _shown(document: dict[str, Any]) -> None:
+    """A diagnosis on the terminal."""
+    out.print(document["sentence"])
+    rows = [
+        [
+            r["effect"],
+            f"{r['log_bayes_factor']:.1f}",
+            f"{100 * r['unexplained']:.0f} %",
+            ", ".join(f"{k.split('.')[-1]} {v:.4g}" for k, v in r["parameters"].items()),
+        ]
+        for r in document["ranking"][:8]
+    ]
+    table("Candidates", ["effect or energy", "ln Bayes factor", "unexplained", "parameters, SI"], rows)
+    errors = [
+        [when, f"{1e3 * e['rmse_N']:.3g}", f"{1e3 * e['max_N']:.3g}", f"{e['reduced_chi2']:.2f}"]
+        for when, e in document["error"].items()
+        if isinstance(e, dict)
+    ]
+    table("Errors", ["", "root mean square, mN", "largest, mN", "reduced chi-square"], errors)
+    for sentence in document["absorbed"]:
+        out.print(sentence)
+    for step in document["next_measurements"]:
+        out.print(step["sentence"])
+
+
+@app.command()
 def report(
-    folders: Annotated[list[Path], typer.Argument(help="Run folders.", metavar="DIR...")],
+    folders: Annotated[list[Path], typer.Argument(help="Folders of runs, or that hold runs.", metavar="DIR...")],
     out_folder: Annotated[Path, typer.Option("--out", help="Folder of the page.")] = Path("reports/report"),
     title: Annotated[str | None, typer.Option(help="Title of the page.")] = None,
     as_json: AsJson = False,
@@ -387,14 +483,15 @@ def report(
 ) -> None:
     """One self-contained HTML page about one run or several."""
     from bayesmembrane.inference.digest import digest
-    from bayesmembrane.inference.run import load_run
+    from bayesmembrane.inference.run import load_run, run_folders
     from bayesmembrane.reporting.page import write_report
 
-    runs = [load_run(folder) for folder in folders]
+    found = [path for folder in folders for path in run_folders(folder)]
+    runs = [load_run(path) for path in found]
     for run in runs:
         digest(run)
     page = write_report(runs, out_folder, title=title)
-    document = {"report": str(page), "runs": [str(f) for f in folders]}
+    document = {"report": str(page), "runs": [str(path) for path in found]}
     answer(document, as_json, lambda: out.print(f"The report lies in {page}"))
 
 
