@@ -133,6 +133,13 @@ def _tally(solve: Solve) -> Tally | None:
     return replace(solve.tally) if isinstance(solve, CachedSolver) else None
 
 
+def run_folders(path: str | Path) -> list[Path]:
+    """The runs, finished or interrupted, in the folder ``path``; ``path`` itself if it is a run or holds none."""
+    path = Path(path)
+    runs = sorted(p.parent for p in path.glob(f"*/{storage.STATUS}") if (p.parent / storage.ASKED).is_file())
+    return runs if runs and not (path / storage.ASKED).is_file() else [path]
+
+
 def _assemble(
     posterior: Posterior, sampled: Sampled, settings: Settings, seed: int, name: str, folder: Path | None, asked: Any
 ) -> Run:

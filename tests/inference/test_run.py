@@ -13,7 +13,7 @@ from bayesmembrane.errors import StorageError
 from bayesmembrane.forward import predict
 from bayesmembrane.hypothesis import hypothesis
 from bayesmembrane.inference import run as run_module
-from bayesmembrane.inference.run import Run, load_run, sample
+from bayesmembrane.inference.run import Run, load_run, run_folders, sample
 from bayesmembrane.inference.sampling import Progress, Settings
 from bayesmembrane.mechanics import solve
 from bayesmembrane.registry import material
@@ -101,6 +101,12 @@ def test_inference_data_is_complete(stored: Run) -> None:
     noise = stored.hypothesis.noise.bind(stored.measurement)
     pointwise = noise.pointwise(stored.measurement.force - p.force, stored.hypothesis.noise_coordinates(x))
     assert data.log_likelihood["force"].values.reshape(count, -1) == pytest.approx(pointwise, rel=1e-4, abs=1e-4)
+
+
+def test_runs_are_found_in_the_folder_that_holds_them(stored: Run, tmp_path: Path) -> None:
+    assert stored.path is not None
+    assert run_folders(stored.path.parent) == run_folders(stored.path) == [stored.path]
+    assert run_folders(tmp_path) == [tmp_path]
 
 
 def test_the_whole_walk_is_stored_in_means(stored: Run) -> None:
