@@ -10,13 +10,14 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: help install demo test lint bench study clean
+.PHONY: help install demo test lint bench study study-loop clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
 	@echo "make test     style, types, floors and tests"
 	@echo "make bench    the table of solver times"
 	@echo "make study    statistical studies, minutes to hours"
+	@echo "make study-loop  diagnosis of synthetic faults, an hour or two; goes on where it was; LOOP='--limit 130' asks for less"
 	@echo "make install  the set-up alone, into $(VENV)"
 	@echo "make lint     style, types and floors alone"
 	@echo "make clean    remove caches and build products; keeps $(VENV), chains and reports"
@@ -52,6 +53,9 @@ bench: $(STAMP)
 
 study: $(STAMP)
 	$(PY) -m pytest -n $(PYTEST_WORKERS) -m study
+
+study-loop: $(STAMP)
+	$(PY) -m tests.studies.loop_study --jobs $(PYTEST_WORKERS) $(LOOP)
 
 clean:
 	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

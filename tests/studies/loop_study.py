@@ -1,0 +1,168 @@
+"""`make study-loop`: measurements with an undeclared fault, diagnosed one by one; writes docs/studies/loop.md.
+
+Each case is one line of a JSON-lines file, written as soon as it is done; cases that stand there are skipped, so that
+the study can be interrupted and goes on where it was.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
+from bayesmembrane.errors import BayesmembraneError
+from bayesmembrane.hypothesis import Hypothesis
+from bayesmembrane.measurement import read_measurement
+from bayesmembrane.registry import materials
+from tests.generator.datasets import Dataset, generate
+from tests.generator.film import NoSolutionError
+from tests.studies.loop_plan import Case, plan
+from tests.studies.loop_table import report
+
+SEED = 90000
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "reports" / "study-loop" / "results.jsonl"
+TABLE = ROOT / "docs" / "studies" / "loop.md"
+SHOWN = 6
+
+
+def run_case(case: Case) -> dict[str, Any]:
+    """Everything that the tables need of one case; ``seconds`` are those of the process, for the diagnosis alone."""
+    head = asdict(case) | {"key": case.key}
+    try:
+        data = generate(case.kind, case.material, case.protocol, case.noise, case.strength, case.seed)
+    except NoSolutionError as error:
+        return head | {"skipped": str(error)}
+    with tempfile.TemporaryDirectory() as folder:
+        measurement = read_measurement(*data.write(Path(folder)))
+    begun = time.process_time()
+    try:
+        found = diagnose(measurement, Hypothesis(materials()[case.material]))
+    except BayesmembraneError as error:
+        return head | truth_of(data) | {"verdict": "error", "effects": [], "sentence": str(error)}
+    return head | truth_of(data) | {"seconds": time.process_time() - begun} | answer_of(found, data)
+
+
+def truth_of(data: Dataset) -> dict[str, Any]:
+    """What is in the measurement, and whether it can be told."""
+    t = data.truth
+    return {
+        "truth": sorted(t["effects"]),
+        "forms": {k: v["form"] for k, v in t["effects"].items()},
+        "snr": t["snr"],
+        "snr_own": t["snr_own"],
+        "reached": t["reached"],
+        "expected": t["expected"],
+        "identifiable": data.identifiable,
+        "angles": {k: dict(sorted(v.items(), key=lambda i: i[1])[:3]) for k, v in data.angles.items()},
+    }
+
+
+def answer_of(found: Diagnosis, data: Dataset) -> dict[str, Any]:
+    """The verdict with what led to it; errors are in standard deviations of the noise that was put in."""
+    true = data.truth["noise"]
+    sd = (true["sd"] ** 2 + true["quantum"] ** 2 / 12) ** 0.5
+    tests = found.detection
+    null = found.null.log_evidence
+    return {
+        "verdict": found.verdict,
+        "effects": list(found.effects),
+        "found_material": found.material,
+        "p_value": tests.p_value,
+        "p_lack_of_fit": tests.lack_of_fit.p_value,
+        "p_score": tests.score.p_value,
+        "p_periodicity": None if tests.periodicity is None else tests.periodicity.p_value,
+        "sd": found.noise.sd / sd,
+        "rho": found.noise.rho,
+        "before": found.before.rmse_N / sd,
+        "after": found.after.rmse_N / sd,
+        "heldout_before": None if found.validation is None else found.validation.before.rmse_N / sd,
+        "heldout_after": None if found.validation is None else found.validation.after.rmse_N / sd,
+        "ranking": [
+            {
+                "label": j.candidate.label,
+                "ln_k": j.log_evidence - null,
+                "unexplained": j.unexplained,
+                "ratio": j.fit.ratio,
+                "p": j.fit.p_value,
+                "at_bound": list(j.candidate.at_bound),
+            }
+            for j in found.ranking[:SHOWN]
+        ],
+    }
+
+
+def stored(path: Path) -> dict[str, dict[str, Any]]:
+    """Results by key; a line that an interruption cut short is left out."""
+    out = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+        try:
+            row = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        out[row["key"]] = row
+    return out
+
+
+def run(cases: Iterable[Case], path: Path, seconds: float, jobs: int) -> None:
+    """Run what is not stored yet, until ``seconds`` have passed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    done = stored(path)
+    todo = [c for c in cases if c.key not in done]
+    end = time.monotonic() + seconds
+    with path.open("a", encoding="utf-8") as file:
+        for row in _results(todo, end, jobs):
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            told = ", ".join(row.get("effects", ())) or row.get("found_material", "") or row.get("skipped", "")
+            print(f"{row['key']}: {row.get('verdict', 'skipped')} {told} ({row.get('seconds', 0):.1f} s)", flush=True)
+
+
+def _results(todo: list[Case], end: float, jobs: int) -> Iterator[dict[str, Any]]:
+    if jobs == 1:
+        for case in todo:
+            if time.monotonic() > end:
+                return
+            yield run_case(case)
+        return
+    with ProcessPoolExecutor(jobs) as pool:
+        # A few at a time: what has begun is finished, and nothing more is begun after the end.
+        rest = iter(todo)
+        while time.monotonic() < end and (some := list(islice(rest, 8 * jobs))):
+            yield from pool.map(run_case, some)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run, and write the tables of all that is stored of this plan."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=SEED, help="of the first case; the others follow")
+    parser.add_argument("--limit", type=int, default=None, help="only the first so many cases of the plan")
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="begin no case after this time")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="JSON lines, one a case")
+    parser.add_argument("--table", type=Path, default=TABLE, help="Markdown")
+    asked = parser.parse_args(arguments)
+    cases = list(islice(plan(asked.seed), asked.limit))
+    run(cases, asked.results, asked.seconds, asked.jobs)
+    have = stored(asked.results)
+    rows = [have[c.key] for c in cases if c.key in have]
+    # The place of the file and the number of processes change nothing.
+    limit = "" if asked.limit is None else f" --limit {asked.limit}"
+    text = report(rows, f"python -m tests.studies.loop_study --seed {asked.seed}{limit}", asked.seed, len(cases))
+    asked.table.parent.mkdir(parents=True, exist_ok=True)
+    asked.table.write_text(text, encoding="utf-8")
+    print(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
