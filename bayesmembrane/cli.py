@@ -432,7 +432,7 @@ def loop(
     for stored in runs:
         digest(stored)
     page = write_report([r.path for r in runs if r.path is not None], report_folder, loops=[found])
-    document = {
+    document: dict[str, Any] = {
         "rounds": [r.summary() for r in found.rounds],
         "sentence": found.sentence,
         "left": None if found.left is None else found.left.sentence,

@@ -293,7 +293,8 @@ def _decide(tracer: Tracer, explaining: Sequence[Judged], others: Sequence[Judge
         return _without_effects(tracer, others)
     rivals = _rivals(tracer, explaining)
     single_valued = all(tracer.single_valued(j.candidate) for j in rivals)
-    if single_valued and energies and energies[0].log_evidence > rivals[0].log_evidence - DECISIVE:
+    if single_valued and energies and energies[0].log_evidence > rivals[0].log_evidence - NEAR_DECISIVE:
+        # The instrument is blamed only where no energy comes near.
         return Verdict("material", (energies[0],))
     if single_valued and len(rivals[0].candidate.names) > 1:
         # Two effects that follow the deflection alone imitate a strain energy that is not among those known.
@@ -342,7 +343,8 @@ def _told(
     lost = tuple(e.absorbed for e in absorbed(measurement, null.hypothesis))
     before = error_of(null.residual, sd, null.x.size)
     after = error_of(best.residual, sd, best.x.size)
-    sentence = sentence_of(verdict.verdict, members, null, detection, before, after, shape, power, nexts)
+    partial = next((j for j in everything if j.candidate.names != null.names), None)
+    sentence = sentence_of(verdict.verdict, members, null, detection, before, after, shape, power, nexts, partial)
     return Diagnosis(
         verdict=verdict.verdict,
         effects=effects,

@@ -10,9 +10,11 @@ from bayesmembrane.diagnosis.candidates import Candidate
 from bayesmembrane.diagnosis.detection import Detection
 from bayesmembrane.diagnosis.heldout import Error
 from bayesmembrane.diagnosis.separation import Experiment
+from bayesmembrane.diagnosis.trace import DECISIVE, Judged
 from bayesmembrane.registry import components
 
 SHOWN = 3
+HALF = 0.5  # unexplained: beyond it a candidate is no part of the answer
 SCALES = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "N": (1e3, "mN"), "N/s": (1e3, "mN/s"), "-": (1.0, "")}
 
 
@@ -26,6 +28,7 @@ def sentence_of(
     shape: str,
     power: Mapping[str, float],
     nexts: Sequence[Experiment],
+    partial: Judged | None,
 ) -> str:
     """What to read first: the verdict, how sure, how large, and what to do."""
     title = null.hypothesis.material.title
@@ -59,7 +62,15 @@ def sentence_of(
             f"{start}{names} would imitate it, but together they follow the deflection alone, as a strain energy that "
             f"is not known here would do just as well. No name is given. {shape}"
         )
-    return f"{start}no known effect, no pair of effects and no other energy explains it. {shape}"
+    return f"{start}no known effect, no pair of effects and no other energy explains it.{_part(partial, null)} {shape}"
+
+
+def _part(partial: Judged | None, null: Candidate) -> str:
+    """How far the best of the effects gets, where that is worth saying."""
+    if partial is None or partial.log_evidence <= null.log_evidence + DECISIVE or partial.unexplained > HALF:
+        return ""
+    taken = 100 * (1 - partial.unexplained)
+    return f" The nearest, {_effects(partial.candidate, null)}, takes {taken:.0f} % of it and leaves the rest."
 
 
 def _effects(candidate: Candidate, null: Candidate) -> str:
