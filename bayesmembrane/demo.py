@@ -1,4 +1,4 @@
-"""Everything on the data that ship: reconstruct, fit and sample five materials on both ranges, report."""
+"""Everything on the data that ship: reconstruct, calibrate and compare five materials, follow valleys, close loops."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bars
 
 from bayesmembrane.cache import CachedSolver, Tally
+from bayesmembrane.diagnosis.loop import Loop, loop
 from bayesmembrane.hypothesis import hypothesis
 from bayesmembrane.inference.comparison import Range, compare_ranges
 from bayesmembrane.inference.comparison_jobs import Tell
@@ -29,8 +30,9 @@ from bayesmembrane.inference.published import Compared, compare_with_paper, pape
 from bayesmembrane.inference.reconstruction import reconstruct
 from bayesmembrane.inference.reconstruction_result import Reconstruction
 from bayesmembrane.inference.reconstruction_table import read_published_table
-from bayesmembrane.inference.run import sample
+from bayesmembrane.inference.run import load_run, sample
 from bayesmembrane.inference.sampling import Progress
+from bayesmembrane.inference.valleys import Valleys, valleys_of
 from bayesmembrane.measurement import Measurement, read_measurement
 from bayesmembrane.registry import materials
 from bayesmembrane.reporting.page import write_report
@@ -43,6 +45,11 @@ ORDER = tuple(
     [("ogden", "OP1"), ("yeoh", "OP1"), ("ogden", "OP2"), ("yeoh", "OP2")]
     + [(name, range_name) for name in ("mooney_rivlin", "gent", "neo_hookean") for range_name in RANGES]
 )
+VALLEYS = ("yeoh", "mooney_rivlin", "gent")
+# What the loop is closed on: the paper's curve over both of its ranges, and a cyclic curve with something hidden in it.
+LOOPS = (("yeoh", "synthetic_cyclic"), ("yeoh", "elastosil_50um_first_loading"), ("yeoh", "elastosil_50um_op1"))
+LOOP_ESS = 400.0
+FINISHED = "finished"
 TITLE = "What the published force curve of a 50 um silicone film says about five materials"
 
 
@@ -100,6 +107,14 @@ def demo(out: Path, chains: Path, seed: int = 0, ess: float = 1000.0) -> dict[st
         for job in as_completed(jobs):
             done[jobs[job]] = job.result()
         found: Reconstruction = other.result()
+        closing = [pool.submit(_loop_in_worker, *case, chains, seed, min(ess, LOOP_ESS), queue) for case in LOOPS]
+        following = [
+            pool.submit(_valleys_in_worker, name, [done[name, r].run for r in RANGES], seed, queue) for name in VALLEYS
+        ]
+        loops: list[Loop] = [job.result() for job in closing]
+        valleys: list[Valleys] = [job.result() for job in following]
+    with _compared() as tell:
+        comparison = compare(chains, seed, ess, tell)
     ordered = [done[name, range_name] for name in materials() for range_name in RANGES if (name, range_name) in done]
     page = write_report(
         [d.run for d in ordered],
@@ -108,9 +123,14 @@ def demo(out: Path, chains: Path, seed: int = 0, ess: float = 1000.0) -> dict[st
         fits=[c for d in ordered for c in d.compared],
         title=TITLE,
         cache=_sum([d.tally for d in ordered]),
+        valleys=valleys,
+        comparison=comparison,
+        paper=paper_losses(),
+        loops=loops,
     )
     return {
         "report": str(page),
+        "verdicts": [{"verdict": c.rounds[0].diagnosis.verdict, "sentence": c.sentence} for c in loops],
         "runs": [str(d.run) for d in ordered],
         "suspect_rows": found.to_json_dict()["suspect_rows"],
         "seconds": time.perf_counter() - began,
@@ -166,9 +186,40 @@ def _in_worker(name: str, range_name: str, chains: Path, seed: int, ess: float, 
     return calibrate(name, range_name, chains, seed, ess, lambda progress: queue.put((label, progress)))
 
 
+def _loop_in_worker(name: str, stem: str, chains: Path, seed: int, ess: float, queue: Any) -> Loop:
+    queue.put((f"loop, {stem}", None))
+    measurement = read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
+    found = loop(measurement, hypothesis(name), seed=seed, out=chains, ess=ess)
+    queue.put((f"loop, {stem}", FINISHED))
+    return found
+
+
+def _valleys_in_worker(name: str, runs: list[Path], seed: int, queue: Any) -> Valleys:
+    queue.put((f"valleys, {name}", None))
+    draws = [load_run(run).draws() for run in runs]
+    found = valleys_of([shipped_measurement(r) for r in RANGES], hypothesis(name), seed=seed, draws=draws)
+    queue.put((f"valleys, {name}", FINISHED))
+    return found
+
+
 def _reconstruct_in_worker(seed: int, queue: Any) -> Reconstruction:
     queue.put(("reconstruct", None))
     return reconstruct(seed=seed)
+
+
+@contextmanager
+def _compared() -> Iterator[Tell]:
+    """A line per hypothesis on stderr while evidence is found."""
+    columns = (TextColumn("{task.description:<32}"), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
+    with Bars(*columns, console=log) as bars:
+        tasks: dict[str, Any] = {}
+
+        def tell(label: str, text: str) -> None:
+            if label not in tasks:
+                tasks[label] = bars.add_task(label, total=None, text=text)
+            bars.update(tasks[label], text=text)
+
+        yield tell
 
 
 @contextmanager
@@ -202,7 +253,9 @@ def _listen(queue: Any, bars: Bars, stop: list[bool]) -> None:
             return
         if label not in tasks:
             tasks[label] = bars.add_task(label, total=1.0, text="fitting" if "," in label else "")
-        if progress is not None:
+        if progress == FINISHED:
+            bars.update(tasks[label], completed=1.0, text="done")
+        elif progress is not None:
             bars.update(tasks[label], completed=share(progress), text=told(progress))
 
 
