@@ -6,7 +6,6 @@ import json
 import os
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import jinja2
 import numpy as np
 
 from bayesmembrane.cache import Tally
+from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.errors import SettingsError, StorageError
 from bayesmembrane.inference.comparison_result import Comparison
 from bayesmembrane.inference.published import Compared
@@ -22,8 +22,9 @@ from bayesmembrane.inference.reconstruction_result import Reconstruction
 from bayesmembrane.inference.run import Run
 from bayesmembrane.inference.valleys_result import Valleys
 from bayesmembrane.reporting import comparison_section, figures, sentences, tables
+from bayesmembrane.reporting.blocks import Block, Section
 from bayesmembrane.reporting.comparison_figures import comparison_picture
-from bayesmembrane.reporting.figures import Picture
+from bayesmembrane.reporting.loop_section import loop_answers, loop_sections
 from bayesmembrane.reporting.reading import read
 from bayesmembrane.reporting.style import spoken
 from bayesmembrane.reporting.style import title as material_title
@@ -37,28 +38,6 @@ PAGE, TWIN = "index.html", "report.json"
 MOST_CORNER = 4000  # draws in a corner plot
 
 
-@dataclass(frozen=True)
-class Block:
-    """One piece of a section; ``kind`` says which of the others is set."""
-
-    kind: str
-    text: str = ""
-    lines: tuple[str, ...] = ()
-    picture: Picture | None = None
-    alt: str = ""
-    caption: str = ""
-    table: Table | None = None
-
-
-@dataclass(frozen=True)
-class Section:
-    """A heading with its pieces; ``key`` is the anchor."""
-
-    key: str
-    title: str
-    blocks: tuple[Block, ...] = field(default_factory=tuple)
-
-
 def write_report(
     runs: Sequence[Run | Path],
     out: Path,
@@ -69,6 +48,7 @@ def write_report(
     valleys: Sequence[Valleys] | None = None,
     comparison: Mapping[str, Comparison] | None = None,
     paper: comparison_section.Paper | None = None,
+    loops: Sequence[Loop] | None = None,
 ) -> Path:
     """Write ``out/index.html`` and ``out/report.json`` about one run or several, and return the page's path.
 
@@ -83,6 +63,7 @@ def write_report(
     valleys : of some materials, from `inference.valleys`; shown in a section of their own
     comparison : by range, from `inference.comparison`; shown in a section of its own
     paper : losses (N) of the paper's optima by range and material, whose ranking is shown beside ours
+    loops : what the model lacks, from `diagnosis.loop`; the page answers with that first
 
     A report of an earlier time is replaced, any other file is not: `StorageError`. The same error, or `DataError`,
     names a folder that holds no run; `SettingsError` says that there is none at all.
@@ -92,7 +73,7 @@ def write_report(
     for name in (PAGE, TWIN):
         _refuse_foreign(out / name)
     shown = [read(run) for run in runs]
-    return write_shown(shown, out, reconstruction, fits or (), title, cache, valleys, comparison, paper)
+    return write_shown(shown, out, reconstruction, fits or (), title, cache, valleys, comparison, paper, loops)
 
 
 def write_shown(
@@ -105,6 +86,7 @@ def write_shown(
     valleys: Sequence[Valleys] | None = None,
     comparison: Mapping[str, Comparison] | None = None,
     paper: comparison_section.Paper | None = None,
+    loops: Sequence[Loop] | None = None,
 ) -> Path:
     """As `write_report`, of runs that have been read."""
     shown = sorted(shown, key=lambda s: (s.digest.end, s.data_hash, s.hypothesis.curve_size, s.name))
@@ -112,8 +94,9 @@ def write_shown(
     title = title or f"What the force curve of {sentences.listed(names)} says"
     cases = [s.case for s in shown]
     warnings = [*sentences.warnings(cases), *_solver_warnings(shown)]
-    told = sentences.answer(cases)
-    parts = [_data(shown, reconstruction), _curves(shown), _comparison(shown, compared)]
+    told = [*loop_answers(loops or ()), *sentences.answer(cases)]
+    parts = loop_sections(loops or ())
+    parts += [_data(shown, reconstruction), _curves(shown), _comparison(shown, compared)]
     parts += [_evidence(comparison, paper or {})] if comparison else []
     broken = [s for s in shown if s.digest.specimens]
     parts += [_break_points(broken)] if broken else []
