@@ -38,7 +38,7 @@ def sentence_of(
             f"{title}{have} describes the curve to within its noise (p = {detection.p_value:.2g}; "
             f"{1e3 * before.rmse_N:.3g} mN root mean square). Nothing is seen to be missing. {_power(null, power)}"
         ).strip()
-    start = f"{title}{have} misses something (p = {_p(detection.p_value)}): "
+    start = f"{title}{have} misses something (p {_p(detection.p_value)}): "
     error = (
         f"The residual falls from {1e3 * before.rmse_N:.3g} to {1e3 * after.rmse_N:.3g} mN root mean square, "
         f"{after.reduced_chi2:.2f} in reduced chi-square."
@@ -113,4 +113,4 @@ def _power(null: Candidate, power: Mapping[str, float]) -> str:
 
 
 def _p(value: float) -> str:
-    return "< 0.0001" if value < 1e-4 else f"{value:.2g}"
+    return "< 0.0001" if value < 1e-4 else f"= {value:.2g}"
