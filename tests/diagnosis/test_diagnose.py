@@ -1,0 +1,87 @@
+"""A small fixed part of `make study-loop`: clear cases at strength 1, from a generator that shares no code."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayesmembrane.diagnosis.diagnose import VERDICTS, Diagnosis, diagnose
+from bayesmembrane.errors import SettingsError
+from bayesmembrane.hypothesis import Hypothesis
+from bayesmembrane.materials.ogden import Ogden
+from bayesmembrane.measurement import read_measurement
+from bayesmembrane.registry import components, materials
+from tests.diagnosis.curves import measured
+from tests.generator.datasets import Dataset, generate
+
+
+def answered(folder: Path, kind: str, material: str, protocol: str, noise: str, seed: int) -> tuple[Dataset, Diagnosis]:
+    data = generate(kind, material, protocol, noise, 1.0, seed)
+    return data, diagnose(read_measurement(*data.write(folder)), Hypothesis(materials()[material]))
+
+
+@pytest.mark.parametrize(
+    ("material", "protocol", "noise", "seed"),
+    [("gent", "staircase", "white", 501), ("yeoh", "two_speeds", "ar1:0.5", 502), ("ogden", "single", "white", 503)],
+)
+def test_nothing_is_missing_where_nothing_is(tmp_path, material, protocol, noise, seed) -> None:
+    data, found = answered(tmp_path, "null", material, protocol, noise, seed)
+    assert found.verdict == "adequate"
+    assert found.effects == ()
+    assert found.hypothesis.effects == ()
+    assert found.noise.sd == pytest.approx(data.truth["noise"]["sd"], rel=0.2)
+    assert found.noise.rho == pytest.approx(data.truth["noise"]["rho"], abs=0.2)
+    assert "Nothing is seen to be missing" in found.sentence
+    assert all(size > 0 for size in found.power.values())
+
+
+@pytest.mark.parametrize(
+    ("kind", "material", "protocol", "seed"),
+    [
+        ("clamp_slip", "gent", "staircase", 511),
+        ("viscoelastic", "yeoh", "two_speeds", 512),
+        ("force_drift", "neo_hookean", "staircase", 513),
+        ("friction", "mooney_rivlin", "staircase_twice", 514),
+    ],
+)
+def test_a_clear_effect_is_named_and_explains_the_residual(tmp_path, kind, material, protocol, seed) -> None:
+    data, found = answered(tmp_path, kind, material, protocol, "white", seed)
+    assert data.identifiable
+    assert found.verdict == "named"
+    assert found.effects == (kind,)
+    assert components("effects")[kind]().title in found.sentence
+    assert [e.name for e in found.hypothesis.effects] == [kind]
+    sd = data.truth["noise"]["sd"]
+    assert found.after.rmse_N < 1.1 * sd < found.before.rmse_N
+    assert found.validation.after.rmse_N < min(1.3 * sd, found.validation.before.rmse_N)
+    assert found.ranking[0].candidate.names == (kind,)
+
+
+def test_what_is_not_in_the_library_gets_no_name(tmp_path) -> None:
+    _, found = answered(tmp_path, "ripple", "gent", "staircase", "white", 521)
+    assert found.verdict == "unknown"
+    assert found.effects == ()
+    assert "repeats every" in found.sentence
+
+
+def test_a_wrongly_declared_family_is_not_blamed_on_the_instrument(tmp_path) -> None:
+    _, found = answered(tmp_path, "typical:gent", "neo_hookean", "single", "white", 531)
+    assert found.verdict in ("material", "unknown")
+    assert found.effects == ()
+    assert found.hypothesis.effects == ()
+
+
+def test_the_summary_is_plain_json(tmp_path) -> None:
+    _, found = answered(tmp_path, "force_offset", "neo_hookean", "staircase", "white", 541)
+    document = json.loads(json.dumps(found.summary()))
+    assert document["verdict"] in VERDICTS
+    assert document["verdict"] == found.verdict
+    assert document["ranking"][0]["log_bayes_factor"] >= document["ranking"][-1]["log_bayes_factor"]
+    assert "force_offset" in document["effects"]
+
+
+def test_too_few_points_are_refused() -> None:
+    few = measured(np.linspace(0.01, 0.1, 8), np.linspace(0.005, 0.04, 8))
+    with pytest.raises(SettingsError, match="points"):
+        diagnose(few, Hypothesis(Ogden))

@@ -1,0 +1,65 @@
+import numpy as np
+import pytest
+
+from bayesmembrane.diagnosis.saturated import reference_basis
+from bayesmembrane.diagnosis.whitening import decorrelated, own_noise
+from tests.diagnosis.curves import SD, correlated, measured, triangle
+
+N, SEEDS = 300, 16
+TIME = np.arange(1.0, N + 1)
+SMOOTH = 0.3 * (triangle(N) / 0.04) ** 1.7  # N
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.4, 0.7])
+def test_restricted_likelihood_recovers_deviation_and_correlation(rho) -> None:
+    rng = np.random.default_rng(1)
+    found = []
+    for _ in range(SEEDS):
+        m = measured(SMOOTH + correlated(rng, TIME, rho))
+        found.append(own_noise(m, reference_basis(m)))
+    sd, rhos = np.array([f.sd for f in found]), np.array([f.rho for f in found])
+    errors = np.array([f.rho_sd for f in found])
+    # Four standard errors of the mean; at zero the estimate is cut off from below.
+    assert abs(sd.mean() / SD - 1) < 4 * max(sd.std() / SD, 0.03) / np.sqrt(SEEDS)
+    assert abs(rhos.mean() - rho) < 4 * errors.mean() / np.sqrt(SEEDS) + (errors.mean() if rho == 0 else 0)
+    spread = np.sqrt(np.mean((rhos - rho) ** 2))
+    assert 0.3 * errors.mean() < spread < 2 * errors.mean()
+
+
+def test_a_curve_that_the_reference_cannot_follow_looks_like_noise_that_remembers() -> None:
+    m = measured(SMOOTH + correlated(np.random.default_rng(2), TIME, 0.0))
+    poor = own_noise(m, np.ones((N, 1)))
+    assert poor.rho > 0.9
+    assert own_noise(m, reference_basis(m)).rho < 0.3
+
+
+def test_decorrelated_noise_is_white_also_between_uneven_points() -> None:
+    time = np.cumsum(np.random.default_rng(3).uniform(0.2, 3.0, 40))
+    for rho in (0.0, 0.3, 0.9):
+        covariance = rho ** np.abs(time[:, None] - time[None, :]) if rho else np.eye(40)
+        root = decorrelated(np.eye(40), rho, np.diff(time))
+        np.testing.assert_allclose(root @ covariance @ root.T, np.eye(40), atol=1e-10)
+
+
+def test_inferred_noise_whitens_what_it_was_inferred_from() -> None:
+    m = measured(SMOOTH + correlated(np.random.default_rng(4), TIME, 0.6))
+    noise = own_noise(m, reference_basis(m))
+    w = noise.white(m.force - SMOOTH)
+    assert abs(np.corrcoef(w[1:], w[:-1])[0, 1]) < 3 / np.sqrt(N)
+    assert w.std() == pytest.approx(1.0, abs=0.15)
+    assert noise.cautious().rho == pytest.approx(noise.rho + noise.rho_sd)
+
+
+def test_stated_noise_is_used_as_stated() -> None:
+    time = TIME[:50]
+    covariance = np.outer(a := np.linspace(1, 3, 50), a) * SD**2 * 0.5 ** np.abs(time[:, None] - time[None, :])
+    force = SMOOTH[:50]
+    noise = own_noise(measured(force, covariance=covariance), np.ones((50, 1)))
+    assert noise.stated
+    assert noise.rho == 0
+    assert noise.sd == pytest.approx(SD * np.sqrt(np.mean(a**2)))
+    assert noise.dof == np.inf
+    assert noise.cautious() is noise
+    w = noise.white(force)
+    assert w @ w == pytest.approx(force @ np.linalg.solve(covariance, force))
+    np.testing.assert_allclose(noise.white(np.stack([force, 2 * force], axis=1)), np.stack([w, 2 * w], axis=1))
