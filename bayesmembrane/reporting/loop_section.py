@@ -36,16 +36,23 @@ def loop_sections(loops: Sequence[Loop]) -> list[Section]:
 
 
 def loop_answers(loops: Sequence[Loop]) -> list[str]:
-    """What to read first of each loop; the model is named where there are several."""
+    """What to read first of each loop, a paragraph for each round and one for the modulus; named where several are."""
     if len(loops) == 1:
-        return [answer(loops[0])]
-    return [f"{_subject(found)}: {answer(found)}" for found in loops]
+        return [*answer(loops[0]), *moved_sentences(loops[0])[:1]]
+    return [f"{_subject(found)}: {' '.join(answer(found))}" for found in loops]
 
 
-def answer(found: Loop) -> str:
+def answer(found: Loop) -> list[str]:
     """What was found and added, with the size, and how it ended."""
     told = [r.diagnosis.sentence for r in found.rounds]
-    return " Then: ".join(dict.fromkeys(told))
+    told = [told[0], *(f"With that: {s}" for s in told[1:])]
+    last = found.rounds[-1]
+    if last.after is not last.before:
+        told.append(
+            f"The loop stops after {len(found.rounds)} round{'s' if len(found.rounds) > 1 else ''}: whether "
+            f"{spoken_hypothesis(last.after.run.hypothesis)} is adequate has not been asked."
+        )
+    return told
 
 
 def _subject(found: Loop) -> str:
@@ -59,7 +66,7 @@ def _section(found: Loop, number: int) -> Section:
     first, last = found.rounds[0].diagnosis, found.rounds[-1].diagnosis
     way = models(found)
     where = "nothing" if first.validation is None else first.validation.where
-    blocks = [Block("text", answer(found))]
+    blocks = [Block("text", text) for text in answer(found)]
     told = [*validation_sentences(found), *bound_sentences(found), *moved_sentences(found)]
     blocks += [Block("list", lines=tuple(told))] if told else []
     blocks.append(_residuals(found, way))
@@ -120,7 +127,7 @@ def moved_sentences(found: Loop) -> list[str]:
         return []
     every = [c for c in changes(before.run, after.run) if c.material or c.name == "shear modulus"]
     modulus, rest = every[0], every[1:]
-    told = [_modulus_sentence(modulus, spoken_hypothesis(after.run.hypothesis))]
+    told = [modulus_sentence(modulus, spoken_hypothesis(after.run.hypothesis))]
     # What only scales with the modulus says nothing new.
     known = [c for c in rest if abs(c.in_sd) > MATTERS and abs(c.share - modulus.share) > SAME]
     if known:
@@ -135,7 +142,8 @@ def moved_sentences(found: Loop) -> list[str]:
     return told
 
 
-def _modulus_sentence(c: Change, model: str) -> str:
+def modulus_sentence(c: Change, model: str) -> str:
+    """What the change of the modulus means to a user."""
     start = f"In {model} the shear modulus is {c.after[0]:.4g} +- {c.after[1]:.2g} MPa instead of {c.before[0]:.4g}"
     if abs(c.in_sd) <= MATTERS:
         return (

@@ -79,7 +79,7 @@ def ranking_table(d: Diagnosis, name: str) -> Table:
         Column("at_bound", "at a bound"),
         Column("in_answer", "in the answer"),
     )
-    members = {id(j.candidate) for j in d.members}
+    members = {id(j.candidate) for j in d.members} if d.verdict != "unknown" else set()
     rows = []
     for j in d.ranking[:MOST_CANDIDATES]:
         c = j.candidate

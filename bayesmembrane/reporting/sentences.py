@@ -166,8 +166,8 @@ def describes(group: Sequence[Case]) -> str:
         best = sorted(group, key=lambda c: c.rmse)
         tail = f"; the others: {_named(best[1:])}" if best[1:] else ""
         return (
-            f"Up to {end} the measurement states no noise, so that no material can be called adequate or not; the "
-            f"smallest root mean square residual has {_named(best[:1])}{tail}."
+            f"Up to {end} the measurement states no noise: a calibration alone cannot say which material is adequate. "
+            f"The smallest root mean square residual has {_named(best[:1])}{tail}."
         )
     noise = newtons(group[0].own_noise or 0.0)
     parts = []
