@@ -28,7 +28,7 @@ from bayesmembrane.diagnosis.trace import (
     effective_weight,
     ranked,
 )
-from bayesmembrane.diagnosis.whitening import OwnNoise, gaps_of, own_noise
+from bayesmembrane.diagnosis.whitening import OwnNoise, own_noise
 from bayesmembrane.diagnosis.wording import sentence_of
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.forward import Solve
@@ -329,7 +329,7 @@ def _told(
 
     def restricted(keep: Any) -> OwnNoise:
         part = measurement.select(keep)
-        return own_noise(part, reference_basis(part)) if search.noise.stated else _thinned(search.noise, part)
+        return own_noise(part, reference_basis(part)) if search.noise.stated else search.noise.part(part)
 
     rivals = [j.candidate for j in everything[:3]] if known else []
     validation = validate(search, mask, where, null, best, rivals, restricted)
@@ -364,11 +364,6 @@ def _told(
         validation=validation,
         experiments=tuple(nexts),
     )
-
-
-def _thinned(noise: OwnNoise, part: Measurement) -> OwnNoise:
-    """The same inferred noise for a part of the points."""
-    return replace(noise, gaps=gaps_of(part))
 
 
 def _confounded(found: Sequence[Signature]) -> tuple[tuple[str, str, float], ...]:

@@ -14,6 +14,8 @@ from bayesmembrane.parameters import Array
 LARGEST_RHO = 0.97
 TRIALS = np.linspace(0.0, LARGEST_RHO, 25)
 CURVED = 0.02  # step in rho at which the curvature of the likelihood is taken
+CLOCKS = ("time", "readings")
+EVEN = 0.05  # steps that differ by no more than this part are even: both clocks are the same
 SMALLEST_SD = 1e-9  # of the largest force: a perfect curve still has a noise
 
 
@@ -23,9 +25,10 @@ class OwnNoise:
 
     sd : N, of one point; with a given covariance the root mean square of its diagonal
     rho, rho_sd : correlation of neighbours a median step apart, and its standard error; 0 where the noise is given
-    gaps : (N - 1,) steps between points over their median
+    gaps : (N - 1,) steps between points over their median, by the clock that the noise follows
     root : (N, N) Cholesky factor of a covariance that the measurement states, or None
     dof : degrees of freedom behind ``sd``; inf where it is given
+    clock : one of `CLOCKS`: what noise forgets with, the time or the number of readings
     """
 
     sd: float
@@ -34,6 +37,7 @@ class OwnNoise:
     gaps: Array
     root: Array | None
     dof: float
+    clock: str = "time"
 
     @property
     def stated(self) -> bool:
@@ -46,6 +50,10 @@ class OwnNoise:
             flat = values.reshape(len(values), -1)
             return np.asarray(solve_triangular(self.root, flat, lower=True)).reshape(values.shape)
         return decorrelated(values, self.rho, self.gaps) / self.sd
+
+    def part(self, measurement: Measurement) -> OwnNoise:
+        """The same inferred noise for some of the points."""
+        return replace(self, gaps=gaps_of(measurement, self.clock))
 
     def cautious(self) -> OwnNoise:
         """With a correlation larger by its standard error: one that is plugged in makes tests optimistic."""
@@ -64,8 +72,13 @@ def decorrelated(values: Array, rho: float, gaps: Array) -> Array:
     return out
 
 
-def gaps_of(measurement: Measurement) -> Array:
-    """(N - 1,) steps between neighbours over the median step: of time, or else of the distance travelled."""
+def gaps_of(measurement: Measurement, clock: str = "time") -> Array:
+    """(N - 1,) steps between neighbours over the median step: of time, or else of the distance travelled.
+
+    By the clock "readings" every step is 1.
+    """
+    if clock == "readings":
+        return np.ones(len(measurement) - 1)
     place = measurement.deflection if measurement.time is None else measurement.time
     gap = np.abs(np.diff(place))
     middle = float(np.median(gap)) if gap.size else 1.0
@@ -76,14 +89,22 @@ def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
     """Noise that the measurement states, or else what ``basis`` (N, p) leaves, by restricted maximum likelihood.
 
     For AR(1) noise e the restricted likelihood of rho, sd maximised away, is
-    -1/2 [(N - p) ln RSS + ln |R| + ln |B^T R^-1 B|] (D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320).
+    -1/2 [(N - p) ln RSS + ln |R| + ln |B^T R^-1 B|] (D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320). Where the
+    points are uneven in time, noise may forget by the time (drift of air, filters) or by the reading (averages and
+    filters of so many readings): the likelier is taken.
     """
     gaps, covariance = gaps_of(measurement), measurement.noise_covariance
     if covariance is not None:
         sd = float(np.sqrt(np.mean(np.diag(covariance))))
         return OwnNoise(sd, 0.0, 0.0, gaps, np.asarray(np.linalg.cholesky(covariance), dtype=float), np.inf)
-    y = measurement.force
-    q = orthonormal(basis)
+    found = [_restricted(measurement.force, orthonormal(basis), gaps, "time")]
+    if gaps.size and float(np.max(np.abs(gaps - 1))) > EVEN:
+        found.append(_restricted(measurement.force, orthonormal(basis), gaps_of(measurement, "readings"), "readings"))
+    return min(found, key=lambda f: f[0])[1]
+
+
+def _restricted(y: Array, q: Array, gaps: Array, clock: str) -> tuple[float, OwnNoise]:
+    """(-2 ln L, noise) at the most likely correlation, beside the orthonormal columns q (N, p)."""
 
     def fit(rho: float) -> tuple[float, float]:
         """(-2 ln L, RSS) at one correlation."""
@@ -103,9 +124,10 @@ def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
     bend = (fit(middle - CURVED)[0] - 2 * fit(middle)[0] + fit(middle + CURVED)[0]) / CURVED**2
     dof = y.size - q.shape[1]
     error = float(np.sqrt(2 / bend)) if bend > 0 else 1 / np.sqrt(dof)
-    sd = np.sqrt(fit(rho)[1] / dof)
+    value, rss = fit(rho)
     floor = SMALLEST_SD * float(np.max(np.abs(y)))
-    return OwnNoise(max(float(sd), floor), rho, min(error, 0.3), gaps, None, float(dof))
+    sd = max(float(np.sqrt(rss / dof)), floor)
+    return value, OwnNoise(sd, rho, min(error, 0.3), gaps, None, float(dof), clock)
 
 
 def orthonormal(basis: Array, tolerance: float = 1e-9) -> Array:

@@ -63,3 +63,18 @@ def test_stated_noise_is_used_as_stated() -> None:
     w = noise.white(force)
     assert w @ w == pytest.approx(force @ np.linalg.solve(covariance, force))
     np.testing.assert_allclose(noise.white(np.stack([force, 2 * force], axis=1)), np.stack([w, 2 * w], axis=1))
+
+
+@pytest.mark.parametrize("clock", ["time", "readings"])
+def test_noise_that_forgets_by_time_or_by_reading_is_told_apart_at_two_speeds(clock) -> None:
+    steps = np.where(np.arange(N) < N // 2, 1.0, 0.1)
+    time = np.cumsum(steps)
+    hits = 0
+    for seed in range(6):
+        noise = correlated(np.random.default_rng(seed), time if clock == "time" else TIME, 0.5)
+        m = measured(SMOOTH + noise, time=time)
+        found = own_noise(m, reference_basis(m))
+        hits += found.clock == clock
+        half = m.select(np.arange(N) < N // 2)
+        assert found.part(half).gaps.size == N // 2 - 1
+    assert hits >= 5
