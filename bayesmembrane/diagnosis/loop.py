@@ -91,10 +91,16 @@ class Loop:
     @property
     def sentence(self) -> str:
         """How it ended."""
-        last = self.rounds[-1].diagnosis
-        added = [n for r in self.rounds for n in r.diagnosis.effects if r.diagnosis.verdict == "named"]
-        start = f"Added: {', '.join(added)}. " if added else ""
-        return start + last.sentence
+        steps = []
+        for r in self.rounds:
+            if r.after is r.before:
+                continue
+            old, new = r.before.run.hypothesis, r.after.run.hypothesis
+            if new.material is not old.material:
+                steps.append(f"{new.material.title} instead of {old.material.title}")
+            steps += [e.title for e in new.effects if e.name not in {e.name for e in old.effects}]
+        start = f"Changed: {', '.join(steps)}. " if steps else ""
+        return start + self.rounds[-1].diagnosis.sentence
 
 
 def loop(

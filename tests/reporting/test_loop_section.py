@@ -164,6 +164,14 @@ def test_the_answer_tells_every_round(named: Loop) -> None:
     assert second.startswith("With that: neo-Hookean with friction in the guide describes the curve")
 
 
+def test_what_was_changed_is_said_before_how_it_ended(named: Loop, unknown: Loop) -> None:
+    assert named.sentence == f"Changed: friction in the guide. {named.rounds[-1].diagnosis.sentence}"
+    assert unknown.sentence == "no name."
+    r = named.rounds[0]
+    gent = replace(r.after, run=replace(r.after.run, settings={"hypothesis": hypothesis("gent").settings()}))
+    assert Loop((replace(r, after=gent),), None).sentence.startswith("Changed: Gent instead of neo-Hookean. ")
+
+
 def test_a_loop_that_stops_early_says_so(named: Loop) -> None:
     told = answer(Loop(named.rounds[:1], None))
     assert "after 1 round: whether neo-Hookean with friction in the guide is adequate" in told[-1]
