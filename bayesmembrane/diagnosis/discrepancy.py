@@ -12,8 +12,10 @@ from bayesmembrane.diagnosis.whitening import OwnNoise
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.parameters import Array
 
-LENGTHS = (0.01, 0.03, 0.1, 0.3)  # of the way: where the search for a correlation length starts
-BOUNDS = ((-12.0, 6.0), (np.log(0.003), np.log(3.0)))
+LENGTHS = (0.001, 0.002, 0.004, 0.01, 0.03, 0.1, 0.3)  # of the way: where the search for a correlation length starts
+AMPLITUDES = (0.3, 1.0, 5.0)  # of the noise
+BOUNDS = ((-12.0, 6.0), (np.log(5e-4), np.log(3.0)))
+SIMPLEX = np.array([[0.0, 0.0], [0.4, 0.0], [0.0, 0.4]])  # its default is next to nothing around zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +65,15 @@ def discrepancy(measurement: Measurement, residual: Array, noise: OwnNoise) -> D
         alpha = cho_solve((c, lower), residual)
         return float(0.5 * residual @ alpha + np.sum(np.log(np.diag(c))))
 
-    starts = [np.array([0.0, np.log(v)]) for v in LENGTHS]
+    starts = [np.array([np.log(a), np.log(v)]) for a in AMPLITUDES for v in LENGTHS]
     first = min(starts, key=cost)
-    best = minimize(cost, first, method="Nelder-Mead", bounds=BOUNDS, options={"maxfev": 60, "xatol": 0.02}).x
+    best = minimize(
+        cost,
+        first,
+        method="Nelder-Mead",
+        bounds=BOUNDS,
+        options={"maxfev": 60, "xatol": 0.02, "initial_simplex": first + SIMPLEX},
+    ).x
     k = kernel(best)
     factor = cho_factor(k + own, lower=True)
     mean = k @ cho_solve(factor, residual)
