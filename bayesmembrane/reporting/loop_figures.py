@@ -97,6 +97,7 @@ def discrepancy_picture(place: Place, residual: Array, mean: Array, sd: Array, k
         figure = _figure(3.6)
         axes = figure.subplots(1, 2, sharey=True)
         at, label = place.along
+        shade = 0.25 if len(_legs(place.leg)) <= 3 else 0.12
         for ax, x, name in ((axes[0], 1e3 * place.deflection, "deflection (mm)"), (axes[1], at, label)):
             _noise(ax, x, place.sd)
             for sign, _, colour, symbol in LEGS:
@@ -105,7 +106,7 @@ def discrepancy_picture(place: Place, residual: Array, mean: Array, sd: Array, k
             for part in _legs(place.leg):
                 colour = LEGS[0 if place.leg[part[0]] > 0 else 1][2]
                 low, high = (1e3 * (mean + s * sd)[part] for s in (-2, 2))
-                ax.fill_between(x[part], low, high, color=colour, alpha=0.25, linewidth=0, zorder=3)
+                ax.fill_between(x[part], low, high, color=colour, alpha=shade, linewidth=0, zorder=3)
                 ax.plot(x[part], 1e3 * mean[part], color=colour, linewidth=1.6, zorder=4)
             ax.axhline(0, color=MUTED, linewidth=0.8, zorder=1)
             ax.set_xlabel(name)
@@ -209,4 +210,5 @@ def _handles(place: Place) -> list[Line2D | Patch]:
         handles.append(hollow)
     if place.leg.size >= 2 * PARTS:
         handles.append(Line2D([], [], color=INK, linewidth=2.0, label="mean of neighbours"))
-    return [*handles, Patch(color=BAND, label="noise alone: 2 sd (by cycle: 1 sd)")]
+    cyclic = " (by cycle: 1 sd)" if np.unique(place.cycle).size > 1 else ""
+    return [*handles, Patch(color=BAND, label=f"noise alone: 2 sd{cyclic}")]

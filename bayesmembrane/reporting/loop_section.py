@@ -185,13 +185,14 @@ def _row_title(word: str, m: Model) -> str:
 
 def _residuals(found: Loop, way: Sequence[Model]) -> Block:
     place, rows = place_of(found), residual_rows(way)
-    cyclic = " and by cycle" if np.unique(place.cycle).size > 1 else ""
-    along = place.along[1].partition(" ")[0]
+    against = ["deflection", place.along[1].partition(" ")[0]]
+    against += ["by cycle"] if np.unique(place.cycle).size > 1 else []
+    order = "; the model as given above, the one with what was found below" if len(rows) > 1 else ""
     caption = (
-        f"Measured less fitted force (mN) against deflection, {along}{cyclic}; the model as given above, the one that "
-        "is kept below. Grey: what the measurement's own noise does. The lines are means of neighbours: where they "
-        "leave the band's middle, or loading and unloading part, something is missing. All points were fitted here; "
-        "the hollow ones are set aside for the held-out errors of the table."
+        f"Measured less fitted force (mN) against {listed(against)}{order}. Grey: what the measurement's own noise "
+        "does. The lines are means of neighbours: where they leave the middle of the band, or loading and unloading "
+        "part, something is missing. All points were fitted here; the hollow ones are those set aside for the held-out "
+        "errors of the table."
     )
     alt = "Residuals " + " and ".join(f"{r.title[0].lower()}{r.title[1:]}" for r in rows)
     return Block("figure", picture=residual_picture(place, rows), alt=alt, caption=caption)
