@@ -223,7 +223,7 @@ def _traced(
     if not explaining or all(tracer.single_valued(j.candidate) for j in _rivals(tracer, explaining)):
         others = tracer.materials(say)
     every = ranked([*pairs, *singles, *others, tracer.judged(tracer.null)])
-    return tracer, _decide(tracer, explaining, others), every
+    return tracer, _decide(tracer, explaining, [j for j in singles if j.explains], others), every
 
 
 def _renewed(tracer: Tracer, judged: list[Judged]) -> tuple[Tracer, list[Judged]]:
@@ -286,8 +286,8 @@ def _trace(tracer: Tracer, candidate: Candidate) -> Array:
     return tracer.search.noise.white(tracer.null.residual - candidate.residual)
 
 
-def _decide(tracer: Tracer, explaining: Sequence[Judged], others: Sequence[Judged]) -> Verdict:
-    """The verdict from the effects that explain the curve and the energies that may do so."""
+def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged], others: Sequence[Judged]) -> Verdict:
+    """The verdict from what explains the curve, the single effects that do, and the energies that may do so."""
     energies = [j for j in others if j.explains]
     if not explaining:
         return _without_effects(tracer, others)
@@ -297,8 +297,11 @@ def _decide(tracer: Tracer, explaining: Sequence[Judged], others: Sequence[Judge
         # The instrument is blamed only where no energy comes near.
         return Verdict("material", (energies[0],))
     if single_valued and len(rivals[0].candidate.names) > 1:
-        # Two effects that follow the deflection alone imitate a strain energy that is not among those known.
-        return Verdict("unknown", rivals)
+        if not alone:
+            # Two effects that follow the deflection alone imitate a strain energy that is not among those known.
+            return Verdict("unknown", rivals)
+        # One of them is enough, but its form is not the machine's: neither can be told from its look-alikes.
+        rivals = (*_rivals(tracer, alone), *rivals)
     return Verdict("named" if len(rivals) == 1 else "ambiguous", rivals)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.stats import chi2, f
+from scipy.stats import chi2, f, ncf, ncx2
 
 from bayesmembrane.diagnosis.whitening import OwnNoise, orthonormal
 from bayesmembrane.measurement import Measurement
@@ -28,12 +28,24 @@ class LackOfFit:
     p_value : P(F >= ratio)
     chi2 : RSS over the noise's own variance
     dof : N - k
+    extra, rest : degrees of freedom above and below in F; ``rest`` is inf where the noise is stated
     """
 
     ratio: float
     p_value: float
     chi2: float
     dof: int
+    extra: int = 1
+    rest: float = np.inf
+
+    def p_if_left(self, part: float, before: LackOfFit) -> float:
+        """P(F >= ratio) if ``part`` of the misfit that ``before`` shows were left: noncentral F or chi-square."""
+        missing = part * max(before.ratio - 1, 0.0) * before.extra
+        if missing == 0:
+            return self.p_value
+        if np.isinf(self.rest):
+            return float(ncx2.sf(self.ratio * self.extra, self.extra, missing))
+        return float(ncf.sf(self.ratio, self.extra, self.rest, missing))
 
     @property
     def reduced_chi2(self) -> float:
@@ -94,7 +106,8 @@ def lack_of_fit(residual: Array, slopes: Array, basis: Array, noise: OwnNoise) -
     if noise.stated:
         # Everything that is left counts: the noise is known.
         value, dof = rss, max(n - k, 1)
-        return LackOfFit(value / dof, float(chi2.sf(value, dof)), rss, n - k)
+        return LackOfFit(value / dof, float(chi2.sf(value, dof)), rss, n - k, dof)
     scale = max(rest / max(n - p, 1), 1e-300)
     ratio = max(rss - rest, 0.0) / extra / scale
-    return LackOfFit(float(ratio), float(f.sf(ratio, extra, max(n - p, 1))), rss, n - k)
+    rest_dof = max(n - p, 1)
+    return LackOfFit(float(ratio), float(f.sf(ratio, extra, rest_dof)), rss, n - k, extra, float(rest_dof))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -19,8 +20,9 @@ from bayesmembrane.registry import materials
 DECISIVE = 4.0
 """ln of the Bayes factor beyond which a rival is out."""
 NEAR_DECISIVE, NEAR = 8.0, 20.0  # the same for rivals whose trace makes less than so many degrees with the winner's
-UNEXPLAINED, LEVEL = 0.12, 0.01
-"""A model explains the curve if lack of fit is not significant, or no more than this part of it is left."""
+UNEXPLAINED, ALLOWED, LEVEL = 0.12, 0.05, 0.01
+"""A model explains the curve if no more than the first part of the misfit is left, or if what is left is no more than
+chance makes of the second part: of a small misfit, noise alone leaves a larger part."""
 BEAM, EARNS, EARNED_SHARE = 4, 5.0, 0.08  # of pairs: how many singles are followed, ln K and part of chi^2 to gain
 SINGLE_VALUED = 0.02  # part of a signature that deflection alone does not explain
 LEAST_WEIGHT = 0.05
@@ -30,16 +32,21 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A candidate and how well it fits."""
+    """A candidate and how well it fits.
+
+    unexplained : part of the null model's misfit that is left
+    p_value : of what is left, if `ALLOWED` of the null model's misfit may be
+    """
 
     candidate: Candidate
     fit: LackOfFit
     unexplained: float
+    p_value: float
 
     @property
     def explains(self) -> bool:
         """True if what is left is noise, or little beside what was there."""
-        return self.fit.p_value > LEVEL or self.unexplained <= UNEXPLAINED
+        return self.p_value > LEVEL or self.unexplained <= UNEXPLAINED
 
     @property
     def log_evidence(self) -> float:
@@ -61,13 +68,18 @@ class Tracer:
     def measurement(self) -> Measurement:
         return self.search.measurement
 
+    @cached_property
+    def _before(self) -> LackOfFit:
+        """Of the null model."""
+        return lack_of_fit(self.null.residual, self.null.slopes, self.basis, self.search.noise.cautious())
+
     def judged(self, candidate: Candidate) -> Judged:
         """Its lack of fit, and the part of the null model's that is left."""
         careful = self.search.noise.cautious()
         fit = lack_of_fit(candidate.residual, candidate.slopes, self.basis, careful)
-        before = lack_of_fit(self.null.residual, self.null.slopes, self.basis, careful)
+        before = self._before
         left = max(fit.ratio - 1, 0.0) / max(before.ratio - 1, 1e-12) if before.ratio > 1 else 0.0
-        return Judged(candidate, fit, float(left))
+        return Judged(candidate, fit, float(left), fit.p_if_left(ALLOWED, before))
 
     def singles(self, effects: Sequence[Effect], tell: Tell) -> list[Judged]:
         """The null model with each effect, refitted; the most probable first."""
