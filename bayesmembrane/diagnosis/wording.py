@@ -89,7 +89,9 @@ def _effects(candidate: Candidate, null: Candidate) -> str:
 def size_in_words(value: float, unit: str) -> str:
     """A value in SI in the unit that people read."""
     factor, shown = SCALES.get(unit, (1.0, unit))
-    return f"{factor * value:.3g} {shown}".strip()
+    # Of a stretch of 1.0026 three digits say nothing.
+    digits = 5 if unit == "-" and abs(value - 1) < 0.1 else 3
+    return f"{factor * value:.{digits}g} {shown}".strip()
 
 
 def _signature(candidate: Candidate, null: Candidate) -> str:
