@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,6 +20,7 @@ LEGS = ((1, "loading", "#0072B2", "o"), (-1, "unloading", "#D55E00", "v"))
 PARTS = 24  # means that make a line against deflection or time
 ENLARGED = 6.0  # how much smaller what is left must be before it gets an axis of its own
 BAND = "#c9ced4"
+LONGEST = 92  # letters of a title that fit into a line
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +67,10 @@ def residual_picture(place: Place, rows: Sequence[Residual], kind: str = "png") 
     apart = len(rows) > 1 and tops[0] > ENLARGED * tops[-1]
     with _style():
         figure = _figure(0.7 + 2.9 * len(rows))
-        axes = figure.subplots(len(rows), 3 if cyclic else 2, squeeze=False, width_ratios=(4, 4, 2.2)[: 2 + cyclic])
+        # A figure for each row: a title as long as the row is wide must not push its panels apart.
+        parts = figure.subfigures(len(rows), 1, squeeze=False)[:, 0]
+        ratios = (4, 4, 2.2)[: 2 + cyclic]
+        axes = np.array([part.subplots(1, len(ratios), width_ratios=ratios) for part in parts])
         for i, row in enumerate(rows):
             top = 1e3 * (tops[i] if apart else max(tops))
             enlarged = f" (axis enlarged {tops[0] / tops[i]:.2g} times)" if apart and i else ""
@@ -77,7 +82,7 @@ def residual_picture(place: Place, rows: Sequence[Residual], kind: str = "png") 
             axes[i, 1].tick_params(labelleft=False)
             if cyclic:
                 _by_cycle(axes[i, 2], place, row.residual)
-            axes[i, 0].set_title(row.title + enlarged)
+            parts[i].suptitle(fill(row.title + enlarged, LONGEST), x=0.01, ha="left", fontsize=11.5, fontweight="bold")
         if cyclic:
             largest = max(ax.get_ylim()[1] for ax in axes[:, 2])
             for ax in axes[:, 2] if not apart else ():

@@ -9,6 +9,7 @@ import numpy as np
 from bayesmembrane.diagnosis.diagnose import Diagnosis
 from bayesmembrane.diagnosis.heldout import held_out, own_sd
 from bayesmembrane.diagnosis.loop import Loop
+from bayesmembrane.diagnosis.separation import CLEAR
 from bayesmembrane.reporting.blocks import Block, Section
 from bayesmembrane.reporting.loop_figures import Place, Residual, discrepancy_picture, residual_picture
 from bayesmembrane.reporting.loop_reading import Change, Model, changes, deciding, models, spoken_hypothesis, stages
@@ -175,12 +176,12 @@ def residual_rows(way: Sequence[Model]) -> list[Residual]:
         return [Residual(_row_title("As given", first), first.candidate.residual)]
     added = [m for m in way[1:] if m.stage is not None]
     last = added[-1] if added else way[-1]
-    word = "After" if added else "With the first of the rivals, not added"
+    word = "After" if added else "The first rival, not added"
     return [*rows, Residual(_row_title(word, last), last.candidate.residual)]
 
 
 def _row_title(word: str, m: Model) -> str:
-    return f"{word}: {m.title}, {1e3 * m.error.rmse_N:.3g} mN root mean square"
+    return f"{word}: {m.title}, rms {1e3 * m.error.rmse_N:.3g} mN"
 
 
 def _residuals(found: Loop, way: Sequence[Model]) -> Block:
@@ -235,9 +236,13 @@ def _rivals(d: Diagnosis) -> list[str]:
         words = "the most probable" if behind == 0 else f"{behind:.1f} behind in ln of the evidence"
         size = ", ".join(sizes(j.candidate, d.null))
         told.append(f"{candidate_title(j.candidate, d.null)}{f' ({size})' if size else ''}: {words}.")
-    told += [f"To tell them apart: {e.sentence}." for e in d.experiments]
-    if not d.experiments:
-        told.append("No further test of those simulated would tell them apart.")
+    clear = [e for e in d.experiments if e.separation >= CLEAR]
+    rest = [f"{e.what} ({e.separation:.1f} standard deviations)" for e in d.experiments if e.separation < CLEAR]
+    told += [f"To tell them apart: {e.sentence}." for e in clear]
+    if not clear:
+        told.append("None of the further tests that were simulated would tell them apart.")
+    if rest:
+        told.append(f"What would not settle it: {listed(rest)}.")
     return told
 
 

@@ -12,6 +12,7 @@ from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
 from bayesmembrane.diagnosis.discrepancy import discrepancy
 from bayesmembrane.diagnosis.loop import Loop, Round, Stage
 from bayesmembrane.diagnosis.separation import Experiment
+from bayesmembrane.diagnosis.wording import size_in_words
 from bayesmembrane.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.inference.run import sample
 from bayesmembrane.inference.sampling import Settings
@@ -81,7 +82,7 @@ def unknown(named: Loop) -> Loop:
 def ambiguous(named: Loop) -> Loop:
     """The same curve, had a second candidate explained it."""
     r = named.rounds[0]
-    nexts = (Experiment("a blank run", math.inf), Experiment("unloading", 7.0))
+    nexts = (Experiment("a blank run", math.inf), Experiment("unloading", 0.7))
     members = tuple(j for j in r.diagnosis.ranking if j.candidate.names)[:2]
     d = replace(r.diagnosis, verdict="ambiguous", members=members, experiments=nexts, sentence="either.")
     return Loop((Round(d, r.before, r.before),), None)
@@ -118,6 +119,11 @@ def test_candidates_are_ranked_against_the_model_as_it_was(named: Loop) -> None:
     assert [r["candidate"] for r in rows if r["in_answer"]] == ["friction in the guide"]
     size = 1e3 * d.best.parameters["friction.level"]
     assert rows[0]["size"] == f"level {size:.3g} mN"
+
+
+def test_sizes_are_told_in_the_units_that_people_read() -> None:
+    told = [size_in_words(*v) for v in ((1.66e-4, "m"), (1.0026, "-"), (0.00348, "-"), (8.8e-4, "m/N"), (-2e-5, "N/s"))]
+    assert told == ["0.166 mm", "1.0026", "0.00348", "0.88 mm/N", "-0.02 mN/s"]
 
 
 def test_sizes_that_show_are_listed_the_easiest_first(named: Loop) -> None:
@@ -234,10 +240,11 @@ def test_rivals_are_listed_with_what_would_part_them(ambiguous: Loop) -> None:
     lines = [line for b in section.blocks for line in b.lines]
     assert any(line.endswith("the most probable.") for line in lines)
     assert "To tell them apart: a blank run: shows one of them directly." in lines
+    assert "What would not settle it: unloading (0.7 standard deviations)." in lines
     assert any(
         row["model"].endswith("(not added)") for b in section.blocks if b.table for row in b.table.records()[1:2]
     )
-    assert residual_rows(models(ambiguous))[1].title.startswith("With the first of the rivals, not added")
+    assert residual_rows(models(ambiguous))[1].title.startswith("The first rival, not added")
 
 
 def test_an_adequate_model_needs_no_candidates(named: Loop) -> None:
