@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import lombscargle
 
 from bayesmembrane.diagnosis.candidates import Candidate
-from bayesmembrane.diagnosis.saturated import LackOfFit, lack_of_fit
+from bayesmembrane.diagnosis.saturated import SPLINE, LackOfFit, lack_of_fit
 from bayesmembrane.diagnosis.scores import ScoreTest, Signature, score_test
 from bayesmembrane.diagnosis.whitening import OwnNoise, orthonormal
 from bayesmembrane.measurement import Measurement
@@ -18,7 +18,7 @@ from bayesmembrane.parameters import Array
 LEVEL = 0.01
 """A curve is adequate unless the smallest p-value, times the number of tests, lies below this."""
 LEAST_WAVES, FEWEST = 4.0, 60  # waves over the range, and points, for a periodicity to be looked for
-SLOWEST_PART = 0.06  # of the frequencies: what the smooth reference has removed is no evidence
+SLOWEST_PART = 0.06  # of the frequencies against time: legs have smooth references of their own
 
 
 @dataclass(frozen=True)
@@ -86,15 +86,19 @@ def periodicity(measurement: Measurement, residual: Array, basis: Array, noise: 
     white, q = noise.white(residual), orthonormal(noise.white(basis))
     rest = white - q @ (q.T @ white)
     t = np.arange(n, dtype=float) if measurement.time is None else measurement.time
-    found = [_peak(t, rest, "time"), _peak(measurement.deflection, rest, "deflection")]
+    found = [
+        _peak(t, rest, "time", SLOWEST_PART * n / 2),
+        _peak(measurement.deflection, rest, "deflection", SPLINE / 2),
+    ]
     best = min(found, key=lambda f: f.p_value)
     return Periodicity(best.against, best.period, best.share, min(1.0, len(found) * best.p_value))
 
 
-def _peak(place: Array, rest: Array, against: str) -> Periodicity:
+def _peak(place: Array, rest: Array, against: str, least: float) -> Periodicity:
+    """The highest peak of at least ``least`` waves: what the smooth reference has removed is no evidence."""
     span = float(np.ptp(place))
     # As many frequencies as half the points could tell apart, were they evenly spaced.
-    waves = np.arange(max(LEAST_WAVES, SLOWEST_PART * rest.size / 2), rest.size / 2)
+    waves = np.arange(max(LEAST_WAVES, least), rest.size / 2)
     if span == 0 or waves.size < 2:
         return Periodicity(against, np.inf, 0.0, 1.0)
     power = np.asarray(lombscargle(place - place.min(), rest, 2 * np.pi * waves / span))
