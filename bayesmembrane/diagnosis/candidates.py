@@ -122,7 +122,7 @@ class Search:
         _, log_det = np.linalg.slogdet(np.eye(x.size) + spread * (white.T @ white) * spread[:, None])
         # A half-normal prior is twice as dense on the side that is allowed.
         halves = sum(isinstance(p.prior, HalfNormal) for p in objective.parameters)
-        log_evidence = -0.5 * size**2 - 0.5 * log_det + halves * np.log(2.0)
+        log_evidence = -0.5 * size**2 - 0.5 * log_det + halves * np.log(2.0) + _heavy_tails(hypothesis, x)
         return Candidate(hypothesis, x, -r[0], slopes, float(log_evidence), _at_bound(objective, x))
 
 
@@ -167,6 +167,20 @@ def prior_moments(hypothesis: Hypothesis) -> tuple[Array, Array]:
     found = [_moments(p) for p in hypothesis.parameters[: hypothesis.curve_size]]
     centre, spread = np.array(found).T
     return centre, spread
+
+
+def _heavy_tails(hypothesis: Hypothesis, x: Array) -> float:
+    """ln of Cauchy over normal density, summed over the sizes of effects at x (k,).
+
+    The expected size is a rough guess: an effect several times larger that fits must not lose to a smaller one that
+    does not. Searches keep the normal, which makes them sums of squares.
+    """
+    out = 0.0
+    for p, value in zip(hypothesis.parameters[: hypothesis.curve_size], x, strict=True):
+        if isinstance(p, EffectParameter) and p.null is not None:
+            z = (float(value) - p.null) / p.scale
+            out += 0.5 * z**2 - float(np.log1p(z**2)) + 0.5 * float(np.log(2 / np.pi))
+    return out
 
 
 @cache
