@@ -16,7 +16,11 @@ from tests.statistics.evidence_targets import Banana, Box, Cut, Linear, Modes, N
 LOOSE = 0.25  # of nested sampling, where a test is about something else
 
 
-@pytest.mark.parametrize("target", [Linear([1.0, 0.2]), Linear(np.geomspace(1, 0.01, 5)), NormalGamma()], ids=str)
+@pytest.mark.parametrize(
+    "target",
+    [Linear([1.0, 0.2]), Linear(np.geomspace(1, 0.01, 5)), NormalGamma()],
+    ids=["linear 2", "linear 5", "normal-gamma"],
+)
 def test_bridge_is_exact_on_conjugate_models(target):
     found = bridge(target, seed=101)
     assert abs(found.log_evidence - target.exact) < min(0.05, 5 * found.sd + 0.005)
