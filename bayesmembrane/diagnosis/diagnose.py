@@ -293,8 +293,9 @@ def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged
         return _without_effects(tracer, others)
     rivals = _rivals(tracer, explaining)
     single_valued = all(tracer.single_valued(j.candidate) for j in rivals)
-    if single_valued and energies and energies[0].log_evidence > rivals[0].log_evidence - NEAR_DECISIVE:
-        # The instrument is blamed only where no energy comes near.
+    near = bool(energies) and energies[0].log_evidence > rivals[0].log_evidence - NEAR_DECISIVE
+    if single_valued and energies and (near or rivals[0].candidate.at_bound):
+        # The instrument is blamed only where no energy comes near, and not with an effect that is driven to its bounds.
         return Verdict("material", (energies[0],))
     if single_valued and len(rivals[0].candidate.names) > 1:
         if not alone:
