@@ -32,9 +32,12 @@ def _first_box(posterior: Posterior) -> list[tuple[float, float]]:
     priors = [p.prior.distribution() for p in posterior.hypothesis.parameters[: posterior.hypothesis.curve_size]]
     rng = np.random.default_rng(0)
     box = [(p.ppf(1e-9), p.ppf(1 - 1e-9)) for p in priors]
-    for _ in range(6):
-        # A random search that closes in: a grid over the whole prior would miss a narrow posterior.
-        x = np.stack([rng.uniform(low, high, 600) for low, high in box], axis=1)
+    k = posterior.hypothesis.curve_size
+    for i in range(6):
+        # A random search that closes in: a grid over the whole prior would miss a narrow posterior. The first draws
+        # are those of the prior, of which a strict convexity mode leaves few.
+        uniform = np.stack([rng.uniform(low, high, 600) for low, high in box], axis=1)
+        x = np.concatenate([uniform, posterior.prior.draw(rng, 4000)[:, :k]]) if i == 0 else uniform
         value = _over_noise(posterior, x)
         good = x[value > np.max(value) - 4 * DEEP]
         grown = []
