@@ -45,8 +45,7 @@ def own_sd(measurement: Measurement, noise: OwnNoise) -> Array:
 def held_out(measurement: Measurement) -> tuple[NDArray[np.bool_], str]:
     """((N,) True for points that are set aside, which they are in words): the rule looks at the path alone.
 
-    The last cycle where there are three or more, unloading of the last cycle where there are two, else every fourth
-    of twenty blocks of the path.
+    The last cycle where there are two or more, else every fourth of twenty blocks of the path.
     """
     cycles = np.unique(measurement.cycle)
     mask = np.zeros(len(measurement), dtype=bool)

@@ -56,7 +56,8 @@ class LackOfFit:
 def reference_basis(measurement: Measurement) -> Array:
     """(N, p): B-splines in the deflection, and on each leg Legendre polynomials and a quick relaxation at its start.
 
-    There are never more columns than a third of the points: splines come first, then what tells legs apart.
+    Splines have no more columns than a third of the points, all together two thirds at most; splines come first, then
+    what tells legs apart.
     """
     d = measurement.deflection
     room = max(len(measurement) // SHARE, 1)

@@ -26,8 +26,8 @@ LEAST_STEPS = 20  # fewer say nothing
 R_HAT = 1.01
 GROWTH = 1.25  # a look costs little, but nothing is learned from looking at every step
 FIRST_LESSON, NEXT_LESSON = 100, 2
-"""The proposal is learned from the chains after so many steps, and anew after so many times as many while fewer than
-half of the autocorrelation times are there. What came before never counts: only a fixed proposal makes a chain."""
+"""The proposal is learned from the chains after so many steps, and anew whenever there are so many times as many,
+until the run converges. What came before the last lesson never counts: only a fixed proposal makes a chain."""
 WALK_SHARE, JUMP_SHARE, LEARN_FROM = 0.4, 0.3, 2000
 
 
