@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from bayesmembrane.errors import BayesmembraneError, SettingsError
-from bayesmembrane.terminal import answer, log, numbers, out, table
+from bayesmembrane.terminal import answer, lines, log, numbers, out, table
 
 if TYPE_CHECKING:
     from bayesmembrane.hypothesis import Hypothesis
@@ -47,6 +47,8 @@ Effects = Annotated[str, typer.Option("--effects", help="Physical effects beside
 MaxDeflection = Annotated[float | None, typer.Option("--max-deflection-mm", help="Use the curve up to here only, mm.")]
 Convexity = Annotated[str, typer.Option("--convexity", help="Convexity prior: reached, box, elliptic or none.")]
 Noise = Annotated[str, typer.Option("--noise", help="Noise model: white or ar1.")]
+Ess = Annotated[float, typer.Option("--ess", help="Wanted effective sample size of the worst parameter.")]
+Runs = Annotated[Path, typer.Option("--out", help="Folder of the runs.")]
 
 
 @app.command()
@@ -244,8 +246,8 @@ def sample(
     max_deflection_mm: MaxDeflection = None,
     convexity: Convexity = "reached",
     noise: Noise = "white",
-    ess: Annotated[float, typer.Option(help="Wanted effective sample size of the worst parameter.")] = 1000.0,
-    out_folder: Annotated[Path, typer.Option("--out", help="Folder of the runs.")] = Path("chains"),
+    ess: Ess = 1000.0,
+    out_folder: Runs = Path("chains"),
     as_json: AsJson = False,
     seed: Seed = 0,
 ) -> None:
@@ -343,8 +345,8 @@ def compare(
     ] = "",
     convexity: Convexity = "reached",
     noise: Noise = "white",
-    ess: Annotated[float, typer.Option(help="Wanted effective sample size of the worst parameter.")] = 1000.0,
-    out_folder: Annotated[Path, typer.Option("--out", help="Folder of the runs.")] = Path("chains"),
+    ess: Ess = 1000.0,
+    out_folder: Runs = Path("chains"),
     as_json: AsJson = False,
     seed: Seed = 0,
 ) -> None:
@@ -358,7 +360,7 @@ def compare(
     ends = numbers(ranges_mm, "--ranges-mm") if ranges_mm else [max_deflection_mm] if max_deflection_mm else []
     ranges = ranges_of(_measurement(curve, specimen), [1e-3 * end for end in ends])
     try:
-        with _lines() as tell:
+        with lines() as tell:
             found = compare_ranges(ranges, claims, seed, out=out_folder, ess=ess, progress=tell)
     except KeyboardInterrupt:
         log.print(f"Interrupted; what is finished is stored in {out_folder}. The same command resumes it: {_command()}")
@@ -408,8 +410,8 @@ def loop(
     max_deflection_mm: MaxDeflection = None,
     convexity: Convexity = "reached",
     noise: Noise = "white",
-    ess: Annotated[float, typer.Option(help="Wanted effective sample size of the worst parameter.")] = 1000.0,
-    out_folder: Annotated[Path, typer.Option("--out", help="Folder of the runs.")] = Path("chains"),
+    ess: Ess = 1000.0,
+    out_folder: Runs = Path("chains"),
     report_folder: Annotated[Path, typer.Option("--report", help="Folder of the page.")] = Path("reports/loop"),
     as_json: AsJson = False,
     seed: Seed = 0,
@@ -421,7 +423,7 @@ def loop(
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
     try:
-        with _lines() as tell:
+        with lines() as tell:
             found = run(
                 measurement, claim, seed=seed, out=out_folder, ess=ess, tell=lambda text: tell(claim.label(), text)
             )
@@ -499,7 +501,7 @@ def report(
 def demo(
     out_folder: Annotated[Path, typer.Option("--out", help="Folder of the page.")] = Path("reports/demo"),
     chains: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("chains"),
-    ess: Annotated[float, typer.Option(help="Wanted effective sample size of the worst parameter.")] = 1000.0,
+    ess: Ess = 1000.0,
     as_json: AsJson = False,
     seed: Seed = 0,
 ) -> None:
@@ -541,24 +543,6 @@ def _bar(label: str) -> Iterator[Callable[[Progress], None]]:
     with Bars(*columns, console=log) as bars:
         task = bars.add_task(label, total=1.0, text="finding starts")
         yield lambda p: bars.update(task, completed=share(p), text=told(p))
-
-
-@contextmanager
-def _lines() -> Iterator[Callable[[str, str], None]]:
-    """A line on stderr for each label, with what is being done for it."""
-    from rich.progress import Progress as Lines
-    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TextColumn("{task.fields[text]}"))
-    with Lines(*columns, TimeElapsedColumn(), console=log) as lines:
-        tasks: dict[str, Any] = {}
-
-        def tell(label: str, text: str) -> None:
-            if label not in tasks:
-                tasks[label] = lines.add_task(label, total=None, text=text)
-            lines.update(tasks[label], text=text)
-
-        yield tell
 
 
 def _command() -> str:

@@ -37,7 +37,7 @@ from bayesmembrane.measurement import Measurement, read_measurement
 from bayesmembrane.registry import materials
 from bayesmembrane.reporting.page import write_report
 from bayesmembrane.shipped import shipped
-from bayesmembrane.terminal import log
+from bayesmembrane.terminal import lines, log
 
 RANGES = ("OP1", "OP2")
 # The slowest first, two materials at a time: the others fill the gaps, and no solver is compiled twice.
@@ -113,7 +113,7 @@ def demo(out: Path, chains: Path, seed: int = 0, ess: float = 1000.0) -> dict[st
         ]
         loops: list[Loop] = [job.result() for job in closing]
         valleys: list[Valleys] = [job.result() for job in following]
-    with _compared() as tell:
+    with lines() as tell:
         comparison = compare(chains, seed, ess, tell)
     ordered = [done[name, range_name] for name in materials() for range_name in RANGES if (name, range_name) in done]
     page = write_report(
@@ -206,21 +206,6 @@ def _valleys_in_worker(name: str, runs: list[Path], seed: int, queue: Any) -> Va
 def _reconstruct_in_worker(seed: int, queue: Any) -> Reconstruction:
     queue.put(("reconstruct", None))
     return reconstruct(seed=seed)
-
-
-@contextmanager
-def _compared() -> Iterator[Tell]:
-    """A line per hypothesis on stderr while evidence is found."""
-    columns = (TextColumn("{task.description:<32}"), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
-    with Bars(*columns, console=log) as bars:
-        tasks: dict[str, Any] = {}
-
-        def tell(label: str, text: str) -> None:
-            if label not in tasks:
-                tasks[label] = bars.add_task(label, total=None, text=text)
-            bars.update(tasks[label], text=text)
-
-        yield tell
 
 
 @contextmanager

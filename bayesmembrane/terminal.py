@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from bayesmembrane.errors import SettingsError
@@ -64,3 +66,18 @@ def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> N
     for row in rows:
         grid.add_row(*row)
     out.print(grid)
+
+
+@contextmanager
+def lines() -> Iterator[Callable[[str, str], None]]:
+    """A line on stderr for each label, with what is being done for it and for how long."""
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TextColumn("{task.fields[text]}"))
+    with Progress(*columns, TimeElapsedColumn(), console=log) as shown:
+        tasks: dict[str, TaskID] = {}
+
+        def tell(label: str, text: str) -> None:
+            if label not in tasks:
+                tasks[label] = shown.add_task(label, total=None, text=text)
+            shown.update(tasks[label], text=text)
+
+        yield tell

@@ -17,7 +17,7 @@ import numpy as np
 
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.hypothesis import Hypothesis, hypothesis
-from bayesmembrane.inference.comparison_jobs import Climbed, Job, Sampled, Tell, climb, climb_again, folder_of, walk
+from bayesmembrane.inference.comparison_jobs import Climbed, Job, Tell, Walked, climb, climb_again, folder_of, walk
 from bayesmembrane.inference.comparison_result import Comparison, Row, ranked
 from bayesmembrane.inference.evidence import BRIDGE, NESTED, SIGMAS, Evidence, together
 from bayesmembrane.inference.evidence_target import averaged
@@ -138,7 +138,7 @@ def _labels(hypotheses: Sequence[Hypothesis]) -> list[str]:
     return labels
 
 
-def _row(label: str, job: Job, climbed: Climbed, walked: Sampled) -> Row:
+def _row(label: str, job: Job, climbed: Climbed, walked: Walked) -> Row:
     spent = [e for e in (climbed.nested, walked.bridge) if e is not None]
     return Row(
         label=label,
@@ -158,13 +158,13 @@ def _row(label: str, job: Job, climbed: Climbed, walked: Sampled) -> Row:
     )
 
 
-def _evidence(climbed: Climbed, walked: Sampled) -> Evidence | None:
+def _evidence(climbed: Climbed, walked: Walked) -> Evidence | None:
     if climbed.nested is None or walked.bridge is None:
         return None
     return together({NESTED: climbed.nested, BRIDGE: walked.bridge}, climbed.mass)
 
 
-def _by_chance(climbed: Climbed, walked: Sampled) -> bool:
+def _by_chance(climbed: Climbed, walked: Walked) -> bool:
     """Whether the estimators differ by so much that another look is worth while, and by no more than chance can do."""
     if climbed.nested is None or walked.bridge is None:
         return False
@@ -184,7 +184,7 @@ def _rows(jobs: Mapping[Key, Job], submit: Submit) -> dict[Key, Row]:
         waiting[submit(walk, jobs[key])] = "walk", key
         waiting[submit(climb, jobs[key])] = "climb", key
     climbed: dict[Key, Climbed] = {}
-    walked: dict[Key, Sampled] = {}
+    walked: dict[Key, Walked] = {}
     again: dict[Key, Future[Any]] = {}
     for done in as_completed(waiting):
         part, key = waiting[done]

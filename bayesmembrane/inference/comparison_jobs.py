@@ -81,7 +81,7 @@ class Climbed:
 
 
 @dataclass(frozen=True, eq=False)
-class Sampled:
+class Walked:
     """What comes from the posterior draws; or why there are none.
 
     ``notes`` are sentences that a reader needs; ``run`` is the folder, if it is stored.
@@ -146,12 +146,12 @@ def climb_again(job: Job, tell: Tell) -> Estimate:
     return _estimate(_kept(folder_of(job), "again", _asked(job)["fingerprint"], make))
 
 
-def walk(job: Job, tell: Tell) -> Sampled:
+def walk(job: Job, tell: Tell) -> Walked:
     """The run, and everything that its draws tell. Raises KeyboardInterrupt once an interrupted run is stored."""
     try:
         return _from_draws(job, _run(job, tell), tell)
     except (SettingsError, DataError) as error:
-        return Sampled(None, None, None, (), (), None, 0, 0.0, (), str(error))
+        return Walked(None, None, None, (), (), None, 0, 0.0, (), str(error))
 
 
 def _no_mass(hypothesis: Hypothesis) -> str:
@@ -161,7 +161,7 @@ def _no_mass(hypothesis: Hypothesis) -> str:
     )
 
 
-def _from_draws(job: Job, run: Run, tell: Tell) -> Sampled:
+def _from_draws(job: Job, run: Run, tell: Tell) -> Walked:
     posterior = Posterior(job.hypothesis, job.measurement)
     key = f"{run.settings['fingerprint']} {run.status['evaluations']}"
     draws, worth = run.draws(), float(run.status["ess_bulk"])
@@ -181,7 +181,7 @@ def _from_draws(job: Job, run: Run, tell: Tell) -> Sampled:
     modes = []
     if job.modes:
         modes = kept("modes", "convexity modes", lambda: _modes(posterior, run, _estimate(found), job.seed))
-    return Sampled(
+    return Walked(
         bridge=_estimate(found),
         loo=LeaveOneOut(**_arrays(loo, "pointwise", "pareto_k"), refitted=tuple(loo["refitted"])),
         rest=None if rest is None else LeaveRangeOut(**_arrays(rest, "deflection", "predicted", "sd")),

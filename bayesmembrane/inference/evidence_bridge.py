@@ -9,9 +9,9 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bayesmembrane.errors import SettingsError
-from bayesmembrane.inference.evidence_mixture import Mixture, fit_mixture, reweighted
 from bayesmembrane.inference.evidence_population import from_prior
 from bayesmembrane.inference.evidence_target import Estimate, Problem, Target
+from bayesmembrane.inference.mixture import Mixture, fit_mixture, reweighted
 from bayesmembrane.parameters import Array
 
 PROPOSED, PILOT = 4000, 1000

@@ -12,8 +12,8 @@ from scipy.special import logsumexp
 
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.hypothesis import CONVEXITY
-from bayesmembrane.inference.evidence_mixture import Mixture, fit_mixture, widened
 from bayesmembrane.inference.initial import starting_points
+from bayesmembrane.inference.mixture import Mixture, fit_mixture, widened
 from bayesmembrane.inference.posterior import Posterior
 from bayesmembrane.inference.prior import Mass
 from bayesmembrane.parameters import Array

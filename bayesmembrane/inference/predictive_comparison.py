@@ -14,8 +14,8 @@ from scipy.special import logsumexp
 
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.forward import Forward, Solve
-from bayesmembrane.inference.evidence_mixture import Mixture, fit_mixture
 from bayesmembrane.inference.evidence_population import led
+from bayesmembrane.inference.mixture import Mixture, fit_mixture
 from bayesmembrane.inference.posterior import Posterior
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.mechanics import api

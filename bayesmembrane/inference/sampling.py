@@ -15,8 +15,8 @@ from emcee.autocorr import integrated_time
 
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.inference.emulator import Emulator, emulate
-from bayesmembrane.inference.evidence_mixture import Mixture, fit_mixture
 from bayesmembrane.inference.initial import starting_points
+from bayesmembrane.inference.mixture import Mixture, fit_mixture
 from bayesmembrane.inference.posterior import Posterior, tally
 from bayesmembrane.parameters import Array
 

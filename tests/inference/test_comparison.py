@@ -10,7 +10,7 @@ from bayesmembrane.errors import SettingsError
 from bayesmembrane.hypothesis import hypothesis
 from bayesmembrane.inference import comparison, comparison_jobs
 from bayesmembrane.inference.comparison import claimed, compare, ranges_of
-from bayesmembrane.inference.comparison_jobs import Climbed, Sampled
+from bayesmembrane.inference.comparison_jobs import Climbed, Walked
 from bayesmembrane.inference.comparison_result import Row, ranked
 from bayesmembrane.inference.evidence import BRIDGE, NESTED, together
 from bayesmembrane.inference.evidence_sensitivity import Widened
@@ -183,7 +183,7 @@ def test_another_look_is_taken_where_chance_may_have_parted_the_estimators(monke
         comparison_jobs, "_nested", lambda posterior, seed, tell: Estimate(-10.0, 0.1, 7, 1.0, (-10.0,))
     )
     monkeypatch.setattr(comparison, "climb", lambda job, tell: Climbed(once, Mass(1.0, 0.0), ""))
-    known = Sampled(Estimate(-10.0, 0.01, 1, 1.0), None, None, (), (), None, 1, 1.0, (), "")
+    known = Walked(Estimate(-10.0, 0.01, 1, 1.0), None, None, (), (), None, 1, 1.0, (), "")
     monkeypatch.setattr(comparison, "walk", lambda job, tell: known)
     (row_,) = compare(film(), [hypothesis("gent")], out=None, workers=1).rows
     assert row_.evidence.log_evidence[NESTED] == pytest.approx(-10.15)

@@ -6,10 +6,10 @@ import pytest
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.inference.evidence import BRIDGE, NESTED, evidence, together
 from bayesmembrane.inference.evidence_bridge import bridge
-from bayesmembrane.inference.evidence_mixture import fit_mixture
 from bayesmembrane.inference.evidence_nested import nested
 from bayesmembrane.inference.evidence_population import led
 from bayesmembrane.inference.evidence_target import Estimate, Problem
+from bayesmembrane.inference.mixture import fit_mixture
 from bayesmembrane.inference.prior import Mass
 from tests.statistics.evidence_targets import Banana, Box, Cut, Linear, Modes, NormalGamma
 
