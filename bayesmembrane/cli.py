@@ -409,7 +409,9 @@ def loop(
     effects: Effects = "",
     max_deflection_mm: MaxDeflection = None,
     convexity: Convexity = "reached",
-    noise: Noise = "white",
+    noise: Annotated[
+        str, typer.Option(help="white, ar1, or auto: ar1 if neighbouring readings turn out to be correlated.")
+    ] = "auto",
     ess: Ess = 1000.0,
     out_folder: Runs = Path("chains"),
     report_folder: Annotated[Path, typer.Option("--report", help="Folder of the page.")] = Path("reports/loop"),
@@ -421,11 +423,20 @@ def loop(
     from bayesmembrane.inference.digest import digest
     from bayesmembrane.reporting.page import write_report
 
-    measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
+    adapt = noise == "auto"
+    measurement, claim = _asked(
+        curve, specimen, material, effects, max_deflection_mm, convexity, "white" if adapt else noise
+    )
     try:
         with lines() as tell:
             found = run(
-                measurement, claim, seed=seed, out=out_folder, ess=ess, tell=lambda text: tell(claim.label(), text)
+                measurement,
+                claim,
+                seed=seed,
+                out=out_folder,
+                ess=ess,
+                tell=lambda text: tell(claim.label(), text),
+                adapt_noise=adapt,
             )
     except KeyboardInterrupt:
         log.print(f"Interrupted; the runs are stored in {out_folder}. The same command resumes: {_command()}")

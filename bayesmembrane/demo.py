@@ -190,7 +190,7 @@ def _in_worker(name: str, range_name: str, chains: Path, seed: int, ess: float, 
 def _loop_in_worker(name: str, stem: str, chains: Path, seed: int, ess: float, queue: Any) -> Loop:
     queue.put((f"loop, {stem}", None))
     measurement = read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
-    found = loop(measurement, hypothesis(name), seed=seed, out=chains, ess=ess)
+    found = loop(measurement, hypothesis(name), seed=seed, out=chains, ess=ess, adapt_noise=True)
     queue.put((f"loop, {stem}", FINISHED))
     return found
 

@@ -147,11 +147,13 @@ def with_effects(hypothesis: Hypothesis, effects: Sequence[Effect]) -> Hypothesi
 
 
 def available(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
-    """Effects of the library that can occur in this test, can be told from the material, and are not there yet."""
+    """Effects of the library that can be seen in this test, can be told from the material, and are not there yet."""
     found: list[Effect] = [cls() for cls in components("effects").values()]
     have = {e.name for e in hypothesis.effects}
     rig, path = measurement.rig.name, measurement.path
-    return [e for e in found if e.name not in have and not e.absorbed and not e.unavailable(rig, path)]
+    thin = measurement.specimen.thickness
+    told = [e for e in found if e.name not in have and not e.absorbed]
+    return [e for e in told if not e.unavailable(rig, path) and not e.negligible(thin)]
 
 
 def absorbed(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:

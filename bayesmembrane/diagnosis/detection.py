@@ -18,16 +18,17 @@ from bayesmembrane.parameters import Array
 LEVEL = 0.01
 """A curve is adequate unless the smallest p-value, times the number of tests, lies below this."""
 LEAST_WAVES, FEWEST = 4.0, 60  # waves over the range, and points, for a periodicity to be looked for
+TOP = 5  # of the periodogram's peaks: how many are judged exactly
 SLOWEST_PART = 0.06  # of the frequencies against time: legs have smooth references of their own
 
 
 @dataclass(frozen=True)
 class Periodicity:
-    """The highest peak of a periodogram of what no smooth curve explains, and its probability in noise.
+    """The strongest wave in what no smooth curve explains, and the probability of one as strong in noise.
 
     against : "time" or "deflection"
     period : s or m (points, where there are no times)
-    share : part of the variance in the peak
+    share : part of the variance in that wave
     """
 
     against: str
@@ -75,10 +76,11 @@ def detect(
 
 
 def periodicity(measurement: Measurement, residual: Array, basis: Array, noise: OwnNoise) -> Periodicity | None:
-    """Fisher's test for the largest ordinate of a periodogram against time and against deflection.
+    """The wave that explains most of what is left beside ``basis`` (N, p), against time or against deflection.
 
-    For m ordinates of white noise P(share >= g) <= m (1 - g)^(m - 1) (R. A. Fisher, Proc. R. Soc. A 125 (1929) 54).
-    None for a curve too short to show waves.
+    A wave of a frequency chosen beforehand takes the part g ~ Beta(1, (nu - 2) / 2) of the squares of white noise with
+    nu = N - p degrees of freedom; of m frequencies the largest has P(g) <= m (1 - g)^((nu - 2) / 2), in the manner of
+    R. A. Fisher, Proc. R. Soc. A 125 (1929) 54. None for a curve too short to show waves.
     """
     n = residual.size
     if n < FEWEST:
@@ -87,21 +89,30 @@ def periodicity(measurement: Measurement, residual: Array, basis: Array, noise: 
     rest = white - q @ (q.T @ white)
     t = np.arange(n, dtype=float) if measurement.time is None else measurement.time
     found = [
-        _peak(t, rest, "time", SLOWEST_PART * n / 2),
-        _peak(measurement.deflection, rest, "deflection", SPLINE / 2),
+        _peak(t, rest, q, "time", SLOWEST_PART * n / 2),
+        _peak(measurement.deflection, rest, q, "deflection", SPLINE / 2),
     ]
     best = min(found, key=lambda f: f.p_value)
     return Periodicity(best.against, best.period, best.share, min(1.0, len(found) * best.p_value))
 
 
-def _peak(place: Array, rest: Array, against: str, least: float) -> Periodicity:
-    """The highest peak of at least ``least`` waves: what the smooth reference has removed is no evidence."""
-    span = float(np.ptp(place))
+def _peak(place: Array, rest: Array, q: Array, against: str, least: float) -> Periodicity:
+    """The strongest of at least ``least`` waves: what the smooth reference q (N, p) has removed is no evidence."""
+    span, freedom = float(np.ptp(place)), rest.size - q.shape[1]
     # As many frequencies as half the points could tell apart, were they evenly spaced.
     waves = np.arange(max(LEAST_WAVES, least), rest.size / 2)
-    if span == 0 or waves.size < 2:
+    if span == 0 or waves.size < 2 or freedom < 4:
         return Periodicity(against, np.inf, 0.0, 1.0)
     power = np.asarray(lombscargle(place - place.min(), rest, 2 * np.pi * waves / span))
-    share = float(power.max() / power.sum())
-    p = min(1.0, waves.size * (1 - share) ** (waves.size - 1))
-    return Periodicity(against, span / float(waves[int(np.argmax(power))]), share, float(p))
+    share, count = max(
+        (_share(2 * np.pi * waves[i] / span * place, rest, q), waves[i]) for i in np.argsort(power)[-TOP:]
+    )
+    p = min(1.0, waves.size * (1 - share) ** ((freedom - 2) / 2))
+    return Periodicity(against, span / float(count), share, float(p))
+
+
+def _share(phase: Array, rest: Array, q: Array) -> float:
+    """Part of the squares of ``rest`` (N,) that a wave of ``phase`` (N,) takes, beside q (N, p)."""
+    wave = np.column_stack([np.cos(phase), np.sin(phase)])
+    own = orthonormal(wave - q @ (q.T @ wave))
+    return float(np.sum((own.T @ rest) ** 2) / max(float(rest @ rest), 1e-300))

@@ -12,16 +12,19 @@ import numpy as np
 from bayesmembrane.diagnosis.candidates import Candidate, Search, absorbed, available
 from bayesmembrane.diagnosis.description import describe
 from bayesmembrane.diagnosis.detection import Detection, detect
-from bayesmembrane.diagnosis.heldout import Error, HeldOut, error_of, held_out, own_sd, validate
+from bayesmembrane.diagnosis.heldout import Error, HeldOut, error_of, held_out, validate
 from bayesmembrane.diagnosis.saturated import reference_basis
 from bayesmembrane.diagnosis.scores import Signature, angle, signatures, smallest_sizes
 from bayesmembrane.diagnosis.separation import Experiment, experiments
+from bayesmembrane.diagnosis.sudden import sudden
 from bayesmembrane.diagnosis.trace import (
     DECISIVE,
     EARNED_SHARE,
     EARNS,
+    LEVEL,
     NEAR,
     NEAR_DECISIVE,
+    WAVES,
     Judged,
     Tell,
     Tracer,
@@ -29,7 +32,7 @@ from bayesmembrane.diagnosis.trace import (
     ranked,
 )
 from bayesmembrane.diagnosis.whitening import OwnNoise, own_noise
-from bayesmembrane.diagnosis.wording import sentence_of
+from bayesmembrane.diagnosis.wording import noise_sentence, sentence_of
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.forward import Solve
 from bayesmembrane.hypothesis import Hypothesis
@@ -126,7 +129,12 @@ class Diagnosis:
                 "heldout": "nothing" if self.validation is None else self.validation.where,
                 "chosen_without_heldout": None if self.validation is None else self.validation.chosen,
             },
-            "noise": {"sd_N": self.noise.sd, "rho": self.noise.rho, "stated": self.noise.stated},
+            "noise": {
+                "sd_N": self.noise.sd,
+                "rho": self.noise.rho,
+                "stated": self.noise.stated,
+                "times_stated": self.noise.excess,
+            },
             "smallest_visible": dict(self.power),
             "absorbed": list(self.absorbed),
             "next_measurements": [
@@ -242,7 +250,9 @@ def _renewed(tracer: Tracer, judged: list[Judged]) -> tuple[Tracer, list[Judged]
 
 
 def _more_is_missing(tracer: Tracer, best: Judged, effects: Sequence[Any], rng: np.random.Generator) -> bool:
-    """True if the best single effect leaves structure behind."""
+    """True if the best single effect leaves structure behind that another one could take away."""
+    if best.waves <= WAVES:
+        return False
     if not best.explains:
         return True
     rest = [e for e in effects if e.name not in best.candidate.names]
@@ -255,12 +265,13 @@ def _earns(tracer: Tracer, pair: Judged, singles: Sequence[Judged]) -> bool:
     """True if two effects are worth their parameters beside every single one, and take away misfit that matters.
 
     An effect whose textbook form differs a little from the machine's leaves something that a second effect could take:
-    that is no second effect.
+    that is no second effect, unless more is left than such a difference and chance make of it.
     """
     first = singles[0]
     null = tracer.judged(tracer.null).fit.chi2
     share = (first.fit.chi2 - pair.fit.chi2) / max(null - pair.fit.chi2, 1e-300)
-    return pair.log_evidence > first.log_evidence + EARNS and share >= EARNED_SHARE
+    matters = share >= EARNED_SHARE or first.p_value <= LEVEL
+    return matters and pair.log_evidence > first.log_evidence + EARNS
 
 
 def _rivals(tracer: Tracer, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
@@ -292,6 +303,10 @@ def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged
     if not explaining:
         return _without_effects(tracer, others)
     rivals = _rivals(tracer, explaining)
+    step = sudden(tracer.search, tracer.null)
+    if step is not None and step.gain > rivals[0].gain + DECISIVE:
+        # The library has gradual changes only: one of them gets no name for what came at one moment.
+        return Verdict("unknown", ())
     single_valued = all(tracer.single_valued(j.candidate) for j in rivals)
     near = bool(energies) and energies[0].log_evidence > rivals[0].log_evidence - NEAR_DECISIVE
     if single_valued and energies and (near or rivals[0].candidate.at_bound):
@@ -330,20 +345,18 @@ def _told(
     material = best.hypothesis.material.name if verdict.verdict == "material" else ""
     say("checking on points that were set aside")
     mask, where = held_out(measurement)
-
-    def restricted(keep: Any) -> OwnNoise:
-        part = measurement.select(keep)
-        return own_noise(part, reference_basis(part)) if search.noise.stated else search.noise.part(part)
-
     rivals = [j.candidate for j in everything[:3]] if known else []
-    validation = validate(search, mask, where, null, best, rivals, restricted)
+    validation = validate(search, mask, where, null, best, rivals)
     members = [j.candidate for j in verdict.members]
     undecided = verdict.verdict == "ambiguous"
     nexts = experiments(measurement, members, search.noise.sd, search.solve) if undecided else []
-    sd = own_sd(measurement, search.noise)
+    sd = search.noise.each
     waves = detection.periodicity
     power = smallest_sizes(found, detection.score.critical)
     shape = describe(measurement, null.residual, waves)
+    step = sudden(search, null)
+    if step is not None and step.gain > everything[0].gain + DECISIVE:
+        shape = f"{shape} {step.sentence(measurement.time)}"
     lost = tuple(e.absorbed for e in absorbed(measurement, null.hypothesis))
     before = error_of(null.residual, sd, null.x.size)
     after = error_of(best.residual, sd, best.x.size)
@@ -353,7 +366,7 @@ def _told(
         verdict=verdict.verdict,
         effects=effects,
         material=material,
-        sentence=sentence,
+        sentence=sentence + noise_sentence(search.noise),
         detection=detection,
         null=null,
         best=best,

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesmembrane.diagnosis.candidates import Candidate, Search
-from bayesmembrane.diagnosis.whitening import OwnNoise
 from bayesmembrane.forward import Forward
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.parameters import Array
@@ -35,11 +33,6 @@ def error_of(residual: Array, noise_sd: Array, parameters: int = 0) -> Error:
         float(np.max(np.abs(residual))),
         float(np.sum((residual / noise_sd) ** 2) / dof),
     )
-
-
-def own_sd(measurement: Measurement, noise: OwnNoise) -> Array:
-    """(N,) N: what the measurement states of each point, or the inferred noise."""
-    return np.full(len(measurement), noise.sd) if measurement.force_sd is None else measurement.force_sd
 
 
 def held_out(measurement: Measurement) -> tuple[NDArray[np.bool_], str]:
@@ -86,16 +79,13 @@ def validate(
     before: Candidate,
     after: Candidate,
     rivals: list[Candidate],
-    restricted: Callable[[NDArray[np.bool_]], OwnNoise],
 ) -> HeldOut | None:
-    """Fit to the points that are not in ``mask`` (N,) and predict those that are; None where there are none.
-
-    ``restricted`` gives the noise of a part of the points.
-    """
+    """Fit to the points that are not in ``mask`` (N,) and predict those that are; None where there are none."""
     if not np.any(mask):
         return None
     whole = search.measurement
-    part = Search(whole.select(~mask), restricted(~mask), search.seed, search.solve, search.weight)
+    seen = whole.select(~mask)
+    part = Search(seen, search.noise.part(seen, ~mask), search.seed, search.solve, search.weight)
     fits = {}
     for candidate in {c.label: c for c in (before, after, *rivals)}.values():
         found = part.fit(candidate.hypothesis, [candidate.x])
@@ -103,7 +93,7 @@ def validate(
             fits[candidate.label] = found
     if before.label not in fits or after.label not in fits:
         return None
-    sd = own_sd(whole, search.noise)[mask]
+    sd = search.noise.each[mask]
 
     def predicted(candidate: Candidate) -> Error:
         forward = Forward(candidate.hypothesis, whole, whole.deflection, search.solve)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from bayesmembrane.inference.run import Run, sample
 from bayesmembrane.inference.sampling import Callback
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.mechanics import api
+from bayesmembrane.noise.ar1 import AR1
 
 MOST_ROUNDS = 3
 BAND = 0.9
@@ -114,11 +115,14 @@ def loop(
     tell: Callable[[str], None] | None = None,
     watch: Watch | None = None,
     most_rounds: int = MOST_ROUNDS,
+    adapt_noise: bool = False,
 ) -> Loop:
-    """Sample, diagnose, add what is named, and again; every run is stored in the folder ``out``.
+    """Diagnose, sample, add what is named, and again; every run is stored in the folder ``out``.
 
     A named effect or a better energy makes the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop,
-    and so does a hypothesis that was there before. Raises what `sample` and `diagnose` raise.
+    and so does a hypothesis that was there before. With ``adapt_noise`` all are sampled with AR(1) noise where the
+    readings turn out to be correlated: white noise would make the posterior too narrow. Raises what `sample` and
+    `diagnose` raise.
     """
     say = tell or (lambda _: None)
 
@@ -130,19 +134,23 @@ def loop(
             raise KeyboardInterrupt
         return _stage(run, solve, seed)
 
+    def diagnosed(claim: Hypothesis) -> Diagnosis:
+        return diagnose(measurement, claim, seed=seed, solve=solve, tell=tell)
+
     rounds: list[Round] = []
-    seen = {hypothesis.label()}
-    stage = staged(hypothesis)
+    found = diagnosed(hypothesis)
+    noise = AR1() if adapt_noise and found.noise.remembers else hypothesis.noise
+    stage = staged(replace(hypothesis, noise=noise))
+    seen = {stage.run.hypothesis.label()}
     while True:
-        found = diagnose(measurement, stage.run.hypothesis, seed=seed, solve=solve, tell=tell)
-        following = found.hypothesis
+        following = replace(found.hypothesis, noise=noise)
         goes_on = found.verdict in ("named", "material") and following.label() not in seen
         after = staged(following) if goes_on else stage
         rounds.append(Round(found, stage, after))
         if not goes_on or len(rounds) >= most_rounds:
             break
         seen.add(following.label())
-        stage = after
+        stage, found = after, diagnosed(following)
     last = rounds[-1].diagnosis
     abstains = last.verdict in ("unknown", "ambiguous")
     return Loop(tuple(rounds), discrepancy(measurement, last.null.residual, last.noise) if abstains else None)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.stats import chi2, f, ncf, ncx2
 
-from bayesmembrane.diagnosis.whitening import OwnNoise, orthonormal
+from bayesmembrane.diagnosis.whitening import FEW, OwnNoise, orthonormal
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.parameters import Array
 
@@ -97,7 +97,8 @@ def _on_leg(d: Array, leg: NDArray[np.intp], count: int) -> Array:
 def lack_of_fit(residual: Array, slopes: Array, basis: Array, noise: OwnNoise) -> LackOfFit:
     """How much of ``residual`` (N,) the reference (N, p), together with the model's ``slopes`` (N, k), explains.
 
-    The saturated residual sets the scale where the noise is inferred; where it is stated, that does.
+    The saturated residual sets the scale where the noise is inferred; where it is stated, that does. A curve too short
+    for the reference to leave `FEW` degrees of freedom is judged by all that is left, if its noise is stated.
     """
     r, k = noise.white(residual), slopes.shape[1]
     q = orthonormal(noise.white(np.column_stack([basis, slopes])))
@@ -105,8 +106,8 @@ def lack_of_fit(residual: Array, slopes: Array, basis: Array, noise: OwnNoise) -
     n, p = r.size, q.shape[1]
     extra = max(p - k, 1)
     if noise.stated:
-        # Everything that is left counts: the noise is known.
-        value, dof = rss, max(n - k, 1)
+        whole = noise.root is not None or n - p < FEW
+        value, dof = (rss, max(n - k, 1)) if whole else (max(rss - rest, 0.0), extra)
         return LackOfFit(value / dof, float(chi2.sf(value, dof)), rss, n - k, dof)
     scale = max(rest / max(n - p, 1), 1e-300)
     ratio = max(rss - rest, 0.0) / extra / scale

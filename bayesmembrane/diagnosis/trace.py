@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from bayesmembrane.diagnosis.candidates import Candidate, Search, starts_with, with_effects
+from bayesmembrane.diagnosis.detection import periodicity
 from bayesmembrane.diagnosis.saturated import SPLINE, LackOfFit, lack_of_fit, splines
 from bayesmembrane.diagnosis.whitening import orthonormal
 from bayesmembrane.effects.base import Effect
@@ -23,6 +24,8 @@ NEAR_DECISIVE, NEAR = 8.0, 20.0  # the same for rivals whose trace makes less th
 UNEXPLAINED, ALLOWED, LEVEL = 0.12, 0.05, 0.01
 """A model explains the curve if no more than the first part of the misfit is left, or if what is left is no more than
 chance makes of the second part: of a small misfit, noise alone leaves a larger part."""
+WAVES = 1e-3
+"""No smooth effect takes waves away: a model whose residual still repeats, at this level, explains nothing."""
 BEAM, EARNS, EARNED_SHARE = 4, 5.0, 0.08  # of pairs: how many singles are followed, ln K and part of chi^2 to gain
 SINGLE_VALUED = 0.02  # part of a signature that deflection alone does not explain
 LEAST_WEIGHT = 0.05
@@ -36,17 +39,22 @@ class Judged:
 
     unexplained : part of the null model's misfit that is left
     p_value : of what is left, if `ALLOWED` of the null model's misfit may be
+    gain : ln of the Bayes factor over the null model
+    waves : probability of the highest peak in the periodogram of what is left
     """
 
     candidate: Candidate
     fit: LackOfFit
     unexplained: float
     p_value: float
+    gain: float
+    waves: float
 
     @property
     def explains(self) -> bool:
-        """True if what is left is noise, or little beside what was there."""
-        return self.p_value > LEVEL or self.unexplained <= UNEXPLAINED
+        """True if it is more probable than the null model and leaves noise, or little beside what was there."""
+        little = self.p_value > LEVEL or self.unexplained <= UNEXPLAINED
+        return bool(little and self.gain > 0 and self.waves > WAVES)
 
     @property
     def log_evidence(self) -> float:
@@ -79,7 +87,16 @@ class Tracer:
         fit = lack_of_fit(candidate.residual, candidate.slopes, self.basis, careful)
         before = self._before
         left = max(fit.ratio - 1, 0.0) / max(before.ratio - 1, 1e-12) if before.ratio > 1 else 0.0
-        return Judged(candidate, fit, float(left), fit.p_if_left(ALLOWED, before))
+        known = np.column_stack([self.basis, candidate.slopes])
+        waves = periodicity(self.measurement, candidate.residual, known, careful)
+        return Judged(
+            candidate,
+            fit,
+            float(left),
+            fit.p_if_left(ALLOWED, before),
+            candidate.log_evidence - self.null.log_evidence,
+            1.0 if waves is None else waves.p_value,
+        )
 
     def singles(self, effects: Sequence[Effect], tell: Tell) -> list[Judged]:
         """The null model with each effect, refitted; the most probable first."""

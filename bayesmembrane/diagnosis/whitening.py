@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import minimize_scalar
+from scipy.stats import chi2
 
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.parameters import Array
@@ -16,6 +18,9 @@ TRIALS = np.linspace(0.0, LARGEST_RHO, 25)
 CURVED = 0.02  # step in rho at which the curvature of the likelihood is taken
 CLOCKS = ("time", "readings")
 EVEN = 0.05  # steps that differ by no more than this part are even: both clocks are the same
+FEW, SURE, DOUBTED = 30, 3.0, 1e-3
+"""A stated standard deviation is doubted from so many degrees of freedom on, where the correlation is so many standard
+errors above zero, or a scatter as large had less than this probability."""
 SMALLEST_SD = 1e-9  # of the largest force: a perfect curve still has a noise
 
 
@@ -23,12 +28,14 @@ SMALLEST_SD = 1e-9  # of the largest force: a perfect curve still has a noise
 class OwnNoise:
     """e ~ N(0, S): what the load cell does on its own, free of anything that a model may lack.
 
-    sd : N, of one point; with a given covariance the root mean square of its diagonal
+    sd : N, root mean square over the points
     rho, rho_sd : correlation of neighbours a median step apart, and its standard error; 0 where the noise is given
     gaps : (N - 1,) steps between points over their median, by the clock that the noise follows
     root : (N, N) Cholesky factor of a covariance that the measurement states, or None
     dof : degrees of freedom behind ``sd``; inf where it is given
     clock : one of `CLOCKS`: what noise forgets with, the time or the number of readings
+    profile : (N,) or (1,) standard deviation of each point over ``sd``
+    excess : how many times larger than stated the noise is, where the statement was not believed; else 1
     """
 
     sd: float
@@ -38,22 +45,40 @@ class OwnNoise:
     root: Array | None
     dof: float
     clock: str = "time"
+    profile: Array = field(default_factory=lambda: np.ones(1))
+    excess: float = 1.0
 
     @property
     def stated(self) -> bool:
-        """True if the measurement states its noise."""
-        return self.root is not None
+        """True if the measurement states its noise, and its readings do not contradict."""
+        return bool(np.isinf(self.dof))
+
+    @property
+    def remembers(self) -> bool:
+        """True if neighbouring readings are correlated beyond doubt, in excess of what is stated."""
+        return self.rho > SURE * self.rho_sd
+
+    @property
+    def each(self) -> Array:
+        """(N,) N, standard deviation of every point."""
+        if self.root is not None:
+            return np.asarray(np.linalg.norm(self.root, axis=1))
+        return np.broadcast_to(self.sd * self.profile, (self.gaps.size + 1,))
 
     def white(self, values: Array) -> Array:
         """L^-1 v along the first axis of v (N, ...), with S = L L^T: noise becomes N(0, 1)."""
         if self.root is not None:
             flat = values.reshape(len(values), -1)
             return np.asarray(solve_triangular(self.root, flat, lower=True)).reshape(values.shape)
-        return decorrelated(values, self.rho, self.gaps) / self.sd
+        return decorrelated(_over(values, self.profile), self.rho, self.gaps) / self.sd
 
-    def part(self, measurement: Measurement) -> OwnNoise:
-        """The same inferred noise for some of the points."""
-        return replace(self, gaps=gaps_of(measurement, self.clock))
+    def part(self, measurement: Measurement, keep: NDArray[np.bool_]) -> OwnNoise:
+        """The same noise for the points at ``keep`` (N,); ``measurement`` is that part."""
+        root = None
+        if self.root is not None:
+            root = np.asarray(np.linalg.cholesky((self.root @ self.root.T)[np.ix_(keep, keep)]), dtype=float)
+        profile = self.profile[keep] if self.profile.size > 1 else self.profile
+        return replace(self, gaps=gaps_of(measurement, self.clock), root=root, profile=profile)
 
     def cautious(self) -> OwnNoise:
         """With a correlation larger by its standard error: one that is plugged in makes tests optimistic."""
@@ -61,6 +86,11 @@ class OwnNoise:
             return self
         rho = min(self.rho + self.rho_sd, LARGEST_RHO)
         return replace(self, rho=rho)
+
+
+def _over(values: Array, profile: Array) -> Array:
+    """v / profile along the first axis of v (N, ...)."""
+    return np.asarray(values / profile.reshape(-1, *(1,) * (values.ndim - 1)))
 
 
 def decorrelated(values: Array, rho: float, gaps: Array) -> Array:
@@ -88,19 +118,31 @@ def gaps_of(measurement: Measurement, clock: str = "time") -> Array:
 def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
     """Noise that the measurement states, or else what ``basis`` (N, p) leaves, by restricted maximum likelihood.
 
+    A stated standard deviation is a claim, often from a data sheet: where the readings scatter more than that, or
+    remember, what they do counts, in proportion to what is stated of each. A stated covariance is believed.
+
     For AR(1) noise e the restricted likelihood of rho, sd maximised away, is
     -1/2 [(N - p) ln RSS + ln |R| + ln |B^T R^-1 B|] (D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320). Where the
     points are uneven in time, noise may forget by the time (drift of air, filters) or by the reading (averages and
     filters of so many readings): the likelier is taken.
     """
-    gaps, covariance = gaps_of(measurement), measurement.noise_covariance
+    gaps, covariance, stated = gaps_of(measurement), measurement.covariance, measurement.force_sd
     if covariance is not None:
         sd = float(np.sqrt(np.mean(np.diag(covariance))))
         return OwnNoise(sd, 0.0, 0.0, gaps, np.asarray(np.linalg.cholesky(covariance), dtype=float), np.inf)
-    found = [_restricted(measurement.force, orthonormal(basis), gaps, "time")]
+    sd = 1.0 if stated is None else float(np.sqrt(np.mean(stated**2)))
+    profile = np.ones(1) if stated is None else stated / sd
+    y, q = _over(measurement.force, profile), orthonormal(_over(basis, profile))
+    found = [_restricted(y, q, gaps, "time")]
     if gaps.size and float(np.max(np.abs(gaps - 1))) > EVEN:
-        found.append(_restricted(measurement.force, orthonormal(basis), gaps_of(measurement, "readings"), "readings"))
-    return min(found, key=lambda f: f[0])[1]
+        found.append(_restricted(y, q, gaps_of(measurement, "readings"), "readings"))
+    inferred = replace(min(found, key=lambda f: f[0])[1], profile=profile)
+    if stated is None:
+        return inferred
+    larger = chi2.sf((inferred.sd / sd) ** 2 * inferred.dof, inferred.dof) < DOUBTED
+    if inferred.dof < FEW or not (inferred.remembers or larger):
+        return OwnNoise(sd, 0.0, 0.0, gaps, None, np.inf, profile=profile)
+    return replace(inferred, excess=inferred.sd / sd)
 
 
 def _restricted(y: Array, q: Array, gaps: Array, clock: str) -> tuple[float, OwnNoise]:

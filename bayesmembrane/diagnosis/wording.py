@@ -11,11 +11,14 @@ from bayesmembrane.diagnosis.detection import Detection
 from bayesmembrane.diagnosis.heldout import Error
 from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.diagnosis.trace import DECISIVE, Judged
+from bayesmembrane.diagnosis.whitening import OwnNoise
 from bayesmembrane.registry import components
 
 SHOWN = 3
 HALF = 0.5  # unexplained: beyond it a candidate is no part of the answer
-SCALES = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "N": (1e3, "mN"), "N/s": (1e3, "mN/s"), "-": (1.0, "")}
+Shown = Mapping[str, tuple[float, str]]
+SCALES: Shown = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "N": (1e3, "mN"), "N/s": (1e3, "mN/s")}
+"""`Rig.shown` of a lifted disc."""
 
 
 def sentence_of(
@@ -29,22 +32,25 @@ def sentence_of(
     power: Mapping[str, float],
     nexts: Sequence[Experiment],
     partial: Judged | None,
+    shown: Shown = SCALES,
 ) -> str:
-    """What to read first: the verdict, how sure, how large, and what to do."""
+    """What to read first: the verdict, how sure, how large, and what to do; in the units ``shown`` of the rig."""
+    factor, unit = shown["N"]
     title = null.hypothesis.material.title
     have = " with " + " and ".join(e.title for e in null.hypothesis.effects) if null.hypothesis.effects else ""
     if verdict == "adequate":
         return (
             f"{title}{have} describes the curve to within its noise (p = {detection.p_value:.2g}; "
-            f"{1e3 * before.rmse_N:.3g} mN root mean square). Nothing is seen to be missing. {_power(null, power)}"
+            f"{factor * before.rmse_N:.3g} {unit} root mean square). Nothing is seen to be missing. "
+            f"{_power(power, shown)}"
         ).strip()
     start = f"{title}{have} misses something (p {_p(detection.p_value)}): "
     error = (
-        f"The residual falls from {1e3 * before.rmse_N:.3g} to {1e3 * after.rmse_N:.3g} mN root mean square, "
+        f"The residual falls from {factor * before.rmse_N:.3g} to {factor * after.rmse_N:.3g} {unit} root mean square, "
         f"{after.reduced_chi2:.2f} in reduced chi-square."
     )
     if verdict == "named":
-        return f"{start}{_effects(members[0], null)}. {error}{_bounds(members[0])}{_signature(members[0], null)}"
+        return f"{start}{_effects(members[0], null, shown)}. {error}{_bounds(members[0])}{_signature(members[0], null)}"
     if verdict == "material":
         better = members[0].hypothesis.material.title
         return (
@@ -53,7 +59,7 @@ def sentence_of(
             f"is right before an instrument is blamed."
         )
     if verdict == "ambiguous":
-        names = "; or ".join(_effects(m, null) for m in members)
+        names = "; or ".join(_effects(m, null, shown) for m in members)
         advice = f" To tell them apart: {nexts[0].sentence}." if nexts else ""
         return f"{start}this measurement cannot tell which of these it is: {names}. {error}{advice}"
     if members:
@@ -62,18 +68,29 @@ def sentence_of(
             f"{start}{names} would imitate it, but together they follow the deflection alone, as a strain energy that "
             f"is not known here would do just as well. No name is given. {shape}"
         )
-    return f"{start}no known effect, no pair of effects and no other energy explains it.{_part(partial, null)} {shape}"
+    nearest = _part(partial, null, shown)
+    return f"{start}no known effect, no pair of effects and no other energy explains it.{nearest} {shape}"
 
 
-def _part(partial: Judged | None, null: Candidate) -> str:
+def noise_sentence(noise: OwnNoise) -> str:
+    """What the readings say against the stated noise; "" if nothing."""
+    if noise.excess == 1:
+        return ""
+    found = [f"the readings scatter {noise.excess:.2f} times as much as the measurement states"]
+    if noise.remembers:
+        found.append(f"neighbouring readings are correlated ({noise.rho:.2f}), which it does not state")
+    return f" Of the noise: {', and '.join(found)}; this is allowed for."
+
+
+def _part(partial: Judged | None, null: Candidate, shown: Shown) -> str:
     """How far the best of the effects gets, where that is worth saying."""
     if partial is None or partial.log_evidence <= null.log_evidence + DECISIVE or partial.unexplained > HALF:
         return ""
     taken = 100 * (1 - partial.unexplained)
-    return f" The nearest, {_effects(partial.candidate, null)}, takes {taken:.0f} % of it and leaves the rest."
+    return f" The nearest, {_effects(partial.candidate, null, shown)}, takes {taken:.0f} % of it and leaves the rest."
 
 
-def _effects(candidate: Candidate, null: Candidate) -> str:
+def _effects(candidate: Candidate, null: Candidate, shown: Shown) -> str:
     """Titles and sizes of the effects that a candidate adds."""
     have = {e.name for e in null.hypothesis.effects}
     values = candidate.parameters
@@ -82,16 +99,16 @@ def _effects(candidate: Candidate, null: Candidate) -> str:
         if effect.name in have:
             continue
         p = effect.size
-        words.append(f"{effect.title} ({p.name} {size_in_words(values[f'{effect.name}.{p.name}'], p.unit)})")
+        words.append(f"{effect.title} ({p.name} {size_in_words(values[f'{effect.name}.{p.name}'], p.unit, shown)})")
     return " and ".join(words)
 
 
-def size_in_words(value: float, unit: str) -> str:
+def size_in_words(value: float, unit: str, shown: Shown = SCALES) -> str:
     """A value in SI in the unit that people read."""
-    factor, shown = SCALES.get(unit, (1.0, unit))
+    factor, name = shown.get(unit, (1.0, unit.removeprefix("-")))
     # Of a stretch of 1.0026 three digits say nothing.
     digits = 5 if unit == "-" and abs(value - 1) < 0.1 else 3
-    return f"{factor * value:.{digits}g} {shown}".strip()
+    return f"{factor * value:.{digits}g} {name}".strip()
 
 
 def _signature(candidate: Candidate, null: Candidate) -> str:
@@ -106,11 +123,12 @@ def _bounds(candidate: Candidate) -> str:
     return f" An estimate lies at its bound ({', '.join(candidate.at_bound)}): take it as a limit, not as a value."
 
 
-def _power(null: Candidate, power: Mapping[str, float]) -> str:
+def _power(power: Mapping[str, float], shown: Shown) -> str:
     """The smallest sizes that would have shown, for the effects that are easiest to see relative to what is usual."""
     known = components("effects")
     relative = sorted((size / known[n]().size.scale, n, size) for n, size in power.items() if np.isfinite(size))
-    words = [f"{known[n].title} of {size_in_words(size, known[n]().size.unit)}" for _, n, size in relative[:SHOWN]]
+    sizes = [(known[n], size) for _, n, size in relative[:SHOWN]]
+    words = [f"{e.title} of {size_in_words(size, e().size.unit, shown)}" for e, size in sizes]
     return f"It would have shown {', '.join(words)} or more." if words else ""
 
 

@@ -108,6 +108,10 @@ class Effect(ABC):
             return f'the effect "{self.name}" needs times, and the measurement has none'
         return ""
 
+    def negligible(self, thickness: float) -> str:
+        """Why it is too small to be looked for in a film of this thickness (m), as a clause; "" if it is not."""
+        return ""
+
     def within_bounds(self, p: Array) -> Array:
         """Parameters (B, k), moved to the nearest bound where they lie outside."""
         low, high = np.array([c.bounds for c in self.coordinates]).T

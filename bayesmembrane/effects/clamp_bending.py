@@ -10,6 +10,8 @@ import numpy as np
 from bayesmembrane.effects.base import ANNULUS, Carried, EffectParameter, State
 from bayesmembrane.parameters import Array, HalfNormal
 
+THINNEST = 200e-6  # m
+
 
 @dataclass(frozen=True)
 class ClampBending(Carried):
@@ -28,6 +30,12 @@ class ClampBending(Carried):
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("stiffness", "N/m", "linear stiffness of the plate", HalfNormal(0.5), (0.0, 50.0), 0.0),
     )
+
+    def negligible(self, thickness: float) -> str:
+        # E h^3 / (0.1 R2^2) with E = 1 MPa, R2 = 35 mm: 1e-3 N/m at 50 um, 0.07 N/m or 1 mN at 15 mm here.
+        if thickness < THINNEST:
+            return f"a film of {1e6 * thickness:g} um bends too easily: below a millinewton"
+        return ""
 
     def carried(self, p: Array, force: Array, state: State) -> Array:
         return np.asarray(force + p[:, :1] * np.maximum(state.deflection, 0.0))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesmembrane.diagnosis.diagnose import Diagnosis
-from bayesmembrane.diagnosis.heldout import held_out, own_sd
+from bayesmembrane.diagnosis.heldout import held_out
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.separation import CLEAR
 from bayesmembrane.reporting.blocks import Block, Section
@@ -165,7 +165,7 @@ def place_of(found: Loop) -> Place:
     """Where the points lie, which were set aside, and their noise as the last diagnosis has it."""
     m, d = found.rounds[0].before.run.measurement, found.rounds[-1].diagnosis
     mask = held_out(m)[0] if d.validation is not None else np.zeros(len(m), dtype=bool)
-    return Place(m.deflection, m.time, m.leg, m.cycle, mask, own_sd(m, d.noise))
+    return Place(m.deflection, m.time, m.leg, m.cycle, mask, d.noise.each)
 
 
 def residual_rows(way: Sequence[Model]) -> list[Residual]:

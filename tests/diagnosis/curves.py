@@ -21,12 +21,16 @@ def triangle(points: int, peaks: tuple[float, ...] = (0.02, 0.04)) -> Array:
 
 
 def measured(
-    force: Array, deflection: Array | None = None, time: Array | None = None, covariance: Array | None = None
+    force: Array,
+    deflection: Array | None = None,
+    time: Array | None = None,
+    covariance: Array | None = None,
+    force_sd: Array | None = None,
 ) -> Measurement:
     """``force`` (N,) N over a triangle, at a point a second."""
     d = triangle(force.size) if deflection is None else deflection
     t = np.arange(1.0, force.size + 1) if time is None else time
-    return Measurement(d, force, RIG, SPECIMEN, time=t, covariance=covariance)
+    return Measurement(d, force, RIG, SPECIMEN, time=t, covariance=covariance, force_sd=force_sd)
 
 
 def correlated(rng: np.random.Generator, time: Array, rho: float, sd: float = SD) -> Array:
@@ -35,7 +39,7 @@ def correlated(rng: np.random.Generator, time: Array, rho: float, sd: float = SD
     return sd * np.linalg.cholesky(c) @ rng.standard_normal(time.size)
 
 
-def white_noise(measurement: Measurement, sd: float = SD, dof: float = np.inf) -> OwnNoise:
+def white_noise(measurement: Measurement, sd: float = SD, dof: float = 1e9) -> OwnNoise:
     """Known white noise."""
     return OwnNoise(sd, 0.0, 0.0, gaps_of(measurement), None, dof)
 

@@ -52,14 +52,9 @@ def test_the_right_effect_predicts_the_cycle_that_it_has_not_seen() -> None:
     for h in (plain, drift, friction):
         start = search.sane(plain)[0]
         fits.append(search.fit(h, [np.concatenate([start, *(e.typical for e in h.effects)])]))
-
-    def restricted(keep):
-        part = m.select(keep)
-        return own_noise(part, reference_basis(part))
-
-    found = validate(search, mask, where, fits[0], fits[1], fits[2:], restricted)
+    found = validate(search, mask, where, fits[0], fits[1], fits[2:])
     assert found.where == where
     assert found.chosen == fits[1].label
     assert found.after.rmse_N < 1.2 * SD < found.before.rmse_N
     # What was set aside decides nothing: other readings there leave the choice and the fits as they are.
-    assert validate(search, np.zeros(len(m), dtype=bool), "nothing", *fits[:2], [], restricted) is None
+    assert validate(search, np.zeros(len(m), dtype=bool), "nothing", *fits[:2], []) is None

@@ -65,6 +65,40 @@ def test_stated_noise_is_used_as_stated() -> None:
     np.testing.assert_allclose(noise.white(np.stack([force, 2 * force], axis=1)), np.stack([w, 2 * w], axis=1))
 
 
+def test_stated_deviations_are_believed_unless_the_readings_contradict() -> None:
+    stated = SD * np.linspace(1, 3, N)
+    basis = reference_basis(measured(SMOOTH))
+    believed = 0
+    for seed in range(SEEDS):
+        e = np.random.default_rng(seed).standard_normal(N)
+        believed += own_noise(measured(SMOOTH + stated * e, force_sd=stated), basis).stated
+        larger = own_noise(measured(SMOOTH + 1.6 * stated * e, force_sd=stated), basis)
+        assert not larger.stated
+        assert larger.excess == pytest.approx(1.6, rel=0.2)
+        np.testing.assert_allclose(larger.each, larger.excess * stated)
+        half = np.arange(N) < N // 2
+        np.testing.assert_allclose(larger.part(larger_part(stated, half), half).each, larger.each[half])
+        # A statement that is too careful is left alone: it may hold more than the readings show.
+        assert own_noise(measured(SMOOTH + 0.5 * stated * e, force_sd=stated), basis).stated
+        remembers = correlated(np.random.default_rng(seed), TIME, 0.6) / SD * stated
+        assert not own_noise(measured(SMOOTH + remembers, force_sd=stated), basis).stated
+    assert believed >= SEEDS - 1
+
+
+def larger_part(stated, keep):
+    return measured(SMOOTH, force_sd=stated).select(keep)
+
+
+def test_a_part_of_stated_covariance_whitens_that_part() -> None:
+    covariance = SD**2 * 0.5 ** np.abs(TIME[:60, None] - TIME[None, :60])
+    m = measured(SMOOTH[:60], covariance=covariance)
+    keep = np.arange(60) % 4 != 2
+    part = own_noise(m, np.ones((60, 1))).part(m.select(keep), keep)
+    w = part.white(SMOOTH[:60][keep])
+    y = SMOOTH[:60][keep]
+    assert w @ w == pytest.approx(y @ np.linalg.solve(covariance[np.ix_(keep, keep)], y))
+
+
 @pytest.mark.parametrize("clock", ["time", "readings"])
 def test_noise_that_forgets_by_time_or_by_reading_is_told_apart_at_two_speeds(clock) -> None:
     steps = np.where(np.arange(N) < N // 2, 1.0, 0.1)
@@ -76,5 +110,5 @@ def test_noise_that_forgets_by_time_or_by_reading_is_told_apart_at_two_speeds(cl
         found = own_noise(m, reference_basis(m))
         hits += found.clock == clock
         half = m.select(np.arange(N) < N // 2)
-        assert found.part(half).gaps.size == N // 2 - 1
+        assert found.part(half, np.arange(N) < N // 2).gaps.size == N // 2 - 1
     assert hits >= 5
