@@ -18,8 +18,9 @@ def describe(measurement: Measurement, residual: Array, periodicity: Periodicity
     """Sentences on a residual (N,) N: against deflection, leg, cycle and time."""
     d, r = measurement.deflection, residual
     third = np.clip((3 * (d - d.min()) / max(np.ptp(d), 1e-12)).astype(int), 0, 2)
-    words = [f"The residual has a root mean square of {1e3 * _rms(r):.3g} mN and reaches {1e3 * _top(r):.3g} mN"]
-    words[0] += f" at {1e3 * d[int(np.argmax(np.abs(r)))]:.3g} mm."
+    factor, unit = measurement.rig.shown(measurement.specimen.thickness)["N"]
+    words = [f"The residual has a root mean square of {factor * _rms(r):.3g} {unit} and reaches {factor * _top(r):.3g}"]
+    words[0] += f" {unit} at {measurement.rig.place(float(d[int(np.argmax(np.abs(r)))]))}."
     sizes = [_rms(r[third == i]) for i in range(3)]
     worst = int(np.argmax(sizes))
     if sizes[worst] > UNEVEN * min(s for s in sizes if s > 0) if any(s > 0 for s in sizes) else False:
@@ -31,7 +32,8 @@ def describe(measurement: Measurement, residual: Array, periodicity: Periodicity
             words.append(f"It is larger on {'loading' if a > b else 'unloading'} legs.")
         gap = float(np.mean(up) - np.mean(down))
         if abs(gap) > _rms(r):
-            words.append(f"Loading legs lie {1e3 * abs(gap):.3g} mN {'above' if gap > 0 else 'below'} unloading legs.")
+            side = "above" if gap > 0 else "below"
+            words.append(f"Loading legs lie {factor * abs(gap):.3g} {unit} {side} unloading legs.")
     cycles = np.unique(measurement.cycle)
     if cycles.size > 1:
         by = np.array([_rms(r[measurement.cycle == c]) for c in cycles])
@@ -44,7 +46,8 @@ def describe(measurement: Measurement, residual: Array, periodicity: Periodicity
             words.append(f"It {'rises' if trend > 0 else 'falls'} with time.")
     if periodicity is not None and periodicity.p_value < PERIODIC:
         if periodicity.against == "deflection":
-            wave = f"{1e3 * periodicity.period:.3g} mm of deflection"
+            length, name = measurement.rig.shown(measurement.specimen.thickness)["m"]
+            wave = f"{length * periodicity.period:.3g} {name}"
         else:
             wave = f"{periodicity.period:.3g} " + ("points" if measurement.time is None else "s")
         words.append(f"It repeats every {wave}, as a drive, a gear or a vibration would make it.")

@@ -45,11 +45,13 @@ class StripLaw:
         stretch = (1.0 + deflection / self.rig.length) / longer
         pulled = np.maximum(stretch, 1e-3 if self.pushes else 1.0)
         l2, dl2 = self.rig.lateral(pulled, self.across)
+        width = self.rig.width
         with np.errstate(all="ignore"):
             _, p1, _, p11, p12, _ = self.material.derivatives(self.parameters.T[:, :, None], pulled, l2)
-        width = self.rig.width
+            p1 = np.where(np.isfinite(p1), p1, np.nan)  # beyond all numbers there is no force
+            slope = width * (p11 + p12 * dl2) / (self.rig.length * longer)
         force = np.where(pulled == stretch, width * p1, 0.0 * p1)
-        slope = np.where(pulled == stretch, width * (p11 + p12 * dl2) / (self.rig.length * longer), 0.0 * p1)
+        slope = np.where(np.isnan(p1), p1, np.where(pulled == stretch, slope, 0.0))
         return force, slope
 
     def varied(self, change: Array) -> StripLaw:

@@ -522,13 +522,16 @@ def convexity_map(
         if shown.count() and shown.min() < 0 < shown.max():
             ax.contour(l1, l2, shown, levels=[0.0], colors=[ALARM], linewidths=1.6)
         shades = mpl.colormaps["cividis"](np.linspace(0.0, 0.92, max(1, deflections.size)))
+        alike = bool(np.all(state_1 == state_1[:, :1]))  # a strip has one state at a time
+        spot = "o" if alike else ""
         for k in range(deflections.size):
-            ax.plot(state_1[k], state_2[k], color="white", linewidth=4)
-            ax.plot(state_1[k], state_2[k], color=shades[k], linewidth=2.2, label=f"{1e3 * deflections[k]:.3g} mm")
+            ax.plot(state_1[k], state_2[k], marker=spot, color="white", linewidth=4)
+            name = f"{1e3 * deflections[k]:.3g} mm"
+            ax.plot(state_1[k], state_2[k], marker=spot, color=shades[k], linewidth=2.2, label=name)
         ax.set_xlim(float(l1[0]), float(l1[-1]))
         ax.set_ylim(float(l2[0]), float(l2[-1]))
-        ax.set_xlabel("meridional stretch $\\lambda_1$ (-)")
-        ax.set_ylabel("hoop stretch $\\lambda_2$ (-)")
+        ax.set_xlabel(f"{'stretch along the pull' if alike else 'meridional stretch'} $\\lambda_1$ (-)")
+        ax.set_ylabel(f"{'stretch across it' if alike else 'hoop stretch'} $\\lambda_2$ (-)")
         bar = figure.colorbar(mesh, ax=ax, pad=0.015)
         bar.set_label("least eigenvalue / $Gd$ (-)")
         bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:.4g}"))

@@ -31,7 +31,9 @@ from bayesmembrane.reporting.style import title as material_title
 from bayesmembrane.reporting.tables import Table
 from bayesmembrane.reporting.valley_figures import valley_picture
 from bayesmembrane.reporting.valley_section import alternative_text, next_table, valley_table
-from bayesmembrane.reporting.view import Shown
+from bayesmembrane.reporting.view import Shown, Specimen
+from bayesmembrane.rigs.annulus import Annulus
+from bayesmembrane.rigs.base import Strip
 
 GENERATOR = "bayesmembrane report"
 PAGE, TWIN = "index.html", "report.json"
@@ -167,7 +169,7 @@ def _data(shown: Sequence[Shown], reconstruction: Reconstruction | None) -> Sect
         facts = {
             "specimen": film.name,
             "thickness": f"{1e6 * film.thickness:.4g} um",
-            "rig": f"{film.rig}, radii {1e3 * film.inner_radius:.4g} and {1e3 * film.outer_radius:.4g} mm",
+            "rig": _rig(film),
             "points": f"{d.at.size}, from {1e3 * float(np.min(d.at)):.4g} to {1e3 * d.end:.4g} mm of deflection",
             "forces": f"{float(np.min(d.force)):.4g} to {float(np.max(d.force)):.4g} N; {noise}",
             "whole measurement": f"up to {1e3 * d.full_range:.4g} mm",
@@ -397,7 +399,7 @@ def _run(s: Shown, compared: Compared | None) -> Section:
     blocks += (
         [_priors(s)] if len(s.prior) else [Block("text", "The convexity prior leaves next to no prior draws to show.")]
     )
-    blocks += [_traces(s), _map(s), _profiles(s)]
+    blocks += [_traces(s), _map(s), *_profiles(s)]
     blocks.append(_table(tables.coordinates_table(s)))
     return Section(s.key, f"{s.name}, fitted up to {end}", tuple(blocks))
 
@@ -473,29 +475,36 @@ def _traces(s: Shown) -> Block:
 def _map(s: Shown) -> Block:
     d = s.digest
     shares = sentences.listed(f"{m} {sentences.percent(v)}" for m, v in d.convex.items())
+    annulus = isinstance(s.specimen.rig, Annulus)
+    states = "the states that its film passes from the ring to the disc" if annulus else "the state of the film"
     return Block(
         "figure",
         picture=figures.convexity_map(d.map_1, d.map_2, d.eigenvalue, d.shape_at, d.state_1, d.state_2, s.material),
         alt=f"Map of the convexity of {s.name} over the stretches, with the states that the film reaches",
         caption=f"{s.name}: least eigenvalue of the Hessian of the energy over G d (-) in the plane of the stretches "
-        "(-), for the draw nearest to the median curve, and the states that its film passes from the ring to the "
-        f"disc at several deflections (mm). Convexity prior: {s.hypothesis.convexity}; posterior draws that meet each "
+        f"(-), for the draw nearest to the median curve, and {states} "
+        f"at several deflections (mm). Convexity prior: {s.hypothesis.convexity}; posterior draws that meet each "
         f"mode: {shares}.",
     )
 
 
-def _profiles(s: Shown) -> Block:
-    d, film = s.digest, s.specimen
+def _profiles(s: Shown) -> list[Block]:
+    """The lifted film; a strip is as long as it is stretched, and needs no picture."""
+    d, rig = s.digest, s.specimen.rig
+    if not isinstance(rig, Annulus):
+        return []
     at = sentences.listed(f"{1e3 * x:.3g}" for x in d.shape_at)
-    return Block(
-        "figure",
-        picture=figures.profiles(
-            d.shape_at, d.shape_radius, d.shape_height, film.inner_radius, film.outer_radius, s.material
-        ),
-        alt=f"Deformed film of {s.name} at {at} mm",
-        caption=f"{s.name}: the deformed film, height (mm) against radius (mm), at deflections of {at} mm; one thin "
-        f"line for each of {d.shape_radius.shape[1]} posterior draws.",
-    )
+    return [
+        Block(
+            "figure",
+            picture=figures.profiles(
+                d.shape_at, d.shape_radius, d.shape_height, rig.inner_radius, rig.outer_radius, s.material
+            ),
+            alt=f"Deformed film of {s.name} at {at} mm",
+            caption=f"{s.name}: the deformed film, height (mm) against radius (mm), at deflections of {at} mm; one "
+            f"thin line for each of {d.shape_radius.shape[1]} posterior draws.",
+        )
+    ]
 
 
 def _checks(shown: Sequence[Shown]) -> Section:
@@ -521,6 +530,19 @@ def _made(shown: Sequence[Shown], cache: Tally | None) -> Section:
 
 
 # ---- pieces ----------------------------------------------------------------------------------------------------------
+
+
+def _rig(film: Specimen) -> str:
+    """Its lengths, and for a strip what stress and stretch the page's forces and deflections stand for."""
+    rig = film.rig
+    lengths = sentences.listed(f"{name.replace('_', ' ')} {1e3 * v:.4g} mm" for name, v in rig.lengths.items())
+    if not isinstance(rig, Strip):
+        return f"{rig.title}, {lengths}"
+    shown = rig.shown(film.thickness)
+    return (
+        f"{rig.title}, {lengths}; forces are nominal stress times width times thickness, 1 N for "
+        f"{shown['N'][0]:.4g} kPa, and 1 mm of deflection is {1e-3 * shown['m'][0]:.4g} of stretch"
+    )
 
 
 def _groups(shown: Sequence[Shown]) -> list[list[Shown]]:

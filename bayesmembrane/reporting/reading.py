@@ -35,7 +35,6 @@ def read(run: Run | Path | str) -> Shown:
             "the run has no digest, or one of other draws", str(run.path), "make one with inference.digest.digest(run)"
         )
     m, h = run.measurement, run.hypothesis
-    lengths = m.rig.lengths
     p = m.provenance
     return Shown(
         folder=str(run.path),
@@ -43,9 +42,7 @@ def read(run: Run | Path | str) -> Shown:
         specimen=Specimen(
             m.specimen.name,
             m.specimen.thickness,
-            m.rig.title,
-            lengths["inner_radius"],
-            lengths["outer_radius"],
+            m.rig,
             p.origin,
             (p.curve, p.specimen, p.covariance),
             p.notes,

@@ -15,6 +15,7 @@ from bayesmembrane.inference.posterior import FAILURES
 from bayesmembrane.parameters import Array
 from bayesmembrane.reporting.sentences import LOOSE, Case
 from bayesmembrane.reporting.style import spoken, title
+from bayesmembrane.rigs.base import Rig
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +47,11 @@ class Sampling:
 
 @dataclass(frozen=True, eq=False)
 class Specimen:
-    """Film, rig and origin in words."""
+    """The film, what held it, and its origin in words."""
 
     name: str
     thickness: float
-    rig: str
-    inner_radius: float
-    outer_radius: float
+    rig: Rig
     origin: str
     files: tuple[str, ...]
     notes: tuple[str, ...]

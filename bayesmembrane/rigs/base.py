@@ -51,6 +51,14 @@ class Rig(ABC):
         names = {k: units.get(k, (f"{k}_N", 1.0)) for k in arrays}
         return {names[k][0]: names[k][1] * v for k, v in arrays.items()}
 
+    def shown(self, thickness: float) -> Mapping[str, tuple[float, str]]:
+        """By SI unit (factor, unit): how people read forces, deflections and what is made of them on this rig."""
+        return {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "N": (1e3, "mN"), "N/s": (1e3, "mN/s")}
+
+    def place(self, deflection: float) -> str:
+        """A deflection in m in words, to follow "at"."""
+        return f"{1e3 * deflection:.3g} mm"
+
     @property
     def lengths(self) -> dict[str, float]:
         """The fields by name, in m."""
@@ -99,3 +107,17 @@ class Strip(Rig, ABC):
         out["stretch"] = 1.0 + arrays["deflection"] / self.length
         out["nominal_stress_MPa"] = 1e-6 * arrays["force"] / (self.width * thickness)
         return out | ({"force_sd_N": arrays["force_sd"]} if "force_sd" in arrays else {})
+
+    def shown(self, thickness: float) -> Mapping[str, tuple[float, str]]:
+        """Nominal stress, force over width and thickness, and stretch: what was measured, whatever the strip's size."""
+        kPa = 1e-3 / (self.width * thickness)
+        per_kPa = 1 / (self.length * kPa)
+        return {
+            "m": (1 / self.length, "in stretch"),
+            "m/N": (per_kPa, "1/kPa"),
+            "N": (kPa, "kPa"),
+            "N/s": (kPa, "kPa/s"),
+        }
+
+    def place(self, deflection: float) -> str:
+        return f"a stretch of {1 + deflection / self.length:.3g}"

@@ -67,7 +67,7 @@ def show(material: str, center: tuple[float, ...], measurement: Measurement, dom
         folder="chains/tiny",
         hypothesis=claim,
         specimen=view.Specimen(
-            measurement.specimen.name, 50e-6, "annulus", 0.010, 0.035, "bench <2> & 3", ("curve.csv",), ()
+            measurement.specimen.name, 50e-6, Annulus(0.010, 0.035), "bench <2> & 3", ("curve.csv",), ()
         ),
         data_hash=measurement.data_hash,
         digest=found,

@@ -10,6 +10,7 @@ from bayesmembrane.forward import Forward
 from bayesmembrane.hypothesis import hypothesis
 from bayesmembrane.inference.optimum import fit
 from bayesmembrane.measurement import Measurement, Specimen, read_measurement, write_measurement
+from bayesmembrane.mechanics.strip_law import StripLaw
 from bayesmembrane.registry import components, materials
 from bayesmembrane.rigs.base import Strip
 from bayesmembrane.rigs.biaxial import Biaxial
@@ -158,3 +159,13 @@ def test_a_biaxial_set_is_calibrated() -> None:
     part = m.select(np.arange(20))
     force = [Forward(found_fit.hypothesis, v, v.deflection)(found_fit.coordinates).force[0] for v in (m, part)]
     assert force[1] == pytest.approx(force[0][:20], rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", STRIPS)
+def test_beyond_all_numbers_there_is_no_force_and_no_warning(kind: str) -> None:
+    rig = STRIPS[kind]()
+    law = StripLaw(materials()["yeoh"], np.array([[1.0, 0.0, 1e308]]), rig)
+    force, slope = law(rig.length * (np.array([[1.0, 1.001, 4.0]]) - 1))
+    assert np.isfinite(force).tolist() == [[True, True, False]]
+    assert np.isfinite(slope).tolist() == [[True, True, False]]
+    assert np.isnan(force[0, 2])
