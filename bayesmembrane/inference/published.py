@@ -16,7 +16,7 @@ from bayesmembrane.mechanics import api
 from bayesmembrane.registry import material
 from bayesmembrane.shipped import shipped
 from bayesmembrane.tables import parse_table, read_text
-from bayesmembrane.units import FORCE, LENGTH
+from bayesmembrane.units import FORCE, LENGTH, SPEED
 
 
 @dataclass(frozen=True)
@@ -120,3 +120,19 @@ def paper_break_points() -> tuple[BreakPoint, ...]:
     values = zip(*(table.column(*c) for c in columns), strict=True)
     names = (row[table.header.index("specimen")] for row in table.rows)
     return tuple(BreakPoint(n, *(float(v) for v in row)) for n, row in zip(names, values, strict=True))
+
+
+@dataclass(frozen=True)
+class SpeedTest:
+    """The force in N at 100 mm on a film of 50 um that was lifted at ``speed`` m/s."""
+
+    speed: float
+    force: float
+
+
+def paper_rates() -> tuple[SpeedTest, ...]:
+    """The forces at three crosshead speeds that the source paper publishes, from the file that ships."""
+    path = shipped("paper_rates.csv")
+    table = parse_table(read_text(path), str(path))
+    speed, force = (table.column(*table.require(*c)) for c in (("speed", SPEED), ("force", FORCE)))
+    return tuple(SpeedTest(float(v), float(f)) for v, f in zip(speed, force, strict=True))

@@ -6,7 +6,7 @@ import pytest
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.hypothesis import hypothesis
 from bayesmembrane.inference.optimum import fit
-from bayesmembrane.inference.published import compare_with_paper, paper_break_points
+from bayesmembrane.inference.published import compare_with_paper, paper_break_points, paper_rates
 from bayesmembrane.measurement import Measurement, Specimen
 from bayesmembrane.mechanics.api import force_curve
 from bayesmembrane.rigs.annulus import Annulus
@@ -44,3 +44,9 @@ def test_the_published_break_points() -> None:
     assert breaks[2].thickness == pytest.approx(100e-6)
     assert breaks[2].deflection == pytest.approx(0.083)
     assert breaks[2].force == pytest.approx(18.8)
+
+
+def test_the_published_forces_at_three_speeds() -> None:
+    rates = paper_rates()
+    assert [r.speed for r in rates] == pytest.approx([1e-4, 1e-3, 1e-2])
+    assert [r.force for r in rates] == [16.8, 17.0, 19.5]
