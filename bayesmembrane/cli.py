@@ -398,7 +398,7 @@ def diagnose(
     with log.status(f"Diagnosing {claim.label()}") as status:
         found = run(measurement, claim, seed=seed, tell=status.update)
     document = found.summary()
-    answer(document, as_json, lambda: _shown(document))
+    answer(document, as_json, lambda: _shown(document, measurement))
 
 
 @app.command()
@@ -455,14 +455,15 @@ def loop(
     def show() -> None:
         for number, round_ in enumerate(document["rounds"], 1):
             out.print(f"Round {number}")
-            _shown(round_)
+            _shown(round_, measurement)
         out.print(f"The report lies in {page}")
 
     answer(document, as_json, show)
 
 
-def _shown(document: dict[str, Any]) -> None:
-    """A diagnosis on the terminal."""
+def _shown(document: dict[str, Any], measurement: Measurement) -> None:
+    """A diagnosis on the terminal, in the units of the rig."""
+    factor, unit = measurement.rig.shown(measurement.specimen.thickness)["N"]
     out.print(document["sentence"])
     rows = [
         [
@@ -475,11 +476,11 @@ def _shown(document: dict[str, Any]) -> None:
     ]
     table("Candidates", ["effect or energy", "ln Bayes factor", "unexplained", "parameters, SI"], rows)
     errors = [
-        [when, f"{1e3 * e['rmse_N']:.3g}", f"{1e3 * e['max_N']:.3g}", f"{e['reduced_chi2']:.2f}"]
+        [when, f"{factor * e['rmse_N']:.3g}", f"{factor * e['max_N']:.3g}", f"{e['reduced_chi2']:.2f}"]
         for when, e in document["error"].items()
         if isinstance(e, dict)
     ]
-    table("Errors", ["", "root mean square, mN", "largest, mN", "reduced chi-square"], errors)
+    table("Errors", ["", f"root mean square, {unit}", f"largest, {unit}", "reduced chi-square"], errors)
     for sentence in document["absorbed"]:
         out.print(sentence)
     for step in document["next_measurements"]:

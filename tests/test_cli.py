@@ -174,3 +174,20 @@ def test_an_effect_that_cannot_be_is_refused_in_a_sentence(run: Run, effects: st
     assert code == 1
     assert sentence in " ".join(err.split())
     assert "Traceback" not in err
+
+
+def test_errors_of_a_strip_are_told_in_stress(run: Run, tmp_path: Path) -> None:
+    """A step of 12 kPa between the legs of a strip, whatever its width, is read off the table as kPa."""
+    stretch = np.concatenate([np.linspace(1.02, 1.6, 30), np.linspace(1.58, 1.04, 28)])
+    stress = 1e-1 * (stretch - stretch**-2) + np.where(np.arange(58) < 30, 6e-3, -6e-3)
+    rows = [f"{t},{x},{s + 1e-5 * (-1) ** t}" for t, (x, s) in enumerate(zip(stretch, stress, strict=True))]
+    (tmp_path / "c.csv").write_text("time_s,stretch,nominal_stress_MPa\n" + "\n".join(rows) + "\n")
+    rig = '[specimen]\nthickness_um = 500\n[rig]\nkind = "uniaxial"\nwidth_mm = 7\n'
+    (tmp_path / "c.toml").write_text(rig)
+    code, out, err = run("diagnose", tmp_path / "c.csv", "--specimen", tmp_path / "c.toml", "--material", "neo_hookean")
+    assert code == 0, err
+    assert "root mean square, kPa" in out
+    (line,) = (x for x in out.splitlines() if "before" in x and "heldout" not in x)
+    shown = [float(x) for x in line.replace("│", " ").split()[1:3]]
+    assert shown[0] == pytest.approx(6, rel=0.05)
+    assert 6 <= shown[1] < 9
