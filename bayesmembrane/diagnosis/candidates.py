@@ -135,9 +135,10 @@ def starts_with(bases: Sequence[Array], effect: Effect) -> list[Array]:
     for i, base in enumerate(bases):
         for sign in signs:
             for share in SIZES if i == 0 else SIZES[:1]:
-                theta = effect.typical.copy()
-                theta[0] = (effect.size.null or 0.0) + sign * share * effect.size.scale
-                out.append(np.concatenate([base, effect.within_bounds(theta)]))
+                for shape in [{}, *effect.starts] if share == SIZES[0] and i == 0 else [{}]:
+                    theta = np.array([shape.get(p.name, p.typical) for p in effect.coordinates])
+                    theta[0] = (effect.size.null or 0.0) + sign * share * effect.size.scale
+                    out.append(np.concatenate([base, effect.within_bounds(theta)]))
     return out
 
 
@@ -197,9 +198,11 @@ def _at_bound(objective: Objective, x: Array) -> tuple[str, ...]:
     out = []
     for i, p in enumerate(objective.parameters):
         low, high = p.bounds
-        tolerance = NEAR_BOUND * (high - low)
+        # Bounds that are decades apart are near in the logarithm.
+        by = np.log if low > 0 else np.asarray
+        tolerance = NEAR_BOUND * float(by(high) - by(low))
         null = getattr(p, "null", None)
         for bound in (low, high):
-            if abs(x[i] - bound) <= tolerance and bound != null:
+            if abs(float(by(x[i]) - by(bound))) <= tolerance and bound != null:
                 out.append(p.name)
     return tuple(out)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import lombscargle
@@ -29,12 +29,14 @@ class Periodicity:
     against : "time" or "deflection"
     period : s or m (points, where there are no times)
     share : part of the variance in that wave
+    squares : its squares over the variance of the noise
     """
 
     against: str
     period: float
     share: float
     p_value: float
+    squares: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ def periodicity(measurement: Measurement, residual: Array, basis: Array, noise: 
         _peak(measurement.deflection, rest, q, "deflection", SPLINE / 2),
     ]
     best = min(found, key=lambda f: f.p_value)
-    return Periodicity(best.against, best.period, best.share, min(1.0, len(found) * best.p_value))
+    return replace(best, p_value=min(1.0, len(found) * best.p_value))
 
 
 def _peak(place: Array, rest: Array, q: Array, against: str, least: float) -> Periodicity:
@@ -108,7 +110,7 @@ def _peak(place: Array, rest: Array, q: Array, against: str, least: float) -> Pe
         (_share(2 * np.pi * waves[i] / span * place, rest, q), waves[i]) for i in np.argsort(power)[-TOP:]
     )
     p = min(1.0, waves.size * (1 - share) ** ((freedom - 2) / 2))
-    return Periodicity(against, span / float(count), share, float(p))
+    return Periodicity(against, span / float(count), share, float(p), share * float(rest @ rest))
 
 
 def _share(phase: Array, rest: Array, q: Array) -> float:

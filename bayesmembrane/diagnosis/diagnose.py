@@ -16,15 +16,14 @@ from bayesmembrane.diagnosis.heldout import Error, HeldOut, error_of, held_out, 
 from bayesmembrane.diagnosis.saturated import reference_basis
 from bayesmembrane.diagnosis.scores import Signature, angle, signatures, smallest_sizes
 from bayesmembrane.diagnosis.separation import Experiment, experiments
-from bayesmembrane.diagnosis.sudden import sudden
+from bayesmembrane.diagnosis.sudden import Step, sudden
 from bayesmembrane.diagnosis.trace import (
     DECISIVE,
     EARNED_SHARE,
     EARNS,
+    ENERGY_DECISIVE,
     LEVEL,
-    NEAR,
-    NEAR_DECISIVE,
-    WAVES,
+    LOOKALIKES,
     Judged,
     Tell,
     Tracer,
@@ -32,7 +31,7 @@ from bayesmembrane.diagnosis.trace import (
     ranked,
 )
 from bayesmembrane.diagnosis.whitening import OwnNoise, own_noise
-from bayesmembrane.diagnosis.wording import noise_sentence, sentence_of
+from bayesmembrane.diagnosis.wording import form_sentence, noise_sentence, sentence_of
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.forward import Solve
 from bayesmembrane.hypothesis import Hypothesis
@@ -42,6 +41,7 @@ from bayesmembrane.mechanics import api
 from bayesmembrane.parameters import Array
 
 VERDICTS = ("adequate", "named", "ambiguous", "material", "unknown")
+NEAR = 20.0  # degrees between signatures below which a protocol cannot separate two effects
 SPARE = 3  # points beyond the parameters, at least
 
 
@@ -146,10 +146,16 @@ class Diagnosis:
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What the candidates come to."""
+    """What the candidates come to.
+
+    step : a sudden change that explains the curve as well as the members do, or better
+    form : part of the plain material's misfit that an adequate model leaves, where the tests do see it
+    """
 
     verdict: str
     members: tuple[Judged, ...]
+    step: Step | None = None
+    form: float | None = None
 
 
 def diagnose(
@@ -177,8 +183,27 @@ def diagnose(
     everything: list[Judged] = [tracer.judged(null)]
     verdict = Verdict("adequate", (everything[0],))
     if not detection.adequate:
-        tracer, verdict, everything = _traced(tracer, effects, found, rng, say)
+        form = _form_left(tracer)
+        if form is None:
+            tracer, verdict, everything = _traced(tracer, effects, found, rng, say)
+        else:
+            verdict = replace(verdict, form=form)
     return _told(tracer, detection, verdict, everything, found, seed, say)
+
+
+def _form_left(tracer: Tracer) -> float | None:
+    """Part of the plain material's misfit that the given effects leave, if a machine that differs a little from the
+    textbook leaves as much; else, or without effects, None.
+
+    What a form leaves is no further effect: another one that takes it predicts worse.
+    """
+    given = tracer.null
+    plain = replace(given.hypothesis, effects=())
+    if not given.names or (alone := tracer.search.fit(plain, tracer.search.sane(plain))) is None:
+        return None
+    judged = replace(tracer, null=alone).judged(given)
+    little = judged.explains and (judged.p_value > LEVEL or judged.unexplained <= EARNED_SHARE)
+    return judged.unexplained if little else None
 
 
 def _enough(measurement: Measurement, hypothesis: Hypothesis) -> None:
@@ -251,7 +276,7 @@ def _renewed(tracer: Tracer, judged: list[Judged]) -> tuple[Tracer, list[Judged]
 
 def _more_is_missing(tracer: Tracer, best: Judged, effects: Sequence[Any], rng: np.random.Generator) -> bool:
     """True if the best single effect leaves structure behind that another one could take away."""
-    if best.waves <= WAVES:
+    if best.ripples:
         return False
     if not best.explains:
         return True
@@ -265,13 +290,12 @@ def _earns(tracer: Tracer, pair: Judged, singles: Sequence[Judged]) -> bool:
     """True if two effects are worth their parameters beside every single one, and take away misfit that matters.
 
     An effect whose textbook form differs a little from the machine's leaves something that a second effect could take:
-    that is no second effect, unless more is left than such a difference and chance make of it.
+    that is no second effect.
     """
     first = singles[0]
     null = tracer.judged(tracer.null).fit.chi2
     share = (first.fit.chi2 - pair.fit.chi2) / max(null - pair.fit.chi2, 1e-300)
-    matters = share >= EARNED_SHARE or first.p_value <= LEVEL
-    return matters and pair.log_evidence > first.log_evidence + EARNS
+    return pair.log_evidence > first.log_evidence + EARNS and share >= EARNED_SHARE
 
 
 def _rivals(tracer: Tracer, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
@@ -281,15 +305,15 @@ def _rivals(tracer: Tracer, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
     best = explaining[0]
     out = [best]
     for j in explaining[1:]:
-        behind = best.log_evidence - j.log_evidence
-        if behind < DECISIVE or (behind < NEAR_DECISIVE and _near(tracer, best, j)):
+        if best.log_evidence - j.log_evidence < _decisive(tracer, best, j):
             out.append(j)
     return tuple(out)
 
 
-def _near(tracer: Tracer, a: Judged, b: Judged) -> bool:
-    """True if the traces of two candidates, as fitted, make less than `NEAR` degrees."""
-    return angle(_trace(tracer, a.candidate), _trace(tracer, b.candidate), fold=False) < NEAR
+def _decisive(tracer: Tracer, a: Judged, b: Judged) -> float:
+    """ln of the Bayes factor that sets two candidates apart: more where their traces, as fitted, look alike."""
+    degrees = angle(_trace(tracer, a.candidate), _trace(tracer, b.candidate), fold=False)
+    return next((needed for nearer, needed in LOOKALIKES if degrees < nearer), DECISIVE)
 
 
 def _trace(tracer: Tracer, candidate: Candidate) -> Array:
@@ -305,10 +329,12 @@ def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged
     rivals = _rivals(tracer, explaining)
     step = sudden(tracer.search, tracer.null)
     if step is not None and step.gain > rivals[0].gain + DECISIVE:
-        # The library has gradual changes only: one of them gets no name for what came at one moment.
-        return Verdict("unknown", ())
+        return Verdict("unknown", (), step)
+    if step is not None and step.gain > rivals[0].gain - DECISIVE:
+        # One moment has all of it: an effect that happens to come then is no better a guess than something foreign.
+        return Verdict("ambiguous", rivals, step)
     single_valued = all(tracer.single_valued(j.candidate) for j in rivals)
-    near = bool(energies) and energies[0].log_evidence > rivals[0].log_evidence - NEAR_DECISIVE
+    near = bool(energies) and energies[0].log_evidence > rivals[0].log_evidence - ENERGY_DECISIVE
     if single_valued and energies and (near or rivals[0].candidate.at_bound):
         # The instrument is blamed only where no energy comes near, and not with an effect that is driven to its bounds.
         return Verdict("material", (energies[0],))
@@ -349,19 +375,27 @@ def _told(
     validation = validate(search, mask, where, null, best, rivals)
     members = [j.candidate for j in verdict.members]
     undecided = verdict.verdict == "ambiguous"
-    nexts = experiments(measurement, members, search.noise.sd, search.solve) if undecided else []
+    several = undecided and len(members) > 1
+    nexts = experiments(measurement, members, search.noise.sd, search.solve) if several else []
     sd = search.noise.each
     waves = detection.periodicity
     power = smallest_sizes(found, detection.score.critical)
+    shown = measurement.rig.shown(measurement.specimen.thickness)
     shape = describe(measurement, null.residual, waves)
-    step = sudden(search, null)
-    if step is not None and step.gain > everything[0].gain + DECISIVE:
-        shape = f"{shape} {step.sentence(measurement.time)}"
+    step = verdict.step or (sudden(search, null) if verdict.verdict == "unknown" else None)
+    sudden_words = ""
+    if step is not None and (verdict.step or step.gain > everything[0].gain):
+        sudden_words = step.sentence(measurement.time, shown)
+        shape = f"{shape} {sudden_words}"
     lost = tuple(e.absorbed for e in absorbed(measurement, null.hypothesis))
     before = error_of(null.residual, sd, null.x.size)
     after = error_of(best.residual, sd, best.x.size)
     partial = next((j for j in everything if j.candidate.names != null.names), None)
-    sentence = sentence_of(verdict.verdict, members, null, detection, before, after, shape, power, nexts, partial)
+    sentence = sentence_of(
+        verdict.verdict, members, null, detection, before, after, shape, power, nexts, partial, shown, sudden_words
+    )
+    if verdict.form is not None:
+        sentence = form_sentence(null, verdict.form, detection)
     return Diagnosis(
         verdict=verdict.verdict,
         effects=effects,

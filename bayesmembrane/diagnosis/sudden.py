@@ -1,7 +1,8 @@
-"""A sudden change: the one foreign fault that the smooth effects of the library imitate well enough to take its name."""
+"""A sudden change: a foreign fault that effects of the library can imitate well enough to give it their name."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,10 +31,11 @@ class Step:
     gain: float
     share: float
 
-    def sentence(self, time: Array | None) -> str:
-        """When, how large, and what makes such a step."""
+    def sentence(self, time: Array | None, shown: Mapping[str, tuple[float, str]]) -> str:
+        """When, how large (by `Rig.shown`), and what makes such a step."""
+        factor, unit = shown["N"]
         when = f"reading {self.place + 1}" if time is None else f"{time[self.place]:.4g} s"
-        size = f"{100 * abs(self.size):.2g} %" if self.relative else f"{1e3 * abs(self.size):.3g} mN"
+        size = f"{100 * abs(self.size):.2g} %" if self.relative else f"{factor * abs(self.size):.3g} {unit}"
         return (
             f"A sudden {'rise' if self.size > 0 else 'drop'} of the force by {size} at {when} takes "
             f"{100 * self.share:.0f} % of the squares away: look for a change of temperature, a knock or a tear then."

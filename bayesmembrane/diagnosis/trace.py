@@ -20,13 +20,16 @@ from bayesmembrane.registry import materials
 
 DECISIVE = 4.0
 """ln of the Bayes factor beyond which a rival is out."""
-NEAR_DECISIVE, NEAR = 8.0, 20.0  # the same for rivals whose trace makes less than so many degrees with the winner's
-UNEXPLAINED, ALLOWED, LEVEL = 0.12, 0.05, 0.01
+LOOKALIKES = ((15.0, 8.0), (30.0, 5.0))
+"""(degrees, the same for rivals whose trace makes less than that with the winner's)."""
+ENERGY_DECISIVE = 8.0  # the same for other energies: an instrument is blamed only far beyond them
+UNEXPLAINED, ALLOWED, LEVEL = 0.2, 0.05, 0.01
 """A model explains the curve if no more than the first part of the misfit is left, or if what is left is no more than
 chance makes of the second part: of a small misfit, noise alone leaves a larger part."""
-WAVES = 1e-3
-"""No smooth effect takes waves away: a model whose residual still repeats, at this level, explains nothing."""
-BEAM, EARNS, EARNED_SHARE = 4, 5.0, 0.08  # of pairs: how many singles are followed, ln K and part of chi^2 to gain
+WAVES, RIPPLE = 1e-3, 0.2
+"""No smooth effect takes waves away: where the residual still repeats, at the first level, and the wave has more than
+the second part of the squares that a model takes away, the model explains nothing."""
+BEAM, EARNS, EARNED_SHARE = 4, 15.0, 0.045  # of pairs: how many singles are followed, ln K and part of chi^2 to gain
 SINGLE_VALUED = 0.02  # part of a signature that deflection alone does not explain
 LEAST_WEIGHT = 0.05
 
@@ -40,7 +43,7 @@ class Judged:
     unexplained : part of the null model's misfit that is left
     p_value : of what is left, if `ALLOWED` of the null model's misfit may be
     gain : ln of the Bayes factor over the null model
-    waves : probability of the highest peak in the periodogram of what is left
+    ripples : True if waves are left that weigh as much as what it takes away
     """
 
     candidate: Candidate
@@ -48,13 +51,13 @@ class Judged:
     unexplained: float
     p_value: float
     gain: float
-    waves: float
+    ripples: bool
 
     @property
     def explains(self) -> bool:
         """True if it is more probable than the null model and leaves noise, or little beside what was there."""
         little = self.p_value > LEVEL or self.unexplained <= UNEXPLAINED
-        return bool(little and self.gain > 0 and self.waves > WAVES)
+        return little and self.gain > 0 and not self.ripples
 
     @property
     def log_evidence(self) -> float:
@@ -87,16 +90,20 @@ class Tracer:
         fit = lack_of_fit(candidate.residual, candidate.slopes, self.basis, careful)
         before = self._before
         left = max(fit.ratio - 1, 0.0) / max(before.ratio - 1, 1e-12) if before.ratio > 1 else 0.0
-        known = np.column_stack([self.basis, candidate.slopes])
-        waves = periodicity(self.measurement, candidate.residual, known, careful)
         return Judged(
             candidate,
             fit,
             float(left),
             fit.p_if_left(ALLOWED, before),
             candidate.log_evidence - self.null.log_evidence,
-            1.0 if waves is None else waves.p_value,
+            self._ripples(candidate, before.chi2 - fit.chi2),
         )
+
+    def _ripples(self, candidate: Candidate, taken: float) -> bool:
+        """True if a wave is left that has more than its part of the squares ``taken`` away."""
+        known = np.column_stack([self.basis, candidate.slopes])
+        wave = periodicity(self.measurement, candidate.residual, known, self.search.noise.cautious())
+        return wave is not None and wave.p_value < WAVES and wave.squares > RIPPLE * max(taken, 0.0)
 
     def singles(self, effects: Sequence[Effect], tell: Tell) -> list[Judged]:
         """The null model with each effect, refitted; the most probable first."""

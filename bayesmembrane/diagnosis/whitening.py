@@ -122,7 +122,8 @@ def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
     remember, what they do counts, in proportion to what is stated of each. A stated covariance is believed.
 
     For AR(1) noise e the restricted likelihood of rho, sd maximised away, is
-    -1/2 [(N - p) ln RSS + ln |R| + ln |B^T R^-1 B|] (D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320). Where the
+    -1/2 [(N - p) ln RSS + ln |R| + ln |B^T R^-1 B|] (D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320); the prior
+    density of rho falls evenly to zero at 1. Where the
     points are uneven in time, noise may forget by the time (drift of air, filters) or by the reading (averages and
     filters of so many readings): the likelier is taken.
     """
@@ -155,7 +156,8 @@ def _restricted(y: Array, q: Array, gaps: Array, clock: str) -> tuple[float, Own
         rss = float(r[-1] ** 2)
         phi = rho**gaps if rho > 0 else np.zeros(gaps.size)
         log_det = float(np.sum(np.log1p(-(phi**2)))) + 2 * float(np.sum(np.log(np.abs(r[:-1]))))
-        return (y.size - q.shape[1]) * np.log(max(rss, 1e-300)) + log_det, rss
+        # A density 2 (1 - rho): noise that hardly forgets is a drift, which no test could tell from a misfit.
+        return (y.size - q.shape[1]) * np.log(max(rss, 1e-300)) + log_det - 2 * np.log1p(-rho), rss
 
     values = [fit(rho)[0] for rho in TRIALS]
     best = int(np.argmin(values))

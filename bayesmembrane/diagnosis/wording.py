@@ -33,8 +33,12 @@ def sentence_of(
     nexts: Sequence[Experiment],
     partial: Judged | None,
     shown: Shown = SCALES,
+    step: str = "",
 ) -> str:
-    """What to read first: the verdict, how sure, how large, and what to do; in the units ``shown`` of the rig."""
+    """What to read first: the verdict, how sure, how large, and what to do; in the units ``shown`` of the rig.
+
+    ``step`` : a sentence on a sudden change that explains an ambiguous curve just as well
+    """
     factor, unit = shown["N"]
     title = null.hypothesis.material.title
     have = " with " + " and ".join(e.title for e in null.hypothesis.effects) if null.hypothesis.effects else ""
@@ -60,8 +64,10 @@ def sentence_of(
         )
     if verdict == "ambiguous":
         names = "; or ".join(_effects(m, null, shown) for m in members)
+        foreign = "; or something from outside the film at one moment" if step else ""
         advice = f" To tell them apart: {nexts[0].sentence}." if nexts else ""
-        return f"{start}this measurement cannot tell which of these it is: {names}. {error}{advice}"
+        text = f"{start}this measurement cannot tell which of these it is: {names}{foreign}. {error}{advice} {step}"
+        return text.rstrip()
     if members:
         names = " with ".join(e.title for e in members[0].hypothesis.effects)
         return (
@@ -70,6 +76,17 @@ def sentence_of(
         )
     nearest = _part(partial, null, shown)
     return f"{start}no known effect, no pair of effects and no other energy explains it.{nearest} {shape}"
+
+
+def form_sentence(null: Candidate, left: float, detection: Detection) -> str:
+    """Of a model that is adequate but for the form of its effects."""
+    h = null.hypothesis
+    have = " and ".join(e.title for e in h.effects)
+    return (
+        f"{h.material.title} with {have} leaves {100 * left:.1f} % of the misfit that {h.material.title} alone has "
+        f"(p {_p(detection.p_value)}): no more than a machine leaves that differs a little from the textbook's form. "
+        "Nothing beyond that is seen to be missing."
+    )
 
 
 def noise_sentence(noise: OwnNoise) -> str:

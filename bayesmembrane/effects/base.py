@@ -100,6 +100,11 @@ class Effect(ABC):
         """The parameter whose null value switches it off."""
         return self.coordinates[0]
 
+    @property
+    def starts(self) -> list[dict[str, float]]:
+        """Shapes by name from which searches for it start, beside the typical ones."""
+        return []
+
     def unavailable(self, rig: str, path: Path) -> str:
         """Why it cannot occur on this rig and path, as a clause; "" if it can."""
         if rig not in self.rigs:

@@ -6,15 +6,22 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from scipy.special import expit
 
 from bayesmembrane.effects._history import EXPONENT, REPEATED, growth
 from bayesmembrane.effects.base import Carried, EffectParameter, State
-from bayesmembrane.parameters import Array, HalfNormal
+from bayesmembrane.parameters import Array, HalfNormal, Uniform
+
+WIDTH = 0.015  # of the full range
 
 
 @dataclass(frozen=True)
 class Tearing(Carried):
-    """F = F0 exp(-loss G), with the growth G of the test (1 after a first loading to its full range)."""
+    """F = F0 exp(-loss [(1 - jump) G + jump / (1 + exp((place - m / D) / w))]), w = 0.015.
+
+    G is the growth law of the test (1 after a first loading to its full range D), m the largest deflection so far: a
+    film tears little by little, and by a jump.
+    """
 
     name: ClassVar[str] = "tearing"
     title: ClassVar[str] = "tearing of the film"
@@ -29,7 +36,18 @@ class Tearing(Carried):
         ),
         EXPONENT,
         REPEATED,
+        EffectParameter("jump", "-", "part of the loss that comes at once", Uniform(0.0, 1.0), (0.0, 1.0)),
+        EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1)),
     )
 
+    jumps: ClassVar[tuple[float, ...]] = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+
+    @property
+    def starts(self) -> list[dict[str, float]]:
+        """A jump is found from nearby only."""
+        return [{"jump": 0.6, "place": place} for place in self.jumps]
+
     def carried(self, p: Array, force: Array, state: State) -> Array:
-        return np.asarray(force * np.exp(-p[:, :1] * growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path)))
+        slow = growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path)
+        quick = expit((state.reached / state.path.full_range - p[:, 4:5]) / WIDTH)
+        return np.asarray(force * np.exp(-p[:, :1] * ((1 - p[:, 3:4]) * slow + p[:, 3:4] * quick)))

@@ -95,3 +95,33 @@ def test_too_few_points_are_refused() -> None:
     few = measured(np.linspace(0.01, 0.1, 8), np.linspace(0.005, 0.04, 8))
     with pytest.raises(SettingsError, match="points"):
         diagnose(few, Hypothesis(Ogden))
+
+
+def test_a_sudden_change_gets_no_single_name(tmp_path) -> None:
+    data, found = answered(tmp_path, "temperature_step", "mooney_rivlin", "two_speeds", "ar1:0.5", 50086)
+    assert found.verdict in data.truth["expected"] or found.verdict == "ambiguous"
+    assert "sudden" in found.sentence
+    moment = data.truth["effects"]["temperature_step"]["when"] * data.time_s[-1]
+    assert float(found.sentence.split(" at ")[-1].split(" s")[0]) == pytest.approx(moment, abs=6)
+
+
+def test_what_the_form_of_a_named_effect_leaves_is_no_further_effect(tmp_path) -> None:
+    data = generate("viscoelastic", "yeoh", "staircase_twice", "white", 5.0, 50701)
+    m = read_measurement(*data.write(tmp_path))
+    first = diagnose(m, Hypothesis(materials()["yeoh"]))
+    assert "viscoelastic" in first.effects
+    second = diagnose(m, first.hypothesis)
+    assert second.verdict == "adequate"
+    assert second.detection.p_value < 0.01
+    assert "form" in second.sentence
+
+
+def test_a_stated_deviation_that_the_readings_contradict_raises_no_alarm(tmp_path) -> None:
+    data = generate("null", "yeoh", "two_speeds", "ar1:0.5", 1.0, 504)
+    curve, specimen = data.write(tmp_path)
+    specimen.write_text(specimen.read_text() + f"\n[measurement]\nforce_sd_N = {data.truth['noise']['sd'] / 1.5}\n")
+    found = diagnose(read_measurement(curve, specimen), Hypothesis(materials()["yeoh"]))
+    assert found.verdict == "adequate"
+    assert not found.noise.stated
+    assert found.noise.excess == pytest.approx(1.5, rel=0.2)
+    assert "Of the noise" in found.sentence

@@ -5,7 +5,7 @@ from bayesmembrane.diagnosis.candidates import Candidate, Search
 from bayesmembrane.diagnosis.sudden import sudden
 from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.materials.neo_hookean import NeoHookean
-from tests.diagnosis.curves import SD, measured, triangle, white_noise
+from tests.diagnosis.curves import RIG, SD, measured, triangle, white_noise
 
 N = 400
 D = triangle(N)
@@ -31,7 +31,7 @@ def test_a_step_is_found_where_it_is_with_its_size(relative, size) -> None:
     assert abs(step_found.place - at) < 12
     assert step_found.size == pytest.approx(size * (0.08 if relative else 2 * SD), rel=0.15)
     assert step_found.gain > 20
-    words = step_found.sentence(TIME)
+    words = step_found.sentence(TIME, RIG.shown(50e-6))
     assert ("rise" if size > 0 else "drop") in words
     assert ("%" if relative else "mN") in words.split(" at ")[0]
 
