@@ -17,10 +17,8 @@ import numpy as np
 
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.hypothesis import Hypothesis, hypothesis
-from bayesmembrane.inference.comparison_jobs import Climbed, Job, Tell, Walked, climb, climb_again, folder_of, walk
+from bayesmembrane.inference.comparison_jobs import Job, Tell, judge
 from bayesmembrane.inference.comparison_result import Comparison, Row, ranked
-from bayesmembrane.inference.evidence import BRIDGE, NESTED, SIGMAS, Evidence, together
-from bayesmembrane.inference.evidence_target import averaged
 from bayesmembrane.measurement import Measurement
 
 # By what their films cost: the slow ones first, so that the others fill the gaps of the second core.
@@ -119,8 +117,6 @@ def compare_ranges(
         for name, r in ranges.items()
         for label, h in zip(labels, hypotheses, strict=True)
     }
-    for job in jobs.values():
-        folder_of(job)  # made here: both parts of a job would make it at the same time
     with _workers(_cores() if workers is None else workers, len(jobs), progress or _silent) as submit:
         rows = _rows(jobs, submit)
     return {name: ranked([rows[name, label] for label in labels]) for name in ranges}
@@ -138,67 +134,17 @@ def _labels(hypotheses: Sequence[Hypothesis]) -> list[str]:
     return labels
 
 
-def _row(label: str, job: Job, climbed: Climbed, walked: Walked) -> Row:
-    spent = [e for e in (climbed.nested, walked.bridge) if e is not None]
-    return Row(
-        label=label,
-        hypothesis=job.hypothesis,
-        evidence=_evidence(climbed, walked),
-        loo=walked.loo,
-        rest=walked.rest,
-        prior_mass=climbed.mass,
-        posterior_probability=None,
-        widths=walked.widths,
-        modes=walked.modes,
-        run=walked.run,
-        evaluations=walked.evaluations + sum(e.evaluations for e in spent),
-        seconds=walked.seconds + sum(e.seconds for e in spent),
-        notes=walked.notes,
-        reason=climbed.reason or walked.reason,
-    )
-
-
-def _evidence(climbed: Climbed, walked: Walked) -> Evidence | None:
-    if climbed.nested is None or walked.bridge is None:
-        return None
-    return together({NESTED: climbed.nested, BRIDGE: walked.bridge}, climbed.mass)
-
-
-def _by_chance(climbed: Climbed, walked: Walked) -> bool:
-    """Whether the estimators differ by so much that another look is worth while, and by no more than chance can do."""
-    if climbed.nested is None or walked.bridge is None:
-        return False
-    joint = float(np.hypot(climbed.nested.sd, walked.bridge.sd))
-    return SIGMAS * joint < abs(climbed.nested.log_evidence - walked.bridge.log_evidence) < 2 * SIGMAS * joint
-
-
 # ---- on the cores there are ------------------------------------------------------------------------------------------
 
 Submit = Callable[[Callable[[Job, Tell], Any], Job], "Future[Any]"]
 
 
 def _rows(jobs: Mapping[Key, Job], submit: Submit) -> dict[Key, Row]:
-    """Both parts of every job; they know nothing of each other and run wherever a core is free."""
-    waiting: dict[Future[Any], tuple[str, Key]] = {}
-    for key in sorted(jobs, key=lambda k: _place(jobs[k].hypothesis)):
-        waiting[submit(walk, jobs[key])] = "walk", key
-        waiting[submit(climb, jobs[key])] = "climb", key
-    climbed: dict[Key, Climbed] = {}
-    walked: dict[Key, Walked] = {}
-    again: dict[Key, Future[Any]] = {}
-    for done in as_completed(waiting):
-        part, key = waiting[done]
-        if part == "walk":
-            walked[key] = done.result()
-        else:
-            climbed[key] = done.result()
-        if key in walked and key in climbed and _by_chance(climbed[key], walked[key]):
-            again[key] = submit(climb_again, jobs[key])
-    for key, more in again.items():
-        first = climbed[key].nested
-        assert first is not None
-        climbed[key] = replace(climbed[key], nested=averaged(first, more.result()))
-    return {key: _row(key[1], job, climbed[key], walked[key]) for key, job in jobs.items()}
+    """Every job judged, wherever a core is free; its row is called as the hypothesis is."""
+    order = sorted(jobs, key=lambda k: _place(jobs[k].hypothesis))
+    waiting = {submit(judge, jobs[key]): key for key in order}
+    done = {waiting[future]: future.result() for future in as_completed(waiting)}
+    return {key: replace(done[key], label=key[1]) for key in jobs}
 
 
 @contextmanager
@@ -207,7 +153,7 @@ def _workers(count: int, jobs: int, tell: Tell) -> Iterator[Submit]:
     if count == 1:
         yield lambda work, job: _at_once(work, job, tell)
         return
-    with _pool(min(count, 2 * jobs), tell) as (pool, queue):
+    with _pool(min(count, jobs), tell) as (pool, queue):
         yield lambda work, job: pool.submit(_in_worker, work, job, queue)
 
 

@@ -12,7 +12,7 @@ import os
 import tempfile
 import tomllib
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,11 +22,13 @@ import numpy as np
 from bayesmembrane.errors import DataError, SettingsError, StorageError
 from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.inference import storage
+from bayesmembrane.inference.comparison_result import Row
+from bayesmembrane.inference.evidence import BRIDGE, NESTED, SIGMAS, together
 from bayesmembrane.inference.evidence_bridge import bridge
 from bayesmembrane.inference.evidence_convexity import ByMode, by_convexity
 from bayesmembrane.inference.evidence_nested import nested
 from bayesmembrane.inference.evidence_sensitivity import Widened, prior_widths
-from bayesmembrane.inference.evidence_target import Estimate, PosteriorTarget
+from bayesmembrane.inference.evidence_target import Estimate, PosteriorTarget, averaged
 from bayesmembrane.inference.initial import starting_points
 from bayesmembrane.inference.posterior import Posterior
 from bayesmembrane.inference.predictive_comparison import LeaveOneOut, LeaveRangeOut, leave_one_out, leave_range_out
@@ -71,50 +73,69 @@ class Job:
         return Settings(ess=self.ess)
 
 
-@dataclass(frozen=True)
-class Climbed:
-    """What nested sampling says, and the part of the prior that convexity leaves; or why there is none."""
+def judge(job: Job, tell: Tell) -> Row:
+    """All that is to be known of one hypothesis, or why there is nothing.
 
-    nested: Estimate | None
-    mass: Mass | None
-    reason: str
-
-
-@dataclass(frozen=True, eq=False)
-class Walked:
-    """What comes from the posterior draws; or why there are none.
-
-    ``notes`` are sentences that a reader needs; ``run`` is the folder, if it is stored.
+    Raises KeyboardInterrupt once an interrupted run is stored.
     """
-
-    bridge: Estimate | None
-    loo: LeaveOneOut | None
-    rest: LeaveRangeOut | None
-    widths: tuple[Widened, ...]
-    modes: tuple[ByMode, ...]
-    run: Path | None
-    evaluations: int
-    seconds: float
-    notes: tuple[str, ...]
-    reason: str
-
-
-def climb(job: Job, tell: Tell) -> Climbed:
-    """Mass and nested sampling, from nothing but the posterior."""
-    tell(job.label, "prior mass")
+    mass: Mass | None = None
     try:
         posterior = Posterior(job.hypothesis, job.measurement)
+        tell(job.label, "prior mass")
         mass = _mass(posterior, job.seed)
         if mass.value == 0.0:
-            return Climbed(None, mass, _no_mass(job.hypothesis))
-
-        def make() -> dict[str, Any]:
-            return asdict(_nested(posterior, job.seed, lambda text: tell(job.label, text)))
-
-        found = _kept(folder_of(job), "nested", _asked(job)["fingerprint"], make)
+            raise SettingsError(_no_mass(job.hypothesis))
+        return _row(job, posterior, mass, _run(job, tell), tell)
     except (SettingsError, DataError) as error:
-        return Climbed(None, None, str(error))
-    return Climbed(_estimate(found), mass, "")
+        return Row(job.label, job.hypothesis, prior_mass=mass, reason=str(error))
+
+
+def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Row:
+    """What the draws of a run tell, and nested sampling beside it."""
+    key = f"{run.settings['fingerprint']} {run.status['evaluations']}"
+    draws, worth = run.draws(), float(run.status["ess_bulk"])
+
+    def kept(name: str, words: str, make: Callable[[], Any], more: str = "") -> Any:
+        tell(job.label, words)
+        return _kept(run.path, name, f"{key} {more}", make)
+
+    def told(text: str) -> None:
+        tell(job.label, text)
+
+    def climb(seed: int) -> dict[str, Any]:
+        return asdict(_nested(posterior, draws, seed, told))
+
+    bridged = _estimate(kept("bridge", "bridge sampling", lambda: asdict(_bridged(posterior, run, job.seed))))
+    climbed = _estimate(kept("nested", "nested sampling", lambda: climb(job.seed)))
+    if by_chance(climbed, bridged):
+        more = kept("again", "nested sampling, again", lambda: climb(job.seed + AGAIN))
+        climbed = averaged(climbed, _estimate(more))
+    loo = kept("loo", "leave one out", lambda: asdict(leave_one_out(posterior, run.data, job.seed, told)))
+    widths = kept("widths", "prior widths", lambda: _all(prior_widths(posterior, draws, worth, job.seed)))
+    rest, modes = None, []
+    if job.whole is not None:
+        whole = job.whole
+        rest = kept("range", "the rest", lambda: asdict(leave_range_out(posterior, draws, whole)), whole.data_hash)
+    if job.modes:
+        modes = kept("modes", "convexity modes", lambda: _all(_modes(posterior, run, bridged, job.seed)))
+    return Row(
+        label=job.label,
+        hypothesis=job.hypothesis,
+        evidence=together({NESTED: climbed, BRIDGE: bridged}, mass),
+        loo=LeaveOneOut(**_arrays(loo, "pointwise", "pareto_k"), refitted=tuple(loo["refitted"])),
+        rest=None if rest is None else LeaveRangeOut(**_arrays(rest, "deflection", "predicted", "sd")),
+        prior_mass=mass,
+        widths=tuple(Widened(**_numbers(w)) for w in widths),
+        modes=tuple(ByMode(**m) for m in modes),
+        run=run.path,
+        evaluations=int(run.status["evaluations"]) + climbed.evaluations + bridged.evaluations,
+        seconds=float(run.status["seconds"]) + climbed.seconds + bridged.seconds,
+        notes=tuple(run.status["sentences"]),
+    )
+
+
+def _all(found: Sequence[Any]) -> list[dict[str, Any]]:
+    return [asdict(each) for each in found]
 
 
 def _mass(posterior: Posterior, seed: int) -> Mass:
@@ -128,32 +149,6 @@ def _mass(posterior: Posterior, seed: int) -> Mass:
     return Mass(part, float(np.sqrt(part * (1 - part) / DRAWS)) if hits else 1 / DRAWS)
 
 
-def _nested(posterior: Posterior, seed: int, tell: Callable[[str], None]) -> Estimate:
-    """Nested sampling that begins around every valley that a descent from prior draws finds."""
-    rng = np.random.default_rng([seed, 7])
-    starts = starting_points(posterior, rng, 2, STARTS, Counter()).reshape(-1, posterior.size)
-    tolerance = NESTED_SD if posterior.size <= FEW else NESTED_SD_MANY
-    return nested(PosteriorTarget(posterior), seed, tolerance, tell, starts)
-
-
-def climb_again(job: Job, tell: Tell) -> Estimate:
-    """Nested sampling with another seed."""
-    posterior = Posterior(job.hypothesis, job.measurement)
-
-    def make() -> dict[str, Any]:
-        return asdict(_nested(posterior, job.seed + AGAIN, lambda text: tell(job.label, f"again: {text}")))
-
-    return _estimate(_kept(folder_of(job), "again", _asked(job)["fingerprint"], make))
-
-
-def walk(job: Job, tell: Tell) -> Walked:
-    """The run, and everything that its draws tell. Raises KeyboardInterrupt once an interrupted run is stored."""
-    try:
-        return _from_draws(job, _run(job, tell), tell)
-    except (SettingsError, DataError) as error:
-        return Walked(None, None, None, (), (), None, 0, 0.0, (), str(error))
-
-
 def _no_mass(hypothesis: Hypothesis) -> str:
     return (
         f'The convexity prior "{hypothesis.convexity}" leaves none of the prior draws of {hypothesis.label()}, so that '
@@ -161,38 +156,18 @@ def _no_mass(hypothesis: Hypothesis) -> str:
     )
 
 
-def _from_draws(job: Job, run: Run, tell: Tell) -> Walked:
-    posterior = Posterior(job.hypothesis, job.measurement)
-    key = f"{run.settings['fingerprint']} {run.status['evaluations']}"
-    draws, worth = run.draws(), float(run.status["ess_bulk"])
+def _nested(posterior: Posterior, draws: Array, seed: int, tell: Callable[[str], None]) -> Estimate:
+    """Nested sampling that begins around the draws, and around every valley that a descent from prior draws finds."""
+    rng = np.random.default_rng([seed, 7])
+    starts = starting_points(posterior, rng, 2, STARTS, Counter()).reshape(-1, posterior.size)
+    tolerance = NESTED_SD if posterior.size <= FEW else NESTED_SD_MANY
+    return nested(PosteriorTarget(posterior), seed, tolerance, tell, (draws, starts))
 
-    def kept(name: str, words: str, make: Callable[[], Any], more: str = "") -> Any:
-        tell(job.label, words)
-        return _kept(run.path, name, f"{key} {more}", make)
 
-    found = kept("bridge", "bridge sampling", lambda: asdict(_bridged(posterior, run, job.seed)))
-    told = lambda text: tell(job.label, text)  # noqa: E731 - too short for a name
-    loo = kept("loo", "leave one out", lambda: asdict(leave_one_out(posterior, run.data, job.seed, told)))
-    widths = kept("widths", "prior widths", lambda: [asdict(w) for w in _widths(posterior, draws, worth, job.seed)])
-    rest = None
-    if job.whole is not None:
-        whole = job.whole
-        rest = kept("range", "the rest", lambda: asdict(leave_range_out(posterior, draws, whole)), whole.data_hash)
-    modes = []
-    if job.modes:
-        modes = kept("modes", "convexity modes", lambda: _modes(posterior, run, _estimate(found), job.seed))
-    return Walked(
-        bridge=_estimate(found),
-        loo=LeaveOneOut(**_arrays(loo, "pointwise", "pareto_k"), refitted=tuple(loo["refitted"])),
-        rest=None if rest is None else LeaveRangeOut(**_arrays(rest, "deflection", "predicted", "sd")),
-        widths=tuple(Widened(**_numbers(w)) for w in widths),
-        modes=tuple(ByMode(**m) for m in modes),
-        run=run.path,
-        evaluations=int(run.status["evaluations"]),
-        seconds=float(run.status["seconds"]),
-        notes=tuple(run.status["sentences"]),
-        reason="",
-    )
+def by_chance(climbed: Estimate, bridged: Estimate) -> bool:
+    """Whether the estimators differ by so much that another look is worth while, and by no more than chance can do."""
+    joint = float(np.hypot(climbed.sd, bridged.sd))
+    return SIGMAS * joint < abs(climbed.log_evidence - bridged.log_evidence) < 2 * SIGMAS * joint
 
 
 def _run(job: Job, tell: Tell) -> Run:
@@ -222,14 +197,9 @@ def _bridged(posterior: Posterior, run: Run, seed: int) -> Estimate:
     )
 
 
-def _widths(posterior: Posterior, draws: Array, worth: float, seed: int) -> tuple[Widened, ...]:
-    return prior_widths(posterior, draws, worth, seed)
-
-
-def _modes(posterior: Posterior, run: Run, found: Estimate, seed: int) -> list[dict[str, Any]]:
+def _modes(posterior: Posterior, run: Run, found: Estimate, seed: int) -> tuple[ByMode, ...]:
     masses = {mode: Mass(m["value"], m["sd"]) for mode, m in run.status["prior_mass"].items()}
-    rows = by_convexity(posterior, run.draws(), found.log_evidence, found.sd, masses, seed)
-    return [asdict(row) for row in rows]
+    return by_convexity(posterior, run.draws(), found.log_evidence, found.sd, masses, seed)
 
 
 # ---- kept beside the run ---------------------------------------------------------------------------------------------

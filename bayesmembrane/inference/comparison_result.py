@@ -39,18 +39,18 @@ class Row:
 
     label: str
     hypothesis: Hypothesis
-    evidence: Evidence | None
-    loo: LeaveOneOut | None
-    rest: LeaveRangeOut | None
-    prior_mass: Mass | None
-    posterior_probability: float | None
-    widths: tuple[Widened, ...]
-    modes: tuple[ByMode, ...]
-    run: Path | None
-    evaluations: int
-    seconds: float
-    notes: tuple[str, ...]
-    reason: str
+    evidence: Evidence | None = None
+    loo: LeaveOneOut | None = None
+    rest: LeaveRangeOut | None = None
+    prior_mass: Mass | None = None
+    posterior_probability: float | None = None
+    widths: tuple[Widened, ...] = ()
+    modes: tuple[ByMode, ...] = ()
+    run: Path | None = None
+    evaluations: int = 0
+    seconds: float = 0.0
+    notes: tuple[str, ...] = ()
+    reason: str = ""
 
     @property
     def fitted(self) -> bool:

@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.hypothesis import CONVEXITY
 from bayesmembrane.inference.initial import starting_points
-from bayesmembrane.inference.mixture import Mixture, fit_mixture, widened
+from bayesmembrane.inference.mixture import Mixture, around
 from bayesmembrane.inference.posterior import Posterior
 from bayesmembrane.inference.prior import Mass
 from bayesmembrane.parameters import Array
@@ -68,7 +68,7 @@ def by_convexity(
         starts = starting_points(free, rng, 2, STARTS, Counter()).reshape(-1, free.size)
     except SettingsError:
         starts = first[:0]
-    found = _adapted(free, _around(np.concatenate([first, starts]), rng), "none", ROUNDS, rng)
+    found = _adapted(free, around(np.concatenate([first, starts]), rng), "none", ROUNDS, rng)
     rows = []
     for mode in CONVEXITY:
         part = found if found.ess(mode) >= LEAST_ESS else _again(free, found, mode, rng)
@@ -131,7 +131,7 @@ def _adapted(free: Posterior, g: Mixture, mode: str, rounds: int, rng: np.random
         found = _weigh(free, g, EACH, rng)
         if found.ess(mode) < free.size + 2:
             break
-        g = _around(found.resampled(mode, EACH, rng), rng)
+        g = around(found.resampled(mode, EACH, rng), rng)
     return _weigh(free, g, LAST, rng)
 
 
@@ -139,11 +139,7 @@ def _again(free: Posterior, found: _Weighted, mode: str, rng: np.random.Generato
     """Draws around those few that meet ``mode``, if there are enough to begin with."""
     if found.ess(mode) < free.size + 2:
         return found
-    return _adapted(free, _around(found.resampled(mode, EACH, rng), rng), mode, 2, rng)
-
-
-def _around(x: Array, rng: np.random.Generator) -> Mixture:
-    return widened(fit_mixture(x + 1e-3 * np.std(x, axis=0) * rng.standard_normal(x.shape), rng), x)
+    return _adapted(free, around(found.resampled(mode, EACH, rng), rng), mode, 2, rng)
 
 
 def _row(own: str, mode: str, found: _Weighted, part: _Weighted, log_evidence: float, sd: float, mass: Mass) -> ByMode:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,25 +11,25 @@ import numpy as np
 from dynesty import NestedSampler
 from dynesty.bounding import UnitCube
 from dynesty.internal_samplers import InternalSampler, SamplerReturn, tune_slice
-from scipy.special import gammaln, logsumexp, stdtrit
+from scipy.special import logsumexp
 
 from bayesmembrane.errors import SettingsError
+from bayesmembrane.inference.evidence_closer import Closer
 from bayesmembrane.inference.evidence_target import Estimate, Problem, Target
 from bayesmembrane.parameters import Array
 
 PILOT_LIVE, PILOT_PER_DIMENSION = 150, 30
 LEAST_LIVE, PER_DIMENSION, MOST_LIVE = 80, 15, 4000
 TOLERANCE = 0.13
-WIDER, DEGREES = 1.4, 3.0  # how much broader than the posterior the later runs begin, and with which tails
-LOG_NORM = float(gammaln(0.5 * (DEGREES + 1)) - gammaln(0.5 * DEGREES) - 0.5 * np.log(np.pi * DEGREES))
 PILOTS, THEN, MOST_RUNS = 2, 1, 12
-REMAINING = 0.2  # ln Z that may be left in the live points when they are added
+REMAINING, NEAR = 0.2, 1.0  # ln Z that may be left in the live points when they are added: from the prior, and from q
 QUEUE = 0.25  # of the live points are proposed at once: those that fall behind meanwhile are lost
 SHRINK = 0.3  # of ln(volume) between two fits of the bounds
 SLICES = 5  # for each dimension (W. J. Handley et al., MNRAS 453 (2015) 4384)
 PER_SLICE = 5.5  # evaluations that a slice takes
 PAUSE = 20  # batches of slices before rejection is tried again
 LARGEST, SMALLEST = 512, 16  # batch
+COPIES = 3  # draws from weighted points for each that they are worth
 MOST_CUTS = 100  # of an interval, after which the start is kept: below that lies round-off
 
 Tell = Callable[[str], None]
@@ -40,7 +40,7 @@ def nested(
     seed: int,
     tolerance: float = TOLERANCE,
     tell: Tell | None = None,
-    around: Array | None = None,
+    around: Sequence[Array] | None = None,
 ) -> Estimate:
     """ln Z = ln of the integral of L dX over the prior volume X, by live points that climb the likelihood.
 
@@ -51,8 +51,8 @@ def nested(
     points has the error sqrt(H / N) for information H; their mean weighs them by it, and its error is inflated by the
     root of chi^2 / (R - 1) of R runs where that is above 1.
 
-    Where points (n, k) ``around`` all of the posterior are known, however roughly, q is made of them, and nothing
-    climbs from the prior. Any q gives the same Z; one that leaves out a mode makes it unlikely to be found.
+    Where points (n, k) ``around`` all of the posterior are known, q is made of them, and nothing climbs from the prior:
+    draws of it first, then places that draws may have missed.
 
     Each run replaces its worst live point by one drawn from the prior above its likelihood: uniformly from ellipsoids
     around the live points (bounds enlarged by bootstrap) while that is efficient, by random slices otherwise.
@@ -62,22 +62,19 @@ def nested(
     J. Skilling, Bayesian Anal. 1 (2006) 833; F. Feroz, M. P. Hobson, M. Bridges, MNRAS 398 (2009) 1601; J. S. Speagle,
     MNRAS 493 (2020) 3132. Raises `SettingsError` if prior and likelihood nowhere meet.
     """
-    problem = Problem(target)
+    problem, own = Problem(target), np.random.default_rng([seed, 8])
     rngs = np.random.default_rng([seed, 5]).spawn(MOST_RUNS)
     found: list[_Run] = []
     if around is None:
         from_prior = max(PILOT_LIVE, PILOT_PER_DIMENSION * problem.size)
-        found = [_run(problem, from_prior, rng) for rng in rngs[:PILOTS]]
-        closer = _Closer(
-            problem, *(np.concatenate(part) for part in zip(*((r.x, r.weight) for r in found), strict=True))
-        )
-    else:
-        closer = _Closer(problem, around, np.ones(len(around)))
+        found = [_run(problem, from_prior, rng, REMAINING) for rng in rngs[:PILOTS]]
+        around = [np.concatenate([r.drawn(own) for r in found])]
+    near = Closer(problem, around, own)
     live = max(LEAST_LIVE, PER_DIMENSION * problem.size)
     for i, rng in enumerate(rngs[PILOTS:]):
         if i > 0:  # the first tells what it takes
             live = _needed(found, live, tolerance)
-        found.append(_run(closer, live, rng))
+        found.append(_run(near, live, rng, NEAR))
         value, sd = _together(found)
         if tell is not None:
             tell(f"nested sampling, run {len(found)}: {value:.2f} +- {sd:.2f}")
@@ -94,6 +91,11 @@ class _Run:
     sd: float
     x: Array
     weight: Array
+
+    def drawn(self, rng: np.random.Generator) -> Array:
+        """Points (n, k) of the posterior, each at most once: as many as the weights are worth, or a few times that."""
+        count = int(COPIES / np.sum(self.weight**2))
+        return np.asarray(self.x[np.unique(rng.choice(len(self.x), count, p=self.weight))])
 
 
 def _needed(found: list[_Run], live: int, tolerance: float) -> int:
@@ -112,32 +114,8 @@ def _together(found: list[_Run]) -> tuple[float, float]:
     return mean, float(np.sqrt(max(1.0, scatter) / np.sum(w)))
 
 
-class _Closer(Problem):
-    """The same integral with q in the place of the prior and L p0 / q in that of the likelihood.
-
-    q(x) = prod_i t(z_i) / |R| with z = R^-1 (x - m): m and R R^T are the mean and the enlarged covariance of x (n, k).
-    """
-
-    def __init__(self, problem: Problem, x: Array, weight: Array) -> None:
-        self.target, self.problem = problem.target, problem
-        w = weight / np.sum(weight)
-        self.mean = w @ x
-        d = x - self.mean
-        scale = np.maximum(np.sqrt(w @ (d * d)), 1e-12 * np.maximum(np.abs(self.mean), 1e-100))
-        covariance = (d / scale).T @ (w[:, None] * (d / scale))
-        values, vectors = np.linalg.eigh(covariance)
-        self.root = WIDER * scale[:, None] * vectors * np.sqrt(np.maximum(values, 1e-10))
-        self.log_volume = float(np.linalg.slogdet(self.root)[1])
-
-    def from_cube(self, u: Array) -> tuple[Array, Array]:
-        z = stdtrit(DEGREES, np.clip(u, 1e-15, 1 - 1e-15))
-        x = np.asarray(self.mean + z @ self.root.T)
-        log_q = np.sum(LOG_NORM - 0.5 * (DEGREES + 1) * np.log1p(z * z / DEGREES), axis=1) - self.log_volume
-        return x, self.problem.log_posterior(x) - log_q
-
-
-def _run(problem: Problem, live: int, rng: np.random.Generator) -> _Run:
-    """One run with ``live`` points."""
+def _run(problem: Problem, live: int, rng: np.random.Generator, remaining: float) -> _Run:
+    """One run with ``live`` points, until at most ``remaining`` of ln Z is in them."""
     start = problem.prior_draws(rng, live)
     points = [start.u[:live], start.x[:live], start.log_likelihood[:live].copy()]
     if np.ptp(points[2]) == 0:
@@ -162,12 +140,14 @@ def _run(problem: Problem, live: int, rng: np.random.Generator) -> _Run:
             queue_size=queue,
             use_pool={"prior_transform": False, "loglikelihood": False, "propose_point": True, "update_bound": False},
         )
-        sampler.run_nested(dlogz=REMAINING, print_progress=False, save_bounds=False)
+        sampler.run_nested(dlogz=remaining, print_progress=False, save_bounds=False)
     r = sampler.results
     information = float(r.information[-1])
     value = float(r.logz[-1] + np.log(start.part) - 0.5 * information / live)
     weight = np.exp(r.logwt - logsumexp(r.logwt))
-    return _Run(value, float(np.hypot(r.logzerr[-1], start.log_part_sd)), np.asarray(r.samples), weight)
+    # The square of dynesty's own error is up to twice too large: it takes the last live points for runs of their own.
+    sd = float(np.hypot(np.sqrt(information / live), start.log_part_sd))
+    return _Run(value, sd, np.asarray(r.samples), weight)
 
 
 def _never(_: Array) -> Any:
@@ -328,7 +308,7 @@ class _Proposals:
 
 def _uniform(bound: Any, count: int, rng: np.random.Generator, k: int) -> Array:
     """At most ``count`` points (n, k), uniform in the part of the bound that lies in the unit cube."""
-    if isinstance(bound, UnitCube):
+    if isinstance(bound, UnitCube) or logsumexp(bound.logvol_ells) > 0:
         return rng.random((count, k))
     share = np.exp(bound.logvol_ells - np.max(bound.logvol_ells))
     which = rng.choice(len(share), size=count, p=share / np.sum(share))

@@ -110,6 +110,11 @@ def widened(g: Mixture, x: Array, share: float = 0.1, factor: float = 2.0) -> Mi
     return Mixture(weights, np.vstack([g.means, centre]), roots, min(g.degrees, 10.0))
 
 
+def around(x: Array, rng: np.random.Generator) -> Mixture:
+    """`widened` mixture for draws x (n, k) some of which may be the same."""
+    return widened(fit_mixture(x + 1e-3 * np.std(x, axis=0) * rng.standard_normal(x.shape), rng), x)
+
+
 def _whitening(x: Array) -> tuple[Array, Array]:
     """(mean (k,), root R (k, k)) with R R^T the covariance of x (n, k)."""
     scale = np.maximum(np.std(x, axis=0), 1e-300)

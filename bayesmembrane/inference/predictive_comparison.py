@@ -14,20 +14,14 @@ from scipy.special import logsumexp
 
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.forward import Forward, Solve
-from bayesmembrane.inference.evidence_population import led
-from bayesmembrane.inference.mixture import Mixture, fit_mixture
 from bayesmembrane.inference.posterior import Posterior
+from bayesmembrane.inference.predictive_pool import Pool
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.mechanics import api
 from bayesmembrane.noise.base import force_scale
 from bayesmembrane.parameters import Array
 
 PARETO_K = 0.7
-REFITTED, PARTS = 600, 4
-TRUSTED = 20.0  # effective draws of the other points' posterior; with fewer, draws are led there
-LEARN_FROM, BRIDGED = 2000, 30
-SPREAD, HEAVY = 1.3, 5.0  # how much wider than the posterior's the other density is, and its degrees of freedom
-FEW = 20  # draws; a mean over fewer says little
 
 Tell = Callable[[str], None]
 
@@ -44,7 +38,7 @@ class LeaveOneOut:
     elpd, se : the sum, and its standard error sqrt(N var_i) over the points
     monte_carlo_sd : what the draws add to that
     pointwise : (N,) the terms
-    pareto_k : (N,) shape of the tail of the importance weights; above 0.7 the term comes from an exact refit
+    pareto_k : (N,) shape of the tail of the importance weights; above 0.7 the term comes from further draws
     refitted : indices of those points
     """
 
@@ -61,14 +55,14 @@ def leave_one_out(posterior: Posterior, data: Any, seed: int = 0, tell: Tell | N
 
     ``data`` is the InferenceData of a run of ``posterior``: its pointwise terms are ln p(y_i | y_-i, x) under the whole
     covariance, so that p(x | y) / p(y_i | y_-i, x) is what the other points say of x, whatever the correlation. Pareto
-    smoothed importance sampling uses that; where its k exceeds 0.7, draws of a wider density are added, and where that
-    does not do either, draws are led to the posterior of the other points and moved there.
+    smoothed importance sampling uses that; where its k exceeds 0.7, draws of densities that are led to the posterior of
+    the other points are added (`Pool`).
 
     A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413; P.-C. Bürkner, J. Gabry, A. Vehtari, Comput. Stat. 36
     (2021) 1243.
     """
     with warnings.catch_warnings():
-        # arviz warns of large k; those points are refitted.
+        # arviz warns of large k; those points get draws of their own.
         warnings.simplefilter("ignore")
         found = arviz.loo(data, pointwise=True, var_name="force", scale="log")  # type: ignore[no-untyped-call]
     terms, k = found.loo_i.values.astype(float).copy(), found.pareto_k.values.astype(float)
@@ -78,14 +72,12 @@ def leave_one_out(posterior: Posterior, data: Any, seed: int = 0, tell: Tell | N
     rng = np.random.default_rng([seed, 2])
     bad = np.flatnonzero(~(k <= PARETO_K))
     log_posterior = data.sample_stats["lp"].values.ravel().astype(float)
-    wide = _Wide(posterior, draws, log_posterior, log_likelihood, rng) if bad.size else None
+    pool = Pool(posterior, draws, log_posterior, log_likelihood, rng) if bad.size else None
     for i in bad:
         if tell is not None:
             tell(f"leaving out point {i + 1} of {len(terms)}")
-        assert wide is not None
-        terms[i], error[i], effective = wide.without(int(i))
-        if effective < TRUSTED:
-            terms[i], error[i] = _refitted(posterior, draws, int(i), rng)
+        assert pool is not None
+        terms[i], error[i], _ = pool.without(int(i))
     return LeaveOneOut(
         elpd=float(np.sum(terms)),
         se=float(np.sqrt(len(terms) * np.var(terms))),
@@ -100,68 +92,6 @@ def _smoothed_error(log_likelihood: Array) -> float:
     """Monte Carlo error of one term, from the spread of the raw weights 1 / p(y_i | ...)."""
     w = np.exp(np.min(log_likelihood) - log_likelihood)
     return float(np.sqrt(np.var(w) / len(w)) / np.mean(w))
-
-
-class _Wide:
-    """Draws of the posterior and of a wider density together, weighed as one mixture: enough for any one point less.
-
-    With as many draws from each, the weight of x for a density p_i is p_i / (p / 2 Z + g / 2), bounded where either
-    covers p_i (E. Veach, L. J. Guibas, SIGGRAPH 1995, 419: the balance heuristic).
-    """
-
-    def __init__(
-        self, posterior: Posterior, draws: Array, log_posterior: Array, terms: Array, rng: np.random.Generator
-    ) -> None:
-        some = rng.permutation(len(draws))
-        g = _spread(fit_mixture(draws[some[:LEARN_FROM]], rng))
-        x = g.draw(rng, len(draws))
-        e = posterior.evaluate(x)
-        good = np.isfinite(e.log_posterior)
-        more = np.zeros((len(x), terms.shape[1]))
-        if np.any(good):
-            more[good] = posterior.pointwise(x[good], e.force[good])
-        self.terms = np.concatenate([terms, more])
-        self.log_p = np.concatenate([log_posterior, np.where(good, e.log_posterior, -np.inf)])
-        log_g = np.concatenate([g.log_density(draws), g.log_density(x)])
-        log_z = 0.0
-        for _ in range(BRIDGED):
-            # Meng & Wong's iteration, for as many draws of one as of the other.
-            self.log_q = np.logaddexp(self.log_p - log_z, log_g) - np.log(2.0)
-            log_z = float(logsumexp(self.log_p - self.log_q) - np.log(len(self.log_p)))
-
-    def without(self, i: int) -> tuple[float, float, float]:
-        """(ln p(y_i | y_-i), its Monte Carlo error, effective number of draws) with p(x | y_-i) ~ p(x | y) / term_i."""
-        a, b = self.log_p - self.log_q, self.log_p - self.terms[:, i] - self.log_q
-        wa, wb = np.exp(a - np.max(a)), np.exp(b - np.max(b))
-        value = float(logsumexp(a) - logsumexp(b))
-        ratio = wa / np.mean(wa) - wb / np.mean(wb)
-        return value, float(np.std(ratio) / np.sqrt(len(ratio))), float(np.sum(wb) ** 2 / np.sum(wb * wb))
-
-
-def _spread(g: Mixture) -> Mixture:
-    return Mixture(g.log_weights, g.means, SPREAD * g.roots, min(g.degrees, HEAVY))
-
-
-def _refitted(posterior: Posterior, draws: Array, i: int, rng: np.random.Generator) -> tuple[float, float]:
-    """(ln p(y_i | y_-i), its Monte Carlo error) from draws that are led to p(x | y) / p(y_i | y_-i, x).
-
-    The ratio of the normalisations of these two is 1 / p(y_i | y_-i), and stepping stones between them find it even
-    where the point lies so far out that hardly any draw of the other points' posterior foresees it.
-    """
-
-    def terms(x: Array) -> tuple[Array, Array]:
-        e = posterior.evaluate(x)
-        possible = np.isfinite(e.log_posterior)
-        added = np.full(len(x), -np.inf)
-        if np.any(possible):
-            added[possible] = -posterior.pointwise(x[possible], e.force[possible])[:, i]
-        return e.log_posterior, added
-
-    start = draws[rng.choice(len(draws), min(REFITTED, len(draws)), replace=False)]
-    log_ratio = np.array([led(terms, start[i::PARTS], rng, 1).log_ratio for i in range(PARTS)])
-    # Each ratio is right in the mean, not its logarithm.
-    value = -float(logsumexp(log_ratio) - np.log(PARTS))
-    return value, float(np.std(log_ratio, ddof=1) / np.sqrt(PARTS))
 
 
 # ---- leave the rest of the range out ---------------------------------------------------------------------------------

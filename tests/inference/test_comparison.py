@@ -1,6 +1,7 @@
 """Hypotheses side by side: rows, ranking, words, and what is stored and used again."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -8,9 +9,8 @@ import pytest
 
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.hypothesis import hypothesis
-from bayesmembrane.inference import comparison, comparison_jobs
+from bayesmembrane.inference import comparison_jobs
 from bayesmembrane.inference.comparison import claimed, compare, ranges_of
-from bayesmembrane.inference.comparison_jobs import Climbed, Walked
 from bayesmembrane.inference.comparison_result import Row, ranked
 from bayesmembrane.inference.evidence import BRIDGE, NESTED, together
 from bayesmembrane.inference.evidence_sensitivity import Widened
@@ -143,7 +143,7 @@ def row(label: str, z: float, elpd: float, sd: float = 0.1, off: float = 0.0) ->
     points += elpd / 10 - points.mean()
     loo = LeaveOneOut(elpd, 1.0, 0.01, points, np.zeros(10), ())
     pair = {NESTED: Estimate(z + off, sd, 1, 1.0), BRIDGE: Estimate(z, 0.01, 1, 1.0)}
-    return Row(label, hypothesis("gent"), together(pair), loo, None, None, None, (), (), None, 1, 1.0, (), "")
+    return Row(label, hypothesis("gent"), together(pair), loo)
 
 
 def test_no_ranking_without_agreement():
@@ -176,20 +176,24 @@ def test_probabilities_follow_the_evidence():
     assert with_unknown.rows[0].posterior_probability == pytest.approx(rows[0].posterior_probability)
 
 
-def test_another_look_is_taken_where_chance_may_have_parted_the_estimators(monkeypatch):
+def test_another_look_is_taken_where_chance_may_have_parted_the_estimators(compared, monkeypatch, tmp_path):
     """Nested sampling that is off by three of its errors is repeated, and both are averaged."""
-    once = Estimate(-10.3, 0.1, 5, 1.0, (-10.3,))
-    monkeypatch.setattr(
-        comparison_jobs, "_nested", lambda posterior, seed, tell: Estimate(-10.0, 0.1, 7, 1.0, (-10.0,))
-    )
-    monkeypatch.setattr(comparison, "climb", lambda job, tell: Climbed(once, Mass(1.0, 0.0), ""))
-    known = Walked(Estimate(-10.0, 0.01, 1, 1.0), None, None, (), (), None, 1, 1.0, (), "")
-    monkeypatch.setattr(comparison, "walk", lambda job, tell: known)
-    (row_,) = compare(film(), [hypothesis("gent")], out=None, workers=1).rows
+    _, out, _, claims, whole = compared
+    shutil.copytree(out, tmp_path / "chains")
+    for name in ("nested", "bridge"):
+        for stored in (tmp_path / "chains").glob(f"*/{name}.json"):
+            stored.unlink()
+    looks = [Estimate(-10.3, 0.1, 5, 1.0, (-10.3,)), Estimate(-10.0, 0.1, 7, 1.0, (-10.0,))]
+    monkeypatch.setattr(comparison_jobs, "_nested", lambda *_: looks.pop(0))
+    monkeypatch.setattr(comparison_jobs, "_bridged", lambda *_: Estimate(-10.0, 0.01, 1, 1.0))
+    monkeypatch.setattr(comparison_jobs, "_mass", lambda *_: Mass(1.0, 0.0))
+    part = whole.up_to(0.049)
+    (row_,) = compare(part, claims[1:], 402, out=tmp_path / "chains", ess=300, modes=False, workers=1).rows
     assert row_.evidence.log_evidence[NESTED] == pytest.approx(-10.15)
     assert row_.evidence.log_evidence_sd[NESTED] == pytest.approx(0.15, abs=0.001)
     assert row_.evidence.evaluations[NESTED] == 12
     assert row_.evidence.agreed
+    assert looks == []
 
 
 def test_the_ranking_is_said_to_survive_other_priors_or_not():
