@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
@@ -51,6 +51,13 @@ class Candidate:
     @property
     def label(self) -> str:
         return self.hypothesis.label()
+
+    def slopes_of(self, names: Collection[str]) -> Array:
+        """(N, m) the slopes of the coordinates of these effects."""
+        sizes = [len(e.coordinates) for e in self.hypothesis.effects]
+        owner = np.repeat(self.names, sizes) if sizes else np.empty(0, dtype=str)
+        start = self.hypothesis.material_size
+        return self.slopes[:, start : start + owner.size][:, np.isin(owner, list(names))]
 
     @cached_property
     def parameters(self) -> dict[str, float]:

@@ -30,7 +30,7 @@ from bayesmembrane.diagnosis.trace import (
     effective_weight,
     ranked,
 )
-from bayesmembrane.diagnosis.whitening import OwnNoise, own_noise
+from bayesmembrane.diagnosis.whitening import OwnNoise, orthonormal, own_noise
 from bayesmembrane.diagnosis.wording import form_sentence, noise_sentence, sentence_of
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.forward import Solve
@@ -312,7 +312,12 @@ def _rivals(tracer: Tracer, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
 
 def _decisive(tracer: Tracer, a: Judged, b: Judged) -> float:
     """ln of the Bayes factor that sets two candidates apart: more where their traces, as fitted, look alike."""
-    degrees = angle(_trace(tracer, a.candidate), _trace(tracer, b.candidate), fold=False)
+    shared = set(a.candidate.names) & set(b.candidate.names)
+    # What two pairs have in common tells nothing of what sets them apart.
+    common = orthonormal(tracer.search.noise.white(a.candidate.slopes_of(shared)))
+    traces = (_trace(tracer, c.candidate) for c in (a, b))
+    one, two = (t - common @ (common.T @ t) for t in traces)
+    degrees = angle(one, two, fold=False)
     return next((needed for nearer, needed in LOOKALIKES if degrees < nearer), DECISIVE)
 
 
