@@ -120,6 +120,13 @@ class Search:
         white = np.moveaxis(white, 0, 1)
         return white[:, :, 0], white[:, :, 1:]
 
+    def covariance(self, candidate: Candidate) -> Array:
+        """(k, k) of the coordinates about a fit of this search, by Laplace's approximation."""
+        _, spread = prior_moments(candidate.hypothesis)
+        white = np.sqrt(self.weight) * self.noise.white(candidate.slopes)
+        scaled = np.eye(spread.size) + spread[:, None] * (white.T @ white) * spread
+        return np.asarray(spread[:, None] * np.linalg.inv(scaled) * spread)
+
     def _candidate(self, objective: Objective, x: Array, size: float) -> Candidate:
         hypothesis = objective.hypothesis
         r, j = objective.batch(x[None, :])

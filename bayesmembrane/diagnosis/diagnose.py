@@ -18,6 +18,7 @@ from bayesmembrane.diagnosis.scores import Signature, angle, signatures, smalles
 from bayesmembrane.diagnosis.separation import Experiment, experiments
 from bayesmembrane.diagnosis.sudden import Step, sudden
 from bayesmembrane.diagnosis.trace import (
+    ALLOWED,
     DECISIVE,
     EARNED_SHARE,
     EARNS,
@@ -128,6 +129,8 @@ class Diagnosis:
                 "heldout_after": None if self.validation is None else asdict(self.validation.after),
                 "heldout": "nothing" if self.validation is None else self.validation.where,
                 "chosen_without_heldout": None if self.validation is None else self.validation.chosen,
+                "heldout_coverage_90_before": None if self.validation is None else self.validation.covered_before,
+                "heldout_coverage_90_after": None if self.validation is None else self.validation.covered_after,
             },
             "noise": {
                 "sd_N": self.noise.sd,
@@ -339,17 +342,25 @@ def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged
         # One moment has all of it: an effect that happens to come then is no better a guess than something foreign.
         return Verdict("ambiguous", rivals, step)
     single_valued = all(tracer.single_valued(j.candidate) for j in rivals)
-    near = bool(energies) and energies[0].log_evidence > rivals[0].log_evidence - ENERGY_DECISIVE
-    if single_valued and energies and (near or rivals[0].candidate.at_bound):
-        # The instrument is blamed only where no energy comes near, and not with an effect that is driven to its bounds.
+    if single_valued and energies and _comes_near(energies[0], rivals[0]):
         return Verdict("material", (energies[0],))
-    if single_valued and len(rivals[0].candidate.names) > 1:
-        if not alone:
-            # Two effects that follow the deflection alone imitate a strain energy that is not among those known.
+    if single_valued and all(j.candidate.x.size > tracer.null.x.size + 1 for j in rivals):
+        if not alone or len(rivals[0].candidate.names) == 1:
+            # Two effects that follow the deflection alone, or one whose law is free, imitate a strain energy that is
+            # not among those known.
             return Verdict("unknown", rivals)
         # One of them is enough, but its form is not the machine's: neither can be told from its look-alikes.
         rivals = (*_rivals(tracer, alone), *rivals)
     return Verdict("named" if len(rivals) == 1 else "ambiguous", rivals)
+
+
+def _comes_near(energy: Judged, effect: Judged) -> bool:
+    """True if an energy explains the curve and an effect that follows the deflection alone is not far beyond it.
+
+    The instrument is blamed only where no energy comes near, and not with an effect that is driven to its bounds.
+    """
+    near = energy.log_evidence > effect.log_evidence - ENERGY_DECISIVE
+    return near or energy.unexplained <= ALLOWED or bool(effect.candidate.at_bound)
 
 
 def _without_effects(tracer: Tracer, others: Sequence[Judged]) -> Verdict:

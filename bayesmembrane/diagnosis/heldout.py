@@ -14,6 +14,7 @@ from bayesmembrane.parameters import Array
 
 BLOCKS, EVERY = 20, 4
 LEAST_POINTS = 12
+Z = 1.6449  # standard deviations to either side of a 90 % band
 
 
 @dataclass(frozen=True)
@@ -64,12 +65,15 @@ class HeldOut:
     where : the points, in words
     before, after : errors there of the plain and of the chosen model, both fitted to the other points
     chosen : label of the most probable of the rivals when these points are left out
+    covered_before, covered_after : part of these points inside the 90 % bands of the two predictions, noise included
     """
 
     where: str
     before: Error
     after: Error
     chosen: str
+    covered_before: float
+    covered_after: float
 
 
 def validate(
@@ -95,10 +99,16 @@ def validate(
         return None
     sd = search.noise.each[mask]
 
-    def predicted(candidate: Candidate) -> Error:
+    def predicted(candidate: Candidate) -> tuple[Error, float]:
+        fit = fits[candidate.label]
         forward = Forward(candidate.hypothesis, whole, whole.deflection, search.solve)
-        force = forward(fits[candidate.label].x[None, :], reached=False).force[0]
-        return error_of(np.nan_to_num(whole.force - force, nan=float(np.max(whole.force)))[mask], sd)
+        new = forward(fit.x[None, :], sensitivities=True, reached=False)
+        assert new.sensitivity is not None
+        residual = np.nan_to_num(whole.force - new.force[0], nan=float(np.max(whole.force)))[mask]
+        slopes = np.nan_to_num(new.sensitivity[0][mask])
+        band = Z * np.sqrt(np.einsum("ni,ij,nj->n", slopes, part.covariance(fit), slopes) + sd**2)
+        return error_of(residual, sd), float(np.mean(np.abs(residual) <= band))
 
     chosen = max(fits, key=lambda label: fits[label].log_evidence)
-    return HeldOut(where, predicted(before), predicted(after), chosen)
+    (first, covered_first), (last, covered_last) = predicted(before), predicted(after)
+    return HeldOut(where, first, last, chosen, covered_first, covered_last)

@@ -24,7 +24,7 @@ from bayesmembrane.measurement import Measurement
 from bayesmembrane.mechanics import api
 from bayesmembrane.noise.ar1 import AR1
 
-MOST_ROUNDS = 3
+MOST_ROUNDS, LEADERS = 3, 3
 BAND = 0.9
 """Part of new readings that a predictive band is to cover."""
 
@@ -66,11 +66,15 @@ class Stage:
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """What was diagnosed, with the posteriors before and after; ``after`` is ``before`` where nothing was added."""
+    """What was diagnosed, with the posteriors before and after; ``after`` is ``before`` where nothing was added.
+
+    leaders : posteriors of the first members of an ambiguous answer, in its order
+    """
 
     diagnosis: Diagnosis
     before: Stage
     after: Stage
+    leaders: tuple[Stage, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """The answer of ``diagnose`` with both posteriors and how the material moved."""
@@ -78,6 +82,7 @@ class Round:
             **self.diagnosis.summary(),
             "before": self.before.summary(),
             "after": self.after.summary(),
+            "leaders": [{"model": s.run.hypothesis.label(), **s.summary()} for s in self.leaders],
             "moved": moved(self.before.run, self.after.run),
         }
 
@@ -120,9 +125,9 @@ def loop(
     """Diagnose, sample, add what is named, and again; every run is stored in the folder ``out``.
 
     A named effect or a better energy makes the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop,
-    and so does a hypothesis that was there before. With ``adapt_noise`` all are sampled with AR(1) noise where the
-    readings turn out to be correlated: white noise would make the posterior too narrow. Raises what `sample` and
-    `diagnose` raise.
+    and so does a hypothesis that was there before. Of an ambiguous answer the first `LEADERS` are sampled. With
+    ``adapt_noise`` all are sampled with AR(1) noise where the readings turn out to be correlated: white noise would
+    make the posterior too narrow. Raises what `sample` and `diagnose` raise.
     """
     say = tell or (lambda _: None)
 
@@ -146,7 +151,9 @@ def loop(
         following = replace(found.hypothesis, noise=noise)
         goes_on = found.verdict in ("named", "material") and following.label() not in seen
         after = staged(following) if goes_on else stage
-        rounds.append(Round(found, stage, after))
+        leaders = found.members[:LEADERS] if found.verdict == "ambiguous" else ()
+        sampled = tuple(staged(replace(j.candidate.hypothesis, noise=noise)) for j in leaders)
+        rounds.append(Round(found, stage, after, sampled))
         if not goes_on or len(rounds) >= most_rounds:
             break
         seen.add(following.label())

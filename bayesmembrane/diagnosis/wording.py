@@ -69,9 +69,11 @@ def sentence_of(
         text = f"{start}this measurement cannot tell which of these it is: {names}{foreign}. {error}{advice} {step}"
         return text.rstrip()
     if members:
-        names = " with ".join(e.title for e in members[0].hypothesis.effects)
+        effects = members[0].hypothesis.effects
+        names = " with ".join(e.title for e in effects)
+        alone = "on this path its free law follows" if len(effects) == 1 else "together they follow"
         return (
-            f"{start}{names} would imitate it, but together they follow the deflection alone, as a strain energy that "
+            f"{start}{names} would imitate it, but {alone} the deflection alone, as a strain energy that "
             f"is not known here would do just as well. No name is given. {shape}"
         )
     nearest = _part(partial, null, shown)

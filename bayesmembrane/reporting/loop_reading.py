@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bayesmembrane.diagnosis.candidates import Candidate
 from bayesmembrane.diagnosis.diagnose import Diagnosis
-from bayesmembrane.diagnosis.heldout import Error
-from bayesmembrane.diagnosis.loop import Loop, Stage
+from bayesmembrane.diagnosis.heldout import Error, error_of
+from bayesmembrane.diagnosis.loop import Loop, Round, Stage
 from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.inference.run import Run
 from bayesmembrane.parameters import Array
@@ -24,7 +24,9 @@ class Model:
     title : material and effects as people say them
     candidate : at its most probable parameters
     error, held_out : in sample; on points that were set aside, with the model fitted to the others, or None
-    stage : its posterior, None if it was not sampled because it was not added
+    stage : its posterior, or None if it was not sampled
+    added : False for what the answer leaves undecided
+    covered : part of the points that were set aside inside the 90 % band of the model fitted to the others, or None
     """
 
     title: str
@@ -32,6 +34,8 @@ class Model:
     error: Error
     held_out: Error | None
     stage: Stage | None
+    added: bool = True
+    covered: float | None = None
 
 
 @dataclass(frozen=True)
@@ -77,14 +81,42 @@ def models(loop: Loop) -> list[Model]:
     out = [_model(d, d.null, d.before, first.before, before=True)]
     for r in loop.rounds:
         d = r.diagnosis
-        if d.best is not d.null and d.verdict in ("named", "material", "ambiguous"):
-            out.append(_model(d, d.best, d.after, r.after if r.after is not r.before else None, before=False))
+        if d.verdict == "ambiguous":
+            out += _undecided(r)
+        elif d.best is not d.null and d.verdict in ("named", "material"):
+            stage = r.after if r.after is not r.before else None
+            out.append(replace(_model(d, d.best, d.after, stage, before=False), added=stage is not None))
     return out
 
 
+def _undecided(r: Round) -> list[Model]:
+    """The members of an ambiguous answer that were sampled, or else the first; only that one was held to new points."""
+    d = r.diagnosis
+    first = replace(_model(d, d.best, d.after, next(iter(r.leaders), None), before=False), added=False)
+    sd = d.noise.each
+    rest = zip(d.members[1:], r.leaders[1:], strict=False)
+    return [
+        first,
+        *(
+            Model(
+                spoken_hypothesis(j.candidate.hypothesis),
+                j.candidate,
+                error_of(j.candidate.residual, sd, j.candidate.x.size),
+                None,
+                stage,
+                added=False,
+            )
+            for j, stage in rest
+        ),
+    ]
+
+
 def _model(d: Diagnosis, candidate: Candidate, error: Error, stage: Stage | None, before: bool) -> Model:
-    held = None if d.validation is None else (d.validation.before if before else d.validation.after)
-    return Model(spoken_hypothesis(candidate.hypothesis), candidate, error, held, stage)
+    v, title = d.validation, spoken_hypothesis(candidate.hypothesis)
+    if v is None:
+        return Model(title, candidate, error, None, stage)
+    held, covered = (v.before, v.covered_before) if before else (v.after, v.covered_after)
+    return Model(title, candidate, error, held, stage, covered=covered)
 
 
 def deciding(loop: Loop) -> Diagnosis:
@@ -100,7 +132,7 @@ def stages(loop: Loop) -> tuple[Stage, Stage]:
 
 def changes(before: Run, after: Run) -> list[Change]:
     """Shear modulus first, then every parameter that either run has, in the order of the later one."""
-    out = [Change("shear modulus", "MPa", _modulus(before), _modulus(after), True)]
+    out = [Change("shear modulus", "MPa", modulus_of(before), modulus_of(after), True)]
     old, new = _posterior(before), _posterior(after)
     nothing = (float("nan"), float("nan"))
     for name in dict.fromkeys([*new, *old]):
@@ -124,7 +156,7 @@ def _posterior(run: Run) -> dict[str, tuple[tuple[float, float], str]]:
     return {n: (_moments(run.data.posterior[n].values), u) for n, u in pairs}
 
 
-def _modulus(run: Run) -> tuple[float, float]:
+def modulus_of(run: Run) -> tuple[float, float]:
     """Mean and standard deviation of G in MPa: the initial slope of the energy over the thickness."""
     material = run.hypothesis.material
     fields = np.stack([run.data.posterior[f"{material.name}.{n}"].values.ravel() for n in material.field_names()])

@@ -12,7 +12,16 @@ from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.separation import CLEAR
 from bayesmembrane.reporting.blocks import Block, Section
 from bayesmembrane.reporting.loop_figures import Place, Residual, discrepancy_picture, residual_picture
-from bayesmembrane.reporting.loop_reading import Change, Model, changes, deciding, models, spoken_hypothesis, stages
+from bayesmembrane.reporting.loop_reading import (
+    Change,
+    Model,
+    changes,
+    deciding,
+    models,
+    modulus_of,
+    spoken_hypothesis,
+    stages,
+)
 from bayesmembrane.reporting.loop_tables import (
     candidate_title,
     confounded_table,
@@ -68,7 +77,7 @@ def _section(found: Loop, number: int) -> Section:
     way = models(found)
     where = "nothing" if first.validation is None else first.validation.where
     blocks = [Block("text", text) for text in answer(found)]
-    told = [*validation_sentences(found), *bound_sentences(found), *moved_sentences(found)]
+    told = [*validation_sentences(found), *bound_sentences(found), *moved_sentences(found), *rival_sentences(found)]
     blocks += [Block("list", lines=tuple(told))] if told else []
     blocks.append(_residuals(found, way))
     blocks += [_table(errors_table(way, where, f"loop errors{end}")), _table(scores_table(way, f"loop scores{end}"))]
@@ -143,6 +152,20 @@ def moved_sentences(found: Loop) -> list[str]:
     return told
 
 
+def rival_sentences(found: Loop) -> list[str]:
+    """What the modulus is under each explanation of an ambiguous answer: whether the choice matters for the film."""
+    last = found.rounds[-1]
+    if not last.leaders:
+        return []
+    every = [(spoken_hypothesis(s.run.hypothesis), modulus_of(s.run)) for s in (last.before, *last.leaders)]
+    values = "; ".join(f"{mean:.4g} +- {sd:.2g} MPa in {name}" for name, (mean, sd) in every)
+    means, sds = np.array([m for _, m in every[1:]]).T
+    apart = float(np.ptp(means))
+    matters = apart > float(np.max(sds))
+    end = "Which of them is right decides the modulus." if matters else "Which of them is right matters little for it."
+    return [f"The shear modulus is {values}. {end}"]
+
+
 def modulus_sentence(c: Change, model: str) -> str:
     """What the change of the modulus means to a user."""
     start = f"In {model} the shear modulus is {c.after[0]:.4g} +- {c.after[1]:.2g} MPa instead of {c.before[0]:.4g}"
@@ -174,8 +197,8 @@ def residual_rows(way: Sequence[Model]) -> list[Residual]:
     rows = [Residual(_row_title("Before", first), first.candidate.residual)] if len(way) > 1 else []
     if not rows:
         return [Residual(_row_title("As given", first), first.candidate.residual)]
-    added = [m for m in way[1:] if m.stage is not None]
-    last = added[-1] if added else way[-1]
+    added = [m for m in way[1:] if m.added]
+    last = added[-1] if added else way[1]
     word = "After" if added else "The first rival, not added"
     return [*rows, Residual(_row_title(word, last), last.candidate.residual)]
 

@@ -28,8 +28,9 @@ def errors_table(found: Sequence[Model], where: str, name: str) -> Table:
         Column("heldout_rmse_mN", "held out: root mean square (mN)", ".3g"),
         Column("heldout_max_mN", "held out: largest (mN)", ".3g"),
         Column("heldout_reduced_chi2", "held out: reduced chi-square", ".3f"),
+        Column("heldout_coverage_90", "held out: inside the 90 % band", "%"),
     )
-    rows = tuple((_labelled(m), *_error(m.error), *_error(m.held_out)) for m in found)
+    rows = tuple((_labelled(m), *_error(m.error), *_error(m.held_out), m.covered) for m in found)
     caption = (
         "Residuals before and after, by the measurement's own noise (a reduced chi-square of 1 is noise alone). Held "
         f"out: {where}; predicted by the model fitted to the other points."
@@ -42,7 +43,7 @@ def _error(error: Error | None) -> tuple[Value, ...]:
 
 
 def _labelled(model: Model) -> str:
-    return model.title if model.stage is not None else f"{model.title} (not added)"
+    return model.title if model.added else f"{model.title} (not added)"
 
 
 def scores_table(found: Sequence[Model], name: str) -> Table:
@@ -56,7 +57,7 @@ def scores_table(found: Sequence[Model], name: str) -> Table:
         Column("coverage_90", "inside the 90 % band", "%"),
     )
     rows = tuple(
-        (m.title, s.log_evidence, s.log_evidence_sd, s.elpd_loo, s.loo_se, s.coverage)
+        (_labelled(m), s.log_evidence, s.log_evidence_sd, s.elpd_loo, s.loo_se, s.coverage)
         for m in found
         if (s := m.stage) is not None
     )

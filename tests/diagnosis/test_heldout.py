@@ -56,5 +56,6 @@ def test_the_right_effect_predicts_the_cycle_that_it_has_not_seen() -> None:
     assert found.where == where
     assert found.chosen == fits[1].label
     assert found.after.rmse_N < 1.2 * SD < found.before.rmse_N
+    assert found.covered_before < 0.8 < found.covered_after < 0.98
     # What was set aside decides nothing: other readings there leave the choice and the fits as they are.
     assert validate(search, np.zeros(len(m), dtype=bool), "nothing", *fits[:2], []) is None

@@ -28,6 +28,7 @@ from bayesmembrane.reporting.loop_section import (
     moved_sentences,
     place_of,
     residual_rows,
+    rival_sentences,
     validation_sentences,
 )
 from bayesmembrane.reporting.loop_tables import (
@@ -88,6 +89,14 @@ def ambiguous(named: Loop) -> Loop:
     return Loop((Round(d, r.before, r.before),), None)
 
 
+@pytest.fixture(scope="module")
+def sampled(ambiguous: Loop, named: Loop) -> Loop:
+    """The same, both candidates sampled."""
+    r = ambiguous.rounds[0]
+    second = stage(r.before.run.measurement, r.diagnosis.members[1].candidate.hypothesis, 550.0)
+    return Loop((replace(r, leaders=(named.rounds[0].after, second)),), None)
+
+
 def only(loop: Loop, verdict: str) -> Diagnosis:
     return next(r.diagnosis for r in loop.rounds if r.diagnosis.verdict == verdict)
 
@@ -107,6 +116,17 @@ def test_errors_fall_from_the_model_as_given_to_the_one_with_its_effect(named: L
 def test_scores_are_those_of_the_sampled_models(named: Loop, ambiguous: Loop) -> None:
     assert [r["log_evidence"] for r in scores_table(models(named), "s").records()] == [500.0, 600.0]
     assert len(scores_table(models(ambiguous), "s").rows) == 1
+
+
+def test_sampled_rivals_stand_side_by_side_and_are_not_added(sampled: Loop) -> None:
+    rows = scores_table(models(sampled), "s").records()
+    assert [r["log_evidence"] for r in rows] == [500.0, 600.0, 550.0]
+    assert ["not added" in r["model"] for r in rows] == [False, True, True]
+    errors = errors_table(models(sampled), "cycle 3", "errors").records()
+    assert [r["heldout_coverage_90"] is None for r in errors] == [False, False, True]
+    (sentence,) = rival_sentences(sampled)
+    assert sentence.count("MPa") == 3
+    assert sampled.rounds[0].summary()["leaders"][1]["log_evidence"] == 550.0
 
 
 def test_candidates_are_ranked_against_the_model_as_it_was(named: Loop) -> None:
