@@ -300,24 +300,30 @@ def valleys(
     as_json: AsJson = False,
     seed: Seed = 0,
 ) -> None:
-    """How long the valley of the loss is, over one range or several, whether they meet, and what to measure next."""
+    """How long the valley of the loss is, over one range or several, whether they meet, and what to measure next.
+
+    With --effects also the valley without them, and how far the two lie apart.
+    """
     from bayesmembrane.inference.valleys import valleys as run
+    from bayesmembrane.inference.valleys_beside import Beside, valleys_beside
     from bayesmembrane.reporting.valley_section import valley_table, write_valleys
 
     measurement, claim = _asked(curve, specimen, material, effects, None, convexity, noise)
     ends = [1e-3 * end for end in numbers(ranges_mm, "--ranges-mm")] if ranges_mm else []
     with log.status(f"Following the valleys of {claim.label()}"):
-        found = run(measurement, claim, ends, rise=loss_rise, seed=seed)
+        how = valleys_beside if claim.effects else run
+        found = how(measurement, claim, ends, rise=loss_rise, seed=seed)
     document = found.summary()
+    parts = [found.without, found.added] if isinstance(found, Beside) else [found]
     if out_folder is not None:
         document["files"] = [str(f) for f in write_valleys(found, out_folder)]
 
     def show() -> None:
-        whole = valley_table([found])
+        whole = valley_table(parts)
         shown = [
             i
             for i, c in enumerate(whole.columns)
-            if c.key in ("end_mm", "loss_N", "length", "unit", "condition_number", "open")
+            if c.key in ("material", "end_mm", "loss_N", "length", "unit", "condition_number", "open")
         ]
         table(
             f"Valleys of {claim.material.title} on {curve}",
@@ -326,11 +332,18 @@ def valleys(
         )
         for sentence in found.sentences:
             out.print(sentence)
-        for valley in found.ranges:
+        for valley in parts[-1].ranges:
             rows = [[t.test, f"{100 * t.reduction:.0f} %"] for t in valley.next_tests[:5]]
             table(f"What to measure next, from data up to {1e3 * valley.end:.4g} mm", ["test", "shorter by"], rows)
 
     answer(document, as_json, show)
+
+
+# What a terminal of 80 characters has room for; a report shows all columns.
+COMPARED = {
+    "evidence": ("hypothesis", "nested", "nested_sd", "bridge", "bridge_sd", "probability", "mass"),
+    "prediction": ("hypothesis", "elpd_loo", "loo_se", "refits", "held_rmse"),
+}
 
 
 @app.command()
@@ -371,7 +384,13 @@ def compare(
     def show() -> None:
         for name, comparison in found.items():
             shown = evidence_table({name: comparison})
-            table(shown.caption, [c.head for c in shown.columns], shown.cells())
+            for text, part in COMPARED.items():
+                columns = [i for i, c in enumerate(shown.columns) if c.key in part]
+                rows = [[row[i] for i in columns] for row in shown.cells()]
+                table(f"{name}: {text}", [shown.columns[i].head for i in columns], rows)
+            for row in comparison.rows:
+                if row.reason:
+                    out.print(f"{row.label}: {row.reason}")
             for sentence in (comparison.reason, comparison.sentence, comparison.survival):
                 if sentence:
                     out.print(sentence)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -48,8 +48,8 @@ RISE = 0.1
 FLOOR, FLOOR_OF_MANY = 121, 61
 COARSE, ALONG, ACROSS = 41, 81, 41
 SDS = 4.0
-MAP = {3: 13}
-MAP_OF_MANY = 9
+MAP = {3: 17}
+MAP_OF_MANY = 9  # also with effects, whose curves are dear
 WIDER = 1.0  # of the least loss: how far profiles of one or two parameters, and the band around a floor, go
 AGAIN = 3
 JUMP = 10.0  # a step of the floor this many times the median one leads to another basin
@@ -100,8 +100,8 @@ def valleys_of(
         coarse = _coarse(surfaces, found)
         found = [replace(v, coarse=g) for v, g in zip(found, coarse, strict=True)]
     found = [replace(v, sentences=sentences_of(v)) for v in found]
-    between = tuple(_between(a, b) for a, b in combinations(found, 2))
-    return Valleys(hypothesis, tuple(found), between)
+    pairs = tuple(between(a, b) for a, b in combinations(found, 2))
+    return Valleys(hypothesis, tuple(found), pairs)
 
 
 def _valley(surface: Surface, rise: float, seed: int, draws: Array | None) -> Valley:
@@ -118,7 +118,8 @@ def _valley(surface: Surface, rise: float, seed: int, draws: Array | None) -> Va
     inside[inside] = _connected(floor_z[inside], best)
     floor_z, floor_loss = floor_z[inside], floor_loss[inside]
     k = best.size
-    maps = pair_maps(surface, best, lines, MAP.get(k, MAP_OF_MANY)) if k > 2 else ()
+    points = MAP_OF_MANY if h.effects else MAP.get(k, MAP_OF_MANY)
+    maps = pair_maps(surface, best, lines, points) if k > 2 else ()
     normal = Normal(surface, best)
     band = _band(surface, lines[along], least, normal) if k <= 2 else None
     spread = _spread(surface, normal, band, along, draws, seed)
@@ -295,12 +296,21 @@ def _placed(surface: Surface, valley: Valley, label: str, p: Array) -> Published
     return PublishedPoint(label, natural, known, loss <= valley.best_loss + valley.rise, distance)
 
 
-def _between(a: Valley, b: Valley) -> Between:
-    """Closest approach of two floors, in units of C_a + C_b: that of a difference of independent estimates."""
-    approach = closest_approach(a.floor_z, b.floor_z, a.spread.covariance + b.spread.covariance)
+Words = Callable[[Valley, Valley, float, Sequence[float] | None], str]
+"""(two valleys, their distance, where they cross) -> a sentence."""
+
+
+def between(a: Valley, b: Valley, words: Words = sentence_between) -> Between:
+    """Closest approach of two floors, in units of C_a + C_b: that of a difference of independent estimates.
+
+    Where ``b`` has more parameters, they come last and are left out.
+    """
+    k = a.best.size
+    covariance = a.spread.covariance + b.spread.covariance[:k, :k]
+    approach = closest_approach(a.floor_z, b.floor_z[:, :k], covariance)
     one, two = (tuple(float(v) for v in a.chart.natural(p)) for p in (approach.first, approach.second))
     crossing = None if approach.crossing is None else tuple(float(v) for v in a.chart.natural(approach.crossing))
-    return Between(a.end, b.end, approach, (one, two), crossing, sentence_between(a, b, approach.distance, crossing))
+    return Between(a.end, b.end, approach, (one, two), crossing, words(a, b, approach.distance, crossing))
 
 
-__all__ = ["RISE", "Valleys", "valleys", "valleys_of"]
+__all__ = ["RISE", "Valleys", "between", "valleys", "valleys_of"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -283,25 +284,33 @@ def floor(surface: Surface, profile: Profile, points: int, best: Array) -> tuple
 
 
 def pair_maps(surface: Surface, best: Array, found: list[Profile], points: int) -> tuple[PairMap, ...]:
-    """Profile maps of all pairs on grids of ``points`` x ``points`` over what the profiles span."""
+    """Profile maps of all pairs on grids of ``points`` x ``points`` over what the profiles span.
+
+    All cells of all maps descend side by side: the solver's price is per batch. Starts are where a parabola, and where
+    the profile of the first parameter, have their minimum.
+    """
     k = best.size
     inverse = np.asarray(np.linalg.pinv(curvature(surface, best), rcond=1e-13), dtype=float)
-    return tuple(_pair_map(surface, best, inverse, found, (i, j), points) for i in range(k) for j in range(i + 1, k))
+    pairs = [(i, j) for i in range(k) for j in range(i + 1, k)]
+    axes = [[np.linspace(found[c].points[0, c], found[c].points[-1, c], points) for c in pair] for pair in pairs]
+    of_pair = np.array([[c in pair for c in range(k)] for pair in pairs])
+    held = np.repeat(of_pair, points * points, axis=0)
+    starts = [_starts(best, inverse, found, p, a) for p, a in zip(pairs, axes, strict=True)]
+    start, other = (np.concatenate(part) for part in zip(*starts, strict=True))
+    better = surface.loss(other) < surface.loss(start)
+    z, size = surface.minimise(np.where(better[:, None], other, start), held, ITERATIONS_OF_A_MAP)
+    place = np.arange(len(z)).reshape(len(pairs), points, points)
+    for axis, shift in ((1, 1), (1, -1), (2, 1), (2, -1)):
+        z, size = _from_neighbours(surface, z, size, place, axis, shift, held)
+    return tuple(PairMap(p, a, b, size[at]) for p, (a, b), at in zip(pairs, axes, place, strict=True))
 
 
-def _pair_map(
-    surface: Surface, best: Array, inverse: Array, found: list[Profile], pair: tuple[int, int], points: int
-) -> PairMap:
-    """Starts are where a parabola, and where the profile of the first parameter, have their minimum."""
+def _starts(
+    best: Array, inverse: Array, found: list[Profile], pair: tuple[int, int], axes: list[Array]
+) -> tuple[Array, Array]:
+    """Starts (cells, k) of one map: along the parabola at the optimum, and along the profile of its first parameter."""
     i, j = pair
-    axes = [np.linspace(found[c].points[0, c], found[c].points[-1, c], points) for c in pair]
     a, b = (m.ravel() for m in np.meshgrid(*axes, indexing="ij"))
-    held = np.zeros(best.size, dtype=bool)
-    held[[i, j]] = True
-    if best.size == 2:
-        z = np.empty((a.size, 2))
-        z[:, i], z[:, j] = a, b
-        return PairMap(pair, axes[0], axes[1], surface.loss(z).reshape(points, points))
     away = np.stack([a - best[i], b - best[j]], axis=1)
     part = inverse[np.ix_([i, j], [i, j])]
     start = best + away @ np.linalg.pinv(part, rcond=1e-12) @ inverse[[i, j]]
@@ -309,12 +318,7 @@ def _pair_map(
     other = np.stack([np.interp(a, line[:, i], line[:, c]) for c in range(best.size)], axis=1)
     for s in (start, other):
         s[:, i], s[:, j] = a, b
-    better = surface.loss(other) < surface.loss(start)
-    z, size = surface.minimise(np.where(better[:, None], other, start), held, ITERATIONS_OF_A_MAP)
-    shape = (points, points)
-    for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
-        z, size = _from_neighbours(surface, z, size, shape, axis, shift, pair, held)
-    return PairMap(pair, axes[0], axes[1], size.reshape(shape))
+    return start, other
 
 
 ITERATIONS_OF_A_MAP = 15
@@ -322,28 +326,18 @@ WORSE = 5e-2  # relative: a cell this much above its neighbour is tried again fr
 
 
 def _from_neighbours(
-    surface: Surface,
-    z: Array,
-    size: Array,
-    shape: tuple[int, int],
-    axis: int,
-    shift: int,
-    pair: tuple[int, int],
-    held: NDArray[np.bool_],
+    surface: Surface, z: Array, size: Array, place: NDArray[Any], axis: int, shift: int, held: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Cells above their neighbour's loss, tried again from the neighbour's film."""
-    rolled = np.roll(np.arange(z.shape[0]).reshape(shape), shift, axis=axis)
-    inner = np.ones(shape, dtype=bool)
+    """Cells above their neighbour's loss, tried again from the neighbour's film; ``place`` (P, A, B) numbers them."""
+    inner = np.ones(place.shape, dtype=bool)
     inner[(slice(None),) * axis + (0 if shift > 0 else -1,)] = False
-    neighbour = rolled.ravel()
+    neighbour = np.roll(place, shift, axis=axis).ravel()
     with np.errstate(invalid="ignore"):
         again = np.flatnonzero(inner.ravel() & (size > size[neighbour] * (1 + WORSE)))
     if not again.size:
         return z, size
-    start = z[neighbour[again]].copy()
-    for c in pair:
-        start[:, c] = z[again, c]
-    found, norm = surface.minimise(start, held, ITERATIONS_OF_A_MAP)
+    start = np.where(held[again], z[again], z[neighbour[again]])
+    found, norm = surface.minimise(start, held[again], ITERATIONS_OF_A_MAP)
     better = norm < size[again]
     z, size = z.copy(), size.copy()
     z[again[better]], size[again[better]] = found[better], norm[better]

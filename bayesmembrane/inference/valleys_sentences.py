@@ -10,12 +10,13 @@ from bayesmembrane.inference.valleys_profile import End
 from bayesmembrane.inference.valleys_result import Valley
 from bayesmembrane.parameters import Array
 
+FEW = 2  # open ends that have a sentence each
 CLOSE = 2.0  # posterior standard deviations within which two valleys count as compatible
 
 
 def sentences_of(v: Valley) -> tuple[str, ...]:
     """What is to be said of one valley."""
-    told = [_where(v), *_open(v), *_basins(v), *_nothing_needed(v), *_modes(v), *_published(v), *_next(v)]
+    told = [_where(v), *_edge(v), *_open(v), *_basins(v), *_nothing_needed(v), *_modes(v), *_published(v), *_next(v)]
     if v.unreached > 0:
         told.append(f"{100 * v.unreached:.2g} % of the cells of the pairwise maps hold no film that reaches the data.")
     return tuple(told)
@@ -23,6 +24,11 @@ def sentences_of(v: Valley) -> tuple[str, ...]:
 
 def _names(v: Valley) -> list[str]:
     return [n.partition(".")[2] for n in v.chart.names]
+
+
+def titled(v: Valley) -> str:
+    """Material and effects for people: ``Gent + zero offset``."""
+    return " + ".join([v.hypothesis.material.title, *(e.name.replace("_", " ") for e in v.hypothesis.effects)])
 
 
 def _range(v: Valley) -> str:
@@ -42,15 +48,17 @@ def _where(v: Valley) -> str:
     number = v.spectra[0].condition_number
     ratio = f", condition number {number:.3g}" if np.isfinite(number) and v.best.size > 1 else ""
     return (
-        f"{_range(v)} every {v.hypothesis.material.title} film between ({point(v, v.floor[0])}) and "
+        f"{_range(v)} every {titled(v)} film between ({point(v, v.floor[0])}) and "
         f"({point(v, v.floor[-1])}) on the valley's floor fits within {share:.3g} % of the least loss, "
         f"{v.best_loss:.4g} N{long}{ratio}."
     )
 
 
 def _open(v: Valley) -> list[str]:
-    """Every parameter with an end that does not close the valley."""
-    told = []
+    """Every parameter with an end that does not close the valley; of many of them in one sentence."""
+    told: list[str] = []
+    if sum(e.open for p in v.profiles for e in p.ends) > FEW:
+        return [_open_in_many(v)]
     for p in v.profiles:
         for end, far in zip(p.ends, ("low", "high"), strict=True):
             if end.open:
@@ -58,9 +66,45 @@ def _open(v: Valley) -> list[str]:
     return told
 
 
+def _open_in_many(v: Valley) -> str:
+    names, units = _names(v), [f" {u}" if u not in ("-", "") else "" for u in v.chart.units]
+    opened, losses, closed = [], [v.best_loss], []
+    for p in v.profiles:
+        ends = [e for e in p.ends if e.open]
+        losses += [e.loss for e in ends]
+        if ends:
+            opened.append(f"{names[p.index]} (to {' and '.join(f'{e.value:.3g}' for e in ends)}{units[p.index]})")
+        if len(ends) == 1:
+            high = p.ends[0].open
+            bound = p.ends[int(high)].value
+            closed.append(f"{names[p.index]} is {'below' if high else 'above'} {bound:.3g}{units[p.index]}")
+    only = f"; what the data do say is that {', '.join(closed)}" if closed else ""
+    return (
+        f"{_range(v)} the valley is open in {', '.join(opened)}: as far as each of these is followed, with the others "
+        f"adjusted, the loss stays between {min(losses):.4g} and {max(losses):.4g} N{only}."
+    )
+
+
+def _edge(v: Valley) -> list[str]:
+    """An optimum at the bounds of its coordinates is none."""
+    if not v.at_bound:
+        return []
+    names = ", ".join(n.partition(".")[2] or n for n in v.at_bound)
+    return [
+        f"{_range(v)} the least loss lies where the search ends, in the coordinate {names}: it is a limit that films "
+        "come close to, and no optimum."
+    ]
+
+
 def _open_end(v: Valley, i: int, end: End, far: str) -> str:
     name, unit = _names(v)[i], v.chart.units[i]
     shown = f"{end.value:.3g}" + (f" {unit}" if unit not in ("-", "") else "")
+    if not v.chart.log[i] and i >= v.hypothesis.material_size:
+        edge = "least" if far == "low" else "largest"
+        return (
+            f"{_range(v)} the valley is open: at {name} = {shown}, the {edge} value that is allowed, the loss is "
+            f"{end.loss:.4g} N."
+        )
     goal = "zero" if abs(end.value) < abs(float(v.best[i])) or (v.chart.log[i] and far == "low") else "infinity"
     if v.chart.log[i] and v.chart.sign[i] < 0 and far == "high":
         goal = "minus infinity" if goal == "infinity" else goal

@@ -77,12 +77,14 @@ def _pair(ax: Axes, found: Valleys, pair: tuple[int, int]) -> None:
         _map_levels(ax, v, m, c)
         x, y = (np.abs(v.floor[:, c_]) if v.chart.log[c_] else v.floor[:, c_] for c_ in pair)
         ax.plot(x, y, color=c, linewidth=1.6, zorder=4)
+        at_edge = bool(v.at_bound)  # the least loss is then a limit, and no optimum
         ax.plot(
             *(abs(v.best[c_]) if v.chart.log[c_] else v.best[c_] for c_ in pair),
             "*",
             color=c,
             markersize=10,
-            markeredgecolor="white",
+            markerfacecolor="white" if at_edge else c,
+            markeredgecolor=c if at_edge else "white",
             zorder=6,
         )
     v = found.ranges[0]

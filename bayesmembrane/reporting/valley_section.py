@@ -8,14 +8,17 @@ from pathlib import Path
 
 from bayesmembrane.errors import StorageError
 from bayesmembrane.hypothesis import CONVEXITY
+from bayesmembrane.inference.valleys_beside import Beside
 from bayesmembrane.inference.valleys_next import ASSUMPTION
 from bayesmembrane.inference.valleys_result import Valley, Valleys
+from bayesmembrane.inference.valleys_sentences import titled
 from bayesmembrane.reporting.figures import Picture
 from bayesmembrane.reporting.tables import Column, Table, Value
+from bayesmembrane.reporting.valley_beside import beside_picture
 from bayesmembrane.reporting.valley_figures import valley_picture
 from bayesmembrane.terminal import plain
 
-ANSWER, PICTURE = "valleys.json", "valleys.png"
+ANSWER, PICTURE, BESIDE = "valleys.json", "valleys.png", "valleys_beside.png"
 TESTS = 5
 
 _COLUMNS = (
@@ -53,7 +56,7 @@ def _row(v: Valley) -> tuple[Value, ...]:
     opened = " and ".join(f"{name} to {e.value:.2g}" for e in (low, high) if e.open)
     first = v.next_tests[0] if v.next_tests else None
     return (
-        v.hypothesis.material.title,
+        titled(v),
         1e3 * v.end,
         v.best_loss,
         f"({names}) = ({ends[0]}) ... ({ends[1]})",
@@ -87,16 +90,22 @@ def alternative_text(found: Valleys) -> str:
     return f"Valleys of the loss of {found.hypothesis.material.title} over its parameters for the ranges {ends} mm"
 
 
-def write_valleys(found: Valleys, out: Path) -> tuple[Path, Path]:
-    """Write ``valleys.json`` and ``valleys.png`` into ``out``; raises `StorageError` if that cannot be done."""
-    paths = out / ANSWER, out / PICTURE
-    picture: Picture = valley_picture(found)
+def write_valleys(found: Valleys | Beside, out: Path) -> tuple[Path, ...]:
+    """Write ``valleys.json`` and ``valleys.png`` into ``out``, with effects also ``valleys_beside.png``.
+
+    Raises `StorageError` if that cannot be done.
+    """
+    pictures: dict[str, Picture] = {}
+    if isinstance(found, Beside):
+        pictures[BESIDE] = beside_picture(found)
+    pictures[PICTURE] = valley_picture(found.added if isinstance(found, Beside) else found)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        paths[0].write_text(json.dumps(plain(found.summary()), allow_nan=False), encoding="utf-8")
-        paths[1].write_bytes(picture.data)
+        (out / ANSWER).write_text(json.dumps(plain(found.summary()), allow_nan=False), encoding="utf-8")
+        for name, picture in pictures.items():
+            (out / name).write_bytes(picture.data)
     except OSError as error:
         raise StorageError(
             f"the valleys cannot be written ({error.strerror})", str(out), "choose another folder"
         ) from None
-    return paths
+    return (out / ANSWER, *(out / name for name in pictures))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,13 @@ from bayesmembrane.cli import app
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.hypothesis import hypothesis
 from bayesmembrane.inference.valleys import Valleys, valleys
+from bayesmembrane.inference.valleys_beside import valleys_beside
 from bayesmembrane.inference.valleys_surface import Chart, Surface
 from bayesmembrane.measurement import Measurement, Specimen, write_measurement
 from bayesmembrane.mechanics import api
 from bayesmembrane.mechanics.reference import force_curve
 from bayesmembrane.registry import material
+from bayesmembrane.reporting.valley_section import write_valleys
 from bayesmembrane.rigs.annulus import Annulus
 
 Film = Callable[..., Measurement]
@@ -180,12 +183,27 @@ def test_slopes_over_the_parameters_are_differences_of_the_residual(name: str, f
         )
 
 
-def test_a_film_with_an_effect_has_a_valley_too(film: Film) -> None:
-    m = film("mooney_rivlin", (6.0, 1.5), end=0.03, points=8, noise=0.003)
-    v = valleys(m, hypothesis("neo_hookean", ["zero_offset"], convexity="none")).ranges[0]
-    assert v.chart.names == ("neo_hookean.c1", "zero_offset.shift")
-    assert v.best_loss <= valleys(m, hypothesis("neo_hookean", convexity="none")).ranges[0].best_loss
-    assert len(v.floor) > 10
+def test_valleys_with_and_without_an_effect_lie_beside_each_other(film: Film, tmp_path: Path) -> None:
+    """A film of one modulus, measured from a zero that is off: only with the offset is its modulus found."""
+    plain = film("neo_hookean", (7.0,), end=0.03, points=8, noise=0.001)
+    at = plain.deflection + 1e-3
+    force = api.solve(material("neo_hookean"), [7.0], at, inner_radius=0.01, outer_radius=0.035).force[0]
+    moved = replace(plain, force=force * (1 + 1e-3 * (-1.0) ** np.arange(8)))
+    found = valleys_beside(moved, hypothesis("neo_hookean", ["zero_offset"], convexity="none"))
+    (with_,), (without,), (pair,) = found.added.ranges, found.without.ranges, found.pairs
+    assert with_.chart.names == ("neo_hookean.c1", "zero_offset.shift")
+    assert len(with_.floor) > 10
+    assert with_.best_loss < 0.2 * without.best_loss
+    assert with_.best[0] == pytest.approx(7.0, rel=0.01)
+    assert abs(without.best[0] - 7.0) > 10 * abs(with_.best[0] - 7.0)
+    assert pair.closest[0][0] == pytest.approx(without.floor[:, 0][np.argmin(abs(without.floor[:, 0] - 7.0))], rel=1e-2)
+    assert f"moves from (c1 {without.best[0]:.4g}) to (c1 {with_.best[0]:.4g})" in pair.sentence
+    assert any(s.startswith("Without effects: Up to 30 mm") for s in found.sentences)
+    names = [path.name for path in write_valleys(found, tmp_path)]
+    assert names == ["valleys.json", "valleys_beside.png", "valleys.png"]
+    assert "without_effects" in json.loads((tmp_path / "valleys.json").read_text())
+    with pytest.raises(SettingsError, match="no effects"):
+        valleys_beside(moved, hypothesis("neo_hookean"))
 
 
 def test_the_command_answers_with_the_promised_fields(film: Film, tmp_path: Path) -> None:
