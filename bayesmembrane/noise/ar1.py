@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numba
 import numpy as np
 
 from bayesmembrane.measurement import Measurement
@@ -65,7 +66,8 @@ class AR1Likelihood(NoiseLikelihood):
         tau = np.exp(x[:, 0]) * self.scale
         rate = np.exp(-x[:, 1])
         if self.given is None:
-            return self._filter(residual, tau * tau, rate)
+            r = np.ascontiguousarray(residual, dtype=float)
+            return np.asarray(_filter(r, tau * tau, rate, self.gap, self.variance))
         sigma = self.given + (tau * tau)[:, None, None] * np.exp(-rate[:, None, None] * self.distance)
         root = np.linalg.cholesky(sigma)
         z = np.linalg.solve(root, residual[:, :, None])[:, :, 0]
@@ -77,21 +79,24 @@ class AR1Likelihood(NoiseLikelihood):
         given = np.diag(self.variance) if self.given is None else self.given
         return np.asarray(given + tau**2 * np.exp(-np.exp(-x[1]) * self.distance))
 
-    def _filter(self, residual: Array, power: Array, rate: Array) -> Array:
-        """State u with variance ``power`` and u_i = phi_i u_(i-1) + ..., observed as r_i = u_i + own noise."""
-        phi = np.exp(-rate[:, None] * self.gap)
-        mean, variance = np.zeros_like(power), power.copy()
-        total = np.zeros_like(power)
+
+@numba.njit(cache=True, error_model="numpy")
+def _filter(residual, power, rate, gap, own):  # type: ignore[no-untyped-def]
+    """State u with variance ``power`` and u_i = phi_i u_(i-1) + ..., observed as r_i = u_i + own noise."""
+    out = np.empty(len(residual))
+    for b in range(len(residual)):
+        mean, variance, total = 0.0, power[b], 0.0
         for i in range(residual.shape[1]):
-            if i:
-                f = phi[:, i - 1]
-                mean, variance = f * mean, power + f * f * (variance - power)
-            s = variance + self.variance[i]
-            e = residual[:, i] - mean
+            if i > 0:
+                f = np.exp(-rate[b] * gap[i - 1])
+                mean, variance = f * mean, power[b] + f * f * (variance - power[b])
+            s = variance + own[i]
+            e = residual[b, i] - mean
             total -= 0.5 * (e * e / s + np.log(2 * np.pi * s))
             gain = variance / s
             mean, variance = mean + gain * e, variance * (1 - gain)
-        return total
+        out[b] = total
+    return out
 
 
 def _gaps(measurement: Measurement) -> Array:
