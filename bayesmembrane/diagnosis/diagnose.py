@@ -256,7 +256,8 @@ def _traced(
             tracer, pairs = _renewed(tracer, pairs)
             singles = tracer.again(singles)
     explaining = [j for j in pairs or singles if j.explains]
-    if not explaining or all(tracer.single_valued(j.candidate) for j in _rivals(tracer, explaining)):
+    rivals = _rivals(tracer, explaining)
+    if not rivals or rivals[0].p_value <= LEVEL or all(tracer.single_valued(j.candidate) for j in rivals):
         others = tracer.materials(say)
     every = ranked([*pairs, *singles, *others, tracer.judged(tracer.null)])
     return tracer, _decide(tracer, explaining, [j for j in singles if j.explains], others), every
@@ -342,7 +343,7 @@ def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged
         # One moment has all of it: an effect that happens to come then is no better a guess than something foreign.
         return Verdict("ambiguous", rivals, step)
     single_valued = all(tracer.single_valued(j.candidate) for j in rivals)
-    if single_valued and energies and _comes_near(energies[0], rivals[0]):
+    if energies and (energies[0].gain > rivals[0].gain or (single_valued and _comes_near(energies[0], rivals[0]))):
         return Verdict("material", (energies[0],))
     if single_valued and all(j.candidate.x.size > tracer.null.x.size + 1 for j in rivals):
         if not alone or len(rivals[0].candidate.names) == 1:

@@ -23,9 +23,10 @@ DECISIVE = 4.0
 LOOKALIKES = ((15.0, 8.0), (30.0, 5.0))
 """(degrees, the same for rivals whose trace makes less than that with the winner's)."""
 ENERGY_DECISIVE = 8.0  # the same for other energies: an instrument is blamed only far beyond them
-UNEXPLAINED, ALLOWED, LEVEL = 0.2, 0.05, 0.01
-"""A model explains the curve if no more than the first part of the misfit is left, or if what is left is no more than
-chance makes of the second part: of a small misfit, noise alone leaves a larger part."""
+UNEXPLAINED, ALLOWED, LEVEL, MODEST = 0.2, 0.05, 0.01, 1.5
+"""A model explains the curve if what is left is no more than chance makes of the second part of the misfit: of a small
+misfit, noise alone leaves a larger part. Or if no more than the second part is left, or no more than the first where the
+reduced chi-square is modest too: of a large misfit a fifth is a lot."""
 WAVES, RIPPLE = 1e-3, 0.2
 """No smooth effect takes waves away: where the residual still repeats, at the first level, and the wave has more than
 the second part of the squares that a model takes away, the model explains nothing."""
@@ -56,7 +57,8 @@ class Judged:
     @property
     def explains(self) -> bool:
         """True if it is more probable than the null model and leaves noise, or little beside what was there."""
-        little = self.p_value > LEVEL or self.unexplained <= UNEXPLAINED
+        most = UNEXPLAINED if self.fit.reduced_chi2 <= MODEST else ALLOWED
+        little = self.p_value > LEVEL or self.unexplained <= most
         return little and self.gain > 0 and not self.ripples
 
     @property
