@@ -25,8 +25,8 @@ LOOKALIKES = ((15.0, 8.0), (30.0, 5.0))
 ENERGY_DECISIVE = 8.0  # the same for other energies: an instrument is blamed only far beyond them
 UNEXPLAINED, ALLOWED, LEVEL, MODEST = 0.2, 0.05, 0.01, 1.5
 """A model explains the curve if what is left is no more than chance makes of the second part of the misfit: of a small
-misfit, noise alone leaves a larger part. Or if no more than the second part is left, or no more than the first where the
-reduced chi-square is modest too: of a large misfit a fifth is a lot."""
+misfit, noise alone leaves a larger part. Or if no more than the second part is left, or no more than the first where
+the reduced chi-square is modest too: of a large misfit a fifth is a lot."""
 WAVES, RIPPLE = 1e-3, 0.2
 """No smooth effect takes waves away: where the residual still repeats, at the first level, and the wave has more than
 the second part of the squares that a model takes away, the model explains nothing."""

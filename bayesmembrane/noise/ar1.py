@@ -9,7 +9,7 @@ import numba
 import numpy as np
 
 from bayesmembrane.measurement import Measurement
-from bayesmembrane.noise.base import LN_SD, Noise, NoiseLikelihood, force_scale
+from bayesmembrane.noise.base import LN_SD, Noise, NoiseLikelihood, conditional, force_scale
 from bayesmembrane.parameters import Array, Normal, Parameter
 
 LN_LENGTH = Parameter(
@@ -73,6 +73,30 @@ class AR1Likelihood(NoiseLikelihood):
         z = np.linalg.solve(root, residual[:, :, None])[:, :, 0]
         log_det = np.sum(np.log(np.diagonal(root, axis1=1, axis2=2)), axis=1)
         return np.asarray(-0.5 * np.sum(z * z, axis=1) - log_det - 0.5 * self.variance.size * np.log(2 * np.pi))
+
+    def pointwise(self, residual: Array, x: Array) -> Array:
+        if self.given is not None or np.any(self.variance):
+            return super().pointwise(residual, x)
+        # Without noise of the points' own, u is a Markov chain: its precision has three diagonals.
+        power = (np.exp(x[:, 0]) * self.scale)[:, None] ** 2
+        phi = np.exp(-np.exp(-x[:, 1])[:, None] * self.gap)
+        link = phi / (1 - phi**2)
+        diagonal = np.ones_like(residual)
+        diagonal[:, 1:] += phi * link
+        diagonal[:, :-1] += phi * link
+        weighted = diagonal * residual
+        weighted[:, 1:] -= link * residual[:, :-1]
+        weighted[:, :-1] -= link * residual[:, 1:]
+        return conditional(weighted / power, diagonal / power)
+
+    def draw(self, x: Array, rng: np.random.Generator) -> Array:
+        if self.given is not None or np.any(self.variance):
+            return super().draw(x, rng)
+        phi = np.exp(-np.exp(-x[:, 1])[:, None] * self.gap)
+        out = rng.standard_normal((len(x), self.variance.size))
+        for i in range(1, self.variance.size):
+            out[:, i] = phi[:, i - 1] * out[:, i - 1] + np.sqrt(1 - phi[:, i - 1] ** 2) * out[:, i]
+        return out * (np.exp(x[:, 0]) * self.scale)[:, None]
 
     def covariance(self, x: Array) -> Array:
         tau = float(np.exp(x[0])) * self.scale
