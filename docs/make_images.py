@@ -1,25 +1,39 @@
-"""The picture in the README, from the runs that `make demo` stored: python docs/make_images.py [CHAINS]."""
+"""Pictures of the README and of docs/valleys.md, from the runs of `make demo`: python docs/make_images.py [CHAINS]."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
+from bayesmembrane.demo import shipped_measurement
+from bayesmembrane.hypothesis import hypothesis
+from bayesmembrane.inference.run import load_run
+from bayesmembrane.inference.valleys import valleys_of
 from bayesmembrane.reporting.figures import first_look
 from bayesmembrane.reporting.page import look_of
 from bayesmembrane.reporting.reading import read
+from bayesmembrane.reporting.valley_figures import valley_picture
 
 RANGES = ("op1", "op2")
 MATERIALS = ("neo_hookean", "mooney_rivlin", "gent", "yeoh", "ogden")
-TARGET = Path(__file__).parent / "images" / "first_look.png"
+IMAGES = Path(__file__).parent / "images"
+VALLEYS = "mooney_rivlin"
 
 
 def main(chains: Path) -> None:
     folders = [[chains / f"elastosil_50um_{r}_{m}" for m in MATERIALS] for r in RANGES]
     looks = [look_of([read(f) for f in group if (f / "status.json").exists()]) for group in folders]
-    TARGET.parent.mkdir(parents=True, exist_ok=True)
-    TARGET.write_bytes(first_look(looks, "png").data)
-    print(f"{TARGET}: {TARGET.stat().st_size // 1000} kB")
+    _write("first_look.png", first_look(looks, "png").data)
+    runs = [load_run(chains / f"elastosil_50um_{r}_{VALLEYS}") for r in RANGES]
+    measurements = [shipped_measurement(r.upper()) for r in RANGES]
+    found = valleys_of(measurements, hypothesis(VALLEYS), draws=[run.draws() for run in runs])
+    _write("valleys.png", valley_picture(found).data)
+
+
+def _write(name: str, data: bytes) -> None:
+    IMAGES.mkdir(parents=True, exist_ok=True)
+    (IMAGES / name).write_bytes(data)
+    print(f"{IMAGES / name}: {len(data) // 1000} kB")
 
 
 if __name__ == "__main__":

@@ -22,7 +22,8 @@ PILOT_LIVE, PILOT_PER_DIMENSION = 150, 30
 LEAST_LIVE, PER_DIMENSION, MOST_LIVE = 80, 15, 4000
 TOLERANCE = 0.13
 PILOTS, THEN, MOST_RUNS = 2, 1, 12
-REMAINING, NEAR = 0.2, 1.0  # ln Z that may be left in the live points when they are added: from the prior, and from q
+FROM_DRAWS = 6  # runs at least, where none climbs from the prior: their scatter says what H / N leaves out
+REMAINING, NEAR = 0.2, 0.5  # ln Z that may be left in the live points when they are added: from the prior, and from q
 QUEUE = 0.25  # of the live points are proposed at once: those that fall behind meanwhile are lost
 SHRINK = 0.3  # of ln(volume) between two fits of the bounds
 SLICES = 5  # for each dimension (W. J. Handley et al., MNRAS 453 (2015) 4384)
@@ -65,6 +66,7 @@ def nested(
     problem, own = Problem(target), np.random.default_rng([seed, 8])
     rngs = np.random.default_rng([seed, 5]).spawn(MOST_RUNS)
     found: list[_Run] = []
+    least = PILOTS + THEN if around is None else FROM_DRAWS
     if around is None:
         from_prior = max(PILOT_LIVE, PILOT_PER_DIMENSION * problem.size)
         found = [_run(problem, from_prior, rng, REMAINING) for rng in rngs[:PILOTS]]
@@ -78,7 +80,7 @@ def nested(
         value, sd = _together(found)
         if tell is not None:
             tell(f"nested sampling, run {len(found)}: {value:.2f} +- {sd:.2f}")
-        if len(found) >= PILOTS + THEN and sd <= tolerance:
+        if len(found) >= least and sd <= tolerance:
             break
     return Estimate(value, sd, problem.evaluations, problem.seconds, tuple(r.log_evidence for r in found))
 
@@ -146,7 +148,10 @@ def _run(problem: Problem, live: int, rng: np.random.Generator, remaining: float
     value = float(r.logz[-1] + np.log(start.part) - 0.5 * information / live)
     weight = np.exp(r.logwt - logsumexp(r.logwt))
     # The square of dynesty's own error is up to twice too large: it takes the last live points for runs of their own.
-    sd = float(np.hypot(np.sqrt(information / live), start.log_part_sd))
+    # What they hold is a mean over them, with the error of one.
+    last = np.exp(r.logl[-live:] - np.max(r.logl[-live:]))
+    left = float(np.sum(weight[-live:])) * float(np.std(last) / np.mean(last))
+    sd = float(np.sqrt((information + left**2) / live + start.log_part_sd**2))
     return _Run(value, sd, np.asarray(r.samples), weight)
 
 

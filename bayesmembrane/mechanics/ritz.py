@@ -448,12 +448,14 @@ def _curves(problem: Problem, search: _Search, back: NDArray[np.intp] | None) ->
     note = np.where(result[:, k.LEAST_P2] < 0, Note.WRINKLED, 0) | np.where(result[:, k.SLACK] <= 0, Note.SLACK, 0)
     factor = 2 * np.pi * length
 
-    def row(index: int, scale: Any = 1.0) -> Array:
-        return np.where(ok, result[:, index] * scale, np.nan)
+    def row(index: int | slice, scale: Any = 1.0) -> Array:
+        # Where it is not ok anything may stand, infinity too.
+        with np.errstate(invalid="ignore", over="ignore"):
+            return np.where(ok if isinstance(index, int) else ok[:, None], result[:, index] * scale, np.nan)
 
     sensitivity = None
     if search.wishes[0]:
-        rows = np.where(ok[:, None], result[:, k.RESULTS :] * (factor * sign)[:, None], np.nan)
+        rows = row(slice(k.RESULTS, None), (factor * sign)[:, None])
         sensitivity = np.ascontiguousarray(np.moveaxis(rows, 1, 2))
     return Curves(
         deflection=problem.deflection,

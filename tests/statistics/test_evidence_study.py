@@ -31,13 +31,15 @@ SYNTHETIC = {
     "funnel, k = 4": lambda: Funnel(4),
     "cut prior, k = 5": lambda: Cut(5),
 }
-MATERIALS = ("neo_hookean", "gent")
+# With the cells of the grid that gives the exact value: convexity cuts the posterior of Mooney-Rivlin, and midpoints
+# meet the edge of a cut only to the first order.
+MATERIALS = {"neo_hookean": 120, "gent": 120, "mooney_rivlin": 360}
 ESTIMATORS = {"bridge": lambda target, seed: bridge(target, seed=seed), "nested": nested}
 
 
 def film(name: str) -> PosteriorTarget:
     target = PosteriorTarget(Posterior(hypothesis(name), shipped_measurement("OP1")))
-    object.__setattr__(target, "exact", log_evidence(target.posterior))
+    object.__setattr__(target, "exact", log_evidence(target.posterior, MATERIALS[name]))
     return target
 
 
