@@ -16,22 +16,16 @@ from bayesmembrane.diagnosis.heldout import Error, HeldOut, error_of, held_out, 
 from bayesmembrane.diagnosis.saturated import reference_basis
 from bayesmembrane.diagnosis.scores import Signature, angle, signatures, smallest_sizes
 from bayesmembrane.diagnosis.separation import Experiment, experiments
-from bayesmembrane.diagnosis.sudden import Step, sudden
+from bayesmembrane.diagnosis.sudden import sudden
 from bayesmembrane.diagnosis.trace import (
-    ALLOWED,
-    DECISIVE,
     EARNED_SHARE,
-    EARNS,
-    ENERGY_DECISIVE,
     LEVEL,
-    LOOKALIKES,
     Judged,
     Tell,
     Tracer,
-    effective_weight,
-    ranked,
 )
-from bayesmembrane.diagnosis.whitening import OwnNoise, orthonormal, own_noise
+from bayesmembrane.diagnosis.verdict import Verdict, explained
+from bayesmembrane.diagnosis.whitening import OwnNoise, own_noise
 from bayesmembrane.diagnosis.wording import form_sentence, noise_sentence, sentence_of
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.forward import Solve
@@ -147,20 +141,6 @@ class Diagnosis:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Verdict:
-    """What the candidates come to.
-
-    step : a sudden change that explains the curve as well as the members do, or better
-    form : part of the plain material's misfit that an adequate model leaves, where the tests do see it
-    """
-
-    verdict: str
-    members: tuple[Judged, ...]
-    step: Step | None = None
-    form: float | None = None
-
-
 def diagnose(
     measurement: Measurement,
     hypothesis: Hypothesis,
@@ -188,7 +168,7 @@ def diagnose(
     if not detection.adequate:
         form = _form_left(tracer)
         if form is None:
-            tracer, verdict, everything = _traced(tracer, effects, found, rng, say)
+            tracer, verdict, everything = explained(tracer, effects, found, rng, say)
         else:
             verdict = replace(verdict, form=form)
     return _told(tracer, detection, verdict, everything, found, seed, say)
@@ -234,141 +214,6 @@ def _null(
     return search, search.fit(hypothesis, [null.x]) or null
 
 
-# ---- what explains it ------------------------------------------------------------------------------------------------
-
-
-def _traced(
-    tracer: Tracer, effects: Sequence[Any], found: Sequence[Signature], rng: np.random.Generator, say: Tell
-) -> tuple[Tracer, Verdict, list[Judged]]:
-    """(tracer with the noise of the best model, verdict, every candidate)."""
-    visible = {f.effect.name for f in found}
-    singles = tracer.singles([e for e in effects if e.name in visible], say)
-    others: list[Judged] = []
-    if not singles:
-        others = tracer.materials(say)
-        return tracer, _without_effects(tracer, others), others
-    tracer, singles = _renewed(tracer, singles)
-    best, pairs = singles[0], []
-    if _more_is_missing(tracer, best, effects, rng):
-        pairs = tracer.pairs(singles, [e for e in effects if e.name in visible], say)
-        pairs = [p for p in pairs if _earns(tracer, p, singles)]
-        if pairs:
-            tracer, pairs = _renewed(tracer, pairs)
-            singles = tracer.again(singles)
-    explaining = [j for j in pairs or singles if j.explains]
-    rivals = _rivals(tracer, explaining)
-    if not rivals or rivals[0].p_value <= LEVEL or all(tracer.single_valued(j.candidate) for j in rivals):
-        others = tracer.materials(say)
-    every = ranked([*pairs, *singles, *others, tracer.judged(tracer.null)])
-    return tracer, _decide(tracer, explaining, [j for j in singles if j.explains], others), every
-
-
-def _renewed(tracer: Tracer, judged: list[Judged]) -> tuple[Tracer, list[Judged]]:
-    """Noise and weight from the best candidate, which misses less than the null model, and all candidates fitted anew.
-
-    Misfit looks like noise that remembers: what the best model leaves is closer to the truth.
-    """
-    best = judged[0].candidate
-    basis = np.column_stack([tracer.basis, best.slopes])
-    noise = own_noise(tracer.measurement, basis)
-    weight = effective_weight(noise.white(best.residual))
-    search = replace(tracer.search, noise=noise, weight=weight)
-    null = search.fit(tracer.null.hypothesis, [tracer.null.x]) or tracer.null
-    tracer = replace(tracer, search=search, null=null)
-    return tracer, tracer.again(judged)
-
-
-def _more_is_missing(tracer: Tracer, best: Judged, effects: Sequence[Any], rng: np.random.Generator) -> bool:
-    """True if the best single effect leaves structure behind that another one could take away."""
-    if best.ripples:
-        return False
-    if not best.explains:
-        return True
-    rest = [e for e in effects if e.name not in best.candidate.names]
-    found = signatures(tracer.measurement, best.candidate, rest, tracer.search.noise, tracer.search.solve)
-    left = detect(tracer.measurement, best.candidate, tracer.basis, found, tracer.search.noise, rng)
-    return not left.adequate
-
-
-def _earns(tracer: Tracer, pair: Judged, singles: Sequence[Judged]) -> bool:
-    """True if two effects are worth their parameters beside every single one, and take away misfit that matters.
-
-    An effect whose textbook form differs a little from the machine's leaves something that a second effect could take:
-    that is no second effect.
-    """
-    first = singles[0]
-    null = tracer.judged(tracer.null).fit.chi2
-    share = (first.fit.chi2 - pair.fit.chi2) / max(null - pair.fit.chi2, 1e-300)
-    return pair.log_evidence > first.log_evidence + EARNS and share >= EARNED_SHARE
-
-
-def _rivals(tracer: Tracer, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
-    """Those that the evidence does not put out of reach of the best; look-alikes are put out of reach later."""
-    if not explaining:
-        return ()
-    best = explaining[0]
-    out = [best]
-    for j in explaining[1:]:
-        if best.log_evidence - j.log_evidence < _decisive(tracer, best, j):
-            out.append(j)
-    return tuple(out)
-
-
-def _decisive(tracer: Tracer, a: Judged, b: Judged) -> float:
-    """ln of the Bayes factor that sets two candidates apart: more where their traces, as fitted, look alike."""
-    shared = set(a.candidate.names) & set(b.candidate.names)
-    # What two pairs have in common tells nothing of what sets them apart.
-    common = orthonormal(tracer.search.noise.white(a.candidate.slopes_of(shared)))
-    traces = (_trace(tracer, c.candidate) for c in (a, b))
-    one, two = (t - common @ (common.T @ t) for t in traces)
-    degrees = angle(one, two, fold=False)
-    return next((needed for nearer, needed in LOOKALIKES if degrees < nearer), DECISIVE)
-
-
-def _trace(tracer: Tracer, candidate: Candidate) -> Array:
-    """(N,) whitened: what the candidate takes away from the null model's residual."""
-    return tracer.search.noise.white(tracer.null.residual - candidate.residual)
-
-
-def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged], others: Sequence[Judged]) -> Verdict:
-    """The verdict from what explains the curve, the single effects that do, and the energies that may do so."""
-    energies = [j for j in others if j.explains]
-    if not explaining:
-        return _without_effects(tracer, others)
-    rivals = _rivals(tracer, explaining)
-    step = sudden(tracer.search, tracer.null)
-    if step is not None and step.gain > rivals[0].gain + DECISIVE:
-        return Verdict("unknown", (), step)
-    if step is not None and step.gain > rivals[0].gain - DECISIVE:
-        # One moment has all of it: an effect that happens to come then is no better a guess than something foreign.
-        return Verdict("ambiguous", rivals, step)
-    single_valued = all(tracer.single_valued(j.candidate) for j in rivals)
-    if energies and (energies[0].gain > rivals[0].gain or (single_valued and _comes_near(energies[0], rivals[0]))):
-        return Verdict("material", (energies[0],))
-    if single_valued and all(j.candidate.x.size > tracer.null.x.size + 1 for j in rivals):
-        if not alone or len(rivals[0].candidate.names) == 1:
-            # Two effects that follow the deflection alone, or one whose law is free, imitate a strain energy that is
-            # not among those known.
-            return Verdict("unknown", rivals)
-        # One of them is enough, but its form is not the machine's: neither can be told from its look-alikes.
-        rivals = (*_rivals(tracer, alone), *rivals)
-    return Verdict("named" if len(rivals) == 1 else "ambiguous", rivals)
-
-
-def _comes_near(energy: Judged, effect: Judged) -> bool:
-    """True if an energy explains the curve and an effect that follows the deflection alone is not far beyond it.
-
-    The instrument is blamed only where no energy comes near, and not with an effect that is driven to its bounds.
-    """
-    near = energy.log_evidence > effect.log_evidence - ENERGY_DECISIVE
-    return near or energy.unexplained <= ALLOWED or bool(effect.candidate.at_bound)
-
-
-def _without_effects(tracer: Tracer, others: Sequence[Judged]) -> Verdict:
-    energies = [j for j in others if j.explains]
-    return Verdict("material", (energies[0],)) if energies else Verdict("unknown", ())
-
-
 # ---- what is said of it ----------------------------------------------------------------------------------------------
 
 
@@ -391,25 +236,19 @@ def _told(
     rivals = [j.candidate for j in everything[:3]] if known else []
     validation = validate(search, mask, where, null, best, rivals)
     members = [j.candidate for j in verdict.members]
-    undecided = verdict.verdict == "ambiguous"
-    several = undecided and len(members) > 1
+    several = verdict.verdict == "ambiguous" and len(members) > 1
     nexts = experiments(measurement, members, search.noise.sd, search.solve) if several else []
     sd = search.noise.each
-    waves = detection.periodicity
     power = smallest_sizes(found, detection.score.critical)
     shown = measurement.rig.shown(measurement.specimen.thickness)
-    shape = describe(measurement, null.residual, waves)
-    step = verdict.step or (sudden(search, null) if verdict.verdict == "unknown" else None)
-    sudden_words = ""
-    if step is not None and (verdict.step or step.gain > everything[0].gain):
-        sudden_words = step.sentence(measurement.time, shown)
-        shape = f"{shape} {sudden_words}"
+    moment = _moment(tracer, verdict, everything)
+    shape = f"{describe(measurement, null.residual, detection.periodicity)} {moment}".rstrip()
     lost = tuple(e.absorbed for e in absorbed(measurement, null.hypothesis))
     before = error_of(null.residual, sd, null.x.size)
     after = error_of(best.residual, sd, best.x.size)
     partial = next((j for j in everything if j.candidate.names != null.names), None)
     sentence = sentence_of(
-        verdict.verdict, members, null, detection, before, after, shape, power, nexts, partial, shown, sudden_words
+        verdict.verdict, members, null, detection, before, after, shape, power, nexts, partial, shown, moment
     )
     if verdict.form is not None:
         sentence = form_sentence(null, verdict.form, detection)
@@ -432,6 +271,15 @@ def _told(
         validation=validation,
         experiments=tuple(nexts),
     )
+
+
+def _moment(tracer: Tracer, verdict: Verdict, everything: Sequence[Judged]) -> str:
+    """A sentence on the sudden change that explains the curve, or that comes nearest where nothing does; "" if none."""
+    m, step = tracer.measurement, verdict.step
+    if step is None and verdict.verdict == "unknown":
+        nearest = sudden(tracer.search, tracer.null)
+        step = nearest if nearest is not None and nearest.gain > everything[0].gain else None
+    return "" if step is None else step.sentence(m.time, m.rig.shown(m.specimen.thickness))
 
 
 def _confounded(found: Sequence[Signature]) -> tuple[tuple[str, str, float], ...]:

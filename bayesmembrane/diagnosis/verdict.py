@@ -1,0 +1,176 @@
+"""What explains a misfit: singles, pairs and energies are refitted, and what they come to is decided."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayesmembrane.diagnosis.candidates import Candidate
+from bayesmembrane.diagnosis.detection import detect
+from bayesmembrane.diagnosis.scores import Signature, angle, signatures
+from bayesmembrane.diagnosis.sudden import Step, sudden
+from bayesmembrane.diagnosis.trace import (
+    ALLOWED,
+    DECISIVE,
+    EARNED_SHARE,
+    EARNS,
+    ENERGY_DECISIVE,
+    LEVEL,
+    LOOKALIKES,
+    Judged,
+    Tell,
+    Tracer,
+    effective_weight,
+    ranked,
+)
+from bayesmembrane.diagnosis.whitening import orthonormal, own_noise
+from bayesmembrane.effects.base import Effect
+from bayesmembrane.parameters import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What the candidates come to.
+
+    step : a sudden change that explains the curve as well as the members do, or better
+    form : part of the plain material's misfit that an adequate model leaves, where the tests do see it
+    """
+
+    verdict: str
+    members: tuple[Judged, ...]
+    step: Step | None = None
+    form: float | None = None
+
+
+def explained(
+    tracer: Tracer, effects: Sequence[Effect], found: Sequence[Signature], rng: np.random.Generator, say: Tell
+) -> tuple[Tracer, Verdict, list[Judged]]:
+    """(tracer with the noise of the best model, verdict, every candidate) of a model that misses something."""
+    visible = {f.effect.name for f in found}
+    singles = tracer.singles([e for e in effects if e.name in visible], say)
+    others: list[Judged] = []
+    if not singles:
+        others = tracer.materials(say)
+        return tracer, _without_effects(tracer, others), others
+    tracer, singles = _renewed(tracer, singles)
+    best, pairs = singles[0], []
+    if _more_is_missing(tracer, best, effects, rng):
+        pairs = tracer.pairs(singles, [e for e in effects if e.name in visible], say)
+        pairs = [p for p in pairs if _earns(tracer, p, singles)]
+        if pairs:
+            tracer, pairs = _renewed(tracer, pairs)
+            singles = tracer.again(singles)
+    explaining = [j for j in pairs or singles if j.explains]
+    rivals = _rivals(tracer, explaining)
+    if not rivals or rivals[0].p_value <= LEVEL or all(tracer.single_valued(j.candidate) for j in rivals):
+        others = tracer.materials(say)
+    every = ranked([*pairs, *singles, *others, tracer.judged(tracer.null)])
+    return tracer, _decide(tracer, explaining, [j for j in singles if j.explains], others), every
+
+
+def _renewed(tracer: Tracer, judged: list[Judged]) -> tuple[Tracer, list[Judged]]:
+    """Noise and weight from the best candidate, which misses less than the null model, and all candidates fitted anew.
+
+    Misfit looks like noise that remembers: what the best model leaves is closer to the truth.
+    """
+    best = judged[0].candidate
+    basis = np.column_stack([tracer.basis, best.slopes])
+    noise = own_noise(tracer.measurement, basis)
+    weight = effective_weight(noise.white(best.residual))
+    search = replace(tracer.search, noise=noise, weight=weight)
+    null = search.fit(tracer.null.hypothesis, [tracer.null.x]) or tracer.null
+    tracer = replace(tracer, search=search, null=null)
+    return tracer, tracer.again(judged)
+
+
+def _more_is_missing(tracer: Tracer, best: Judged, effects: Sequence[Effect], rng: np.random.Generator) -> bool:
+    """True if the best single effect leaves structure behind that another one could take away."""
+    if best.ripples:
+        return False
+    if not best.explains:
+        return True
+    rest = [e for e in effects if e.name not in best.candidate.names]
+    found = signatures(tracer.measurement, best.candidate, rest, tracer.search.noise, tracer.search.solve)
+    left = detect(tracer.measurement, best.candidate, tracer.basis, found, tracer.search.noise, rng)
+    return not left.adequate
+
+
+def _earns(tracer: Tracer, pair: Judged, singles: Sequence[Judged]) -> bool:
+    """True if two effects are worth their parameters beside every single one, and take away misfit that matters.
+
+    An effect whose textbook form differs a little from the machine's leaves something that a second effect could take:
+    that is no second effect.
+    """
+    first = singles[0]
+    null = tracer.judged(tracer.null).fit.chi2
+    share = (first.fit.chi2 - pair.fit.chi2) / max(null - pair.fit.chi2, 1e-300)
+    return pair.log_evidence > first.log_evidence + EARNS and share >= EARNED_SHARE
+
+
+def _rivals(tracer: Tracer, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
+    """Those that the evidence does not put out of reach of the best; look-alikes are put out of reach later."""
+    if not explaining:
+        return ()
+    best = explaining[0]
+    out = [best]
+    for j in explaining[1:]:
+        if best.log_evidence - j.log_evidence < _decisive(tracer, best, j):
+            out.append(j)
+    return tuple(out)
+
+
+def _decisive(tracer: Tracer, a: Judged, b: Judged) -> float:
+    """ln of the Bayes factor that sets two candidates apart: more where their traces, as fitted, look alike."""
+    shared = set(a.candidate.names) & set(b.candidate.names)
+    # What two pairs have in common tells nothing of what sets them apart.
+    common = orthonormal(tracer.search.noise.white(a.candidate.slopes_of(shared)))
+    traces = (_trace(tracer, c.candidate) for c in (a, b))
+    one, two = (t - common @ (common.T @ t) for t in traces)
+    degrees = angle(one, two, fold=False)
+    return next((needed for nearer, needed in LOOKALIKES if degrees < nearer), DECISIVE)
+
+
+def _trace(tracer: Tracer, candidate: Candidate) -> Array:
+    """(N,) whitened: what the candidate takes away from the null model's residual."""
+    return tracer.search.noise.white(tracer.null.residual - candidate.residual)
+
+
+def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged], others: Sequence[Judged]) -> Verdict:
+    """The verdict from what explains the curve, the single effects that do, and the energies that may do so."""
+    energies = [j for j in others if j.explains]
+    if not explaining:
+        return _without_effects(tracer, others)
+    rivals = _rivals(tracer, explaining)
+    step = sudden(tracer.search, tracer.null)
+    if step is not None and step.gain > rivals[0].gain + DECISIVE:
+        return Verdict("unknown", (), step)
+    if step is not None and step.gain > rivals[0].gain - DECISIVE:
+        # One moment has all of it: an effect that happens to come then is no better a guess than something foreign.
+        return Verdict("ambiguous", rivals, step)
+    single_valued = all(tracer.single_valued(j.candidate) for j in rivals)
+    if energies and (energies[0].gain > rivals[0].gain or (single_valued and _comes_near(energies[0], rivals[0]))):
+        return Verdict("material", (energies[0],))
+    if single_valued and all(j.candidate.x.size > tracer.null.x.size + 1 for j in rivals):
+        if not alone or len(rivals[0].candidate.names) == 1:
+            # Two effects that follow the deflection alone, or one whose law is free, imitate a strain energy that is
+            # not among those known.
+            return Verdict("unknown", rivals)
+        # One of them is enough, but its form is not the machine's: neither can be told from its look-alikes.
+        rivals = (*_rivals(tracer, alone), *rivals)
+    return Verdict("named" if len(rivals) == 1 else "ambiguous", rivals)
+
+
+def _comes_near(energy: Judged, effect: Judged) -> bool:
+    """True if an energy explains the curve and an effect that follows the deflection alone is not far beyond it.
+
+    The instrument is blamed only where no energy comes near, and not with an effect that is driven to its bounds.
+    """
+    near = energy.log_evidence > effect.log_evidence - ENERGY_DECISIVE
+    return near or energy.unexplained <= ALLOWED or bool(effect.candidate.at_bound)
+
+
+def _without_effects(tracer: Tracer, others: Sequence[Judged]) -> Verdict:
+    energies = [j for j in others if j.explains]
+    return Verdict("material", (energies[0],)) if energies else Verdict("unknown", ())
