@@ -23,6 +23,7 @@ class Step:
 
     place : number of the reading; size : N, or part of the force if ``relative``
     gain : ln of the Bayes factor over the model without it; share : part of the model's chi^2 that it takes away
+    residual : (N,) N, what is left once the model has adapted; slopes : (N, k + 1) its own and the step's
     """
 
     place: int
@@ -30,6 +31,8 @@ class Step:
     relative: bool
     gain: float
     share: float
+    residual: Array
+    slopes: Array
 
     def sentence(self, time: Array | None, shown: Mapping[str, tuple[float, str]]) -> str:
         """When, how large (by `Rig.shown`), and what makes such a step."""
@@ -66,10 +69,14 @@ def sudden(search: Search, null: Candidate) -> Step | None:
     taken = np.where(seen, along**2 / np.where(seen, length, 1.0), 0.0)
     best = int(np.argmax(taken))
     gain = 0.5 * search.weight * float(taken[best]) - float(np.log(taken.size)) - 0.5 * float(np.log(n))
+    slopes = np.column_stack([null.slopes, steps[:, best]])
+    adapted = np.linalg.lstsq(search.noise.white(slopes), search.noise.white(null.residual), rcond=1e-9)[0]
     return Step(
         place=int(places[best % places.size]),
         size=float(along[best] / length[best]),
         relative=best >= after.shape[1],
         gain=gain,
         share=float(taken[best] / (r @ r)),
+        residual=null.residual - slopes @ adapted,
+        slopes=slopes,
     )

@@ -22,7 +22,9 @@ DECISIVE = 4.0
 """ln of the Bayes factor beyond which a rival is out."""
 LOOKALIKES = ((15.0, 8.0), (30.0, 5.0))
 """(degrees, the same for rivals whose trace makes less than that with the winner's)."""
-ENERGY_DECISIVE = 8.0  # the same for other energies: an instrument is blamed only far beyond them
+ENERGY_DECISIVE, ENERGY_SHARE = 8.0, 0.05
+"""The same for other energies, and as a part of the best effect's: an instrument is blamed only far beyond them."""
+FOREIGN_SHARE = 0.1  # of the best effect's ln K: how far beyond it a sudden change must be, for forms differ
 UNEXPLAINED, ALLOWED, LEVEL, MODEST = 0.2, 0.05, 0.01, 1.5
 """A model explains the curve if what is left is no more than chance makes of the second part of the misfit: of a small
 misfit, noise alone leaves a larger part. Or if no more than the second part is left, or no more than the first where
@@ -57,9 +59,7 @@ class Judged:
     @property
     def explains(self) -> bool:
         """True if it is more probable than the null model and leaves noise, or little beside what was there."""
-        most = UNEXPLAINED if self.fit.reduced_chi2 <= MODEST else ALLOWED
-        little = self.p_value > LEVEL or self.unexplained <= most
-        return little and self.gain > 0 and not self.ripples
+        return little(self.fit, self.unexplained, self.p_value) and self.gain > 0 and not self.ripples
 
     @property
     def log_evidence(self) -> float:
@@ -88,18 +88,19 @@ class Tracer:
 
     def judged(self, candidate: Candidate) -> Judged:
         """Its lack of fit, and the part of the null model's that is left."""
-        careful = self.search.noise.cautious()
-        fit = lack_of_fit(candidate.residual, candidate.slopes, self.basis, careful)
-        before = self._before
+        fit, left, p_value = self._left(candidate.residual, candidate.slopes)
+        gain = candidate.log_evidence - self.null.log_evidence
+        return Judged(candidate, fit, left, p_value, gain, self._ripples(candidate, self._before.chi2 - fit.chi2))
+
+    def explained_by(self, residual: Array, slopes: Array) -> bool:
+        """True if what a model with these slopes (N, k) leaves (N,) is noise, or little beside what was there."""
+        return little(*self._left(residual, slopes))
+
+    def _left(self, residual: Array, slopes: Array) -> tuple[LackOfFit, float, float]:
+        """(lack of fit, part of the null model's that is left, probability of it if `ALLOWED` may be left)."""
+        fit, before = lack_of_fit(residual, slopes, self.basis, self.search.noise.cautious()), self._before
         left = max(fit.ratio - 1, 0.0) / max(before.ratio - 1, 1e-12) if before.ratio > 1 else 0.0
-        return Judged(
-            candidate,
-            fit,
-            float(left),
-            fit.p_if_left(ALLOWED, before),
-            candidate.log_evidence - self.null.log_evidence,
-            self._ripples(candidate, before.chi2 - fit.chi2),
-        )
+        return fit, float(left), fit.p_if_left(ALLOWED, before)
 
     def _ripples(self, candidate: Candidate, taken: float) -> bool:
         """True if a wave is left that has more than its part of the squares ``taken`` away."""
@@ -174,6 +175,11 @@ class Tracer:
             if size > 0 and float(np.linalg.norm(rest)) > SINGLE_VALUED**0.5 * size:
                 return False
         return True
+
+
+def little(fit: LackOfFit, unexplained: float, p_value: float) -> bool:
+    """True if what is left is noise, or little beside what was there."""
+    return p_value > LEVEL or unexplained <= (UNEXPLAINED if fit.reduced_chi2 <= MODEST else ALLOWED)
 
 
 def ranked(judged: Iterable[Judged]) -> list[Judged]:

@@ -12,11 +12,12 @@ from bayesmembrane.diagnosis.detection import detect
 from bayesmembrane.diagnosis.scores import Signature, angle, signatures
 from bayesmembrane.diagnosis.sudden import Step, sudden
 from bayesmembrane.diagnosis.trace import (
-    ALLOWED,
     DECISIVE,
     EARNED_SHARE,
     EARNS,
     ENERGY_DECISIVE,
+    ENERGY_SHARE,
+    FOREIGN_SHARE,
     LEVEL,
     LOOKALIKES,
     Judged,
@@ -64,7 +65,7 @@ def explained(
             singles = tracer.again(singles)
     explaining = [j for j in pairs or singles if j.explains]
     rivals = _rivals(tracer, explaining)
-    if not rivals or rivals[0].p_value <= LEVEL or all(tracer.single_valued(j.candidate) for j in rivals):
+    if not rivals or rivals[0].p_value <= LEVEL or tracer.single_valued(rivals[0].candidate):
         others = tracer.materials(say)
     every = ranked([*pairs, *singles, *others, tracer.judged(tracer.null)])
     return tracer, _decide(tracer, explaining, [j for j in singles if j.explains], others), every
@@ -144,15 +145,18 @@ def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged
         return _without_effects(tracer, others)
     rivals = _rivals(tracer, explaining)
     step = sudden(tracer.search, tracer.null)
-    if step is not None and step.gain > rivals[0].gain + DECISIVE:
+    if step is not None and not tracer.explained_by(step.residual, step.slopes):
+        step = None
+    if step is not None and step.gain > rivals[0].gain + max(DECISIVE, FOREIGN_SHARE * rivals[0].gain):
         return Verdict("unknown", (), step)
     if step is not None and step.gain > rivals[0].gain - DECISIVE:
         # One moment has all of it: an effect that happens to come then is no better a guess than something foreign.
         return Verdict("ambiguous", rivals, step)
-    single_valued = all(tracer.single_valued(j.candidate) for j in rivals)
+    single_valued = tracer.single_valued(rivals[0].candidate)
     if energies and (energies[0].gain > rivals[0].gain or (single_valued and _comes_near(energies[0], rivals[0]))):
         return Verdict("material", (energies[0],))
-    if single_valued and all(j.candidate.x.size > tracer.null.x.size + 1 for j in rivals):
+    alike = all(tracer.single_valued(j.candidate) for j in rivals)
+    if alike and all(j.candidate.x.size > tracer.null.x.size + 1 for j in rivals):
         if not alone or len(rivals[0].candidate.names) == 1:
             # Two effects that follow the deflection alone, or one whose law is free, imitate a strain energy that is
             # not among those known.
@@ -167,8 +171,8 @@ def _comes_near(energy: Judged, effect: Judged) -> bool:
 
     The instrument is blamed only where no energy comes near, and not with an effect that is driven to its bounds.
     """
-    near = energy.log_evidence > effect.log_evidence - ENERGY_DECISIVE
-    return near or energy.unexplained <= ALLOWED or bool(effect.candidate.at_bound)
+    behind = effect.gain - energy.gain
+    return behind < max(ENERGY_DECISIVE, ENERGY_SHARE * effect.gain) or bool(effect.candidate.at_bound)
 
 
 def _without_effects(tracer: Tracer, others: Sequence[Judged]) -> Verdict:
