@@ -161,7 +161,7 @@ def _sentence(rows: Sequence[Row], agreed: bool) -> str:
     by_z = sorted(both, key=lambda r: -_best(r)[0])
     gap = _best(by_z[0])[0] - _best(by_z[1])[0]
     sd = float(np.hypot(_best(by_z[0])[1], _best(by_z[1])[1]))
-    start = f"The evidence prefers {by_z[0].label} to {by_z[1].label} by {gap:.1f} +- {sd:.1f} in ln Z{_bayes(gap)}"
+    start = f"The evidence prefers {by_z[0].label} to {by_z[1].label} by {gap:.1f} +- {sd:.2g} in ln Z{_bayes(gap)}"
     if predicts is by_z[0]:
         d, se = _elpd_gap(predicts, next_best)
         return f"{start}, and leave-one-out prefers it too, to {next_best.label} by {d:.1f} +- {se:.1f}{_weak(d, se)}."

@@ -178,7 +178,7 @@ def _difference(better: Row, worse: Row, a: float, b: float) -> str:
     gap, sd = za - zb, float(np.hypot(sa, sb))
     names = spoken_label(better), spoken_label(worse)
     start = (
-        f"the evidence puts {names[0]} before {names[1]} by {gap:.1f} +- {sd:.1f} in ln Z, and the paper has them the "
+        f"the evidence puts {names[0]} before {names[1]} by {gap:.1f} +- {sd:.2g} in ln Z, and the paper has them the "
         f"other way round, with losses of {a:.3g} and {b:.3g} N"
     )
     if gap < DECIDED * sd or gap < 1.0:
