@@ -19,7 +19,9 @@ def started(out: Path) -> "subprocess.Popen[str]":
     """`compare` as a shell starts it, in a process group of its own."""
     words = ["compare", CURVE[0], "--specimen", CURVE[1], "--materials", "neo_hookean,yeoh"]
     words += ["--max-deflection-mm", "25", "--ess", "200", "--out", str(out), "--json"]
-    code = "import sys; from bayesmembrane.cli import main; sys.exit(main())"
+    # A job that a script puts into the background ignores interruptions; this one must not.
+    code = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    code += "from bayesmembrane.cli import main; sys.exit(main())"
     return subprocess.Popen(
         [sys.executable, "-c", code, *words],
         stdout=subprocess.PIPE,
