@@ -111,7 +111,7 @@ def _earns(tracer: Tracer, pair: Judged, singles: Sequence[Judged]) -> bool:
 
 
 def _rivals(tracer: Tracer, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
-    """Those that the evidence does not put out of reach of the best; look-alikes are put out of reach later."""
+    """The best and those that the evidence does not put out of its reach; of look-alikes it must say more."""
     if not explaining:
         return ()
     best = explaining[0]
@@ -145,13 +145,13 @@ def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged
         return _without_effects(tracer, others)
     rivals = _rivals(tracer, explaining)
     step = sudden(tracer.search, tracer.null)
-    if step is not None and not tracer.explained_by(step.residual, step.slopes):
-        step = None
-    if step is not None and step.gain > rivals[0].gain + max(DECISIVE, FOREIGN_SHARE * rivals[0].gain):
-        return Verdict("unknown", (), step)
-    if step is not None and step.gain > rivals[0].gain - DECISIVE:
-        # One moment has all of it: an effect that happens to come then is no better a guess than something foreign.
-        return Verdict("ambiguous", rivals, step)
+    if step is not None and tracer.explained_by(step.residual, step.slopes):
+        best = rivals[0].gain
+        if step.gain > best + max(DECISIVE, FOREIGN_SHARE * best):
+            return Verdict("unknown", (), step)
+        if step.gain > best - DECISIVE:
+            # One moment has all of it: an effect that happens to come then is no better a guess than what is foreign.
+            return Verdict("ambiguous", rivals, step)
     single_valued = tracer.single_valued(rivals[0].candidate)
     if energies and (energies[0].gain > rivals[0].gain or (single_valued and _comes_near(energies[0], rivals[0]))):
         return Verdict("material", (energies[0],))
