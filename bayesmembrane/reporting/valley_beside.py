@@ -30,7 +30,9 @@ def beside_picture(found: Beside, kind: str = "png") -> Picture:
             _approach(ax, a, pair)
             ax.set_title(label(a))
             ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16))
-        figure.suptitle(f"{found.added.hypothesis.material.title}: valleys without and with {names}", fontweight="bold")
+        title = found.added.hypothesis.material.title
+        text = f"{title}: valleys without and with {names} (dots: posterior draws)"
+        figure.suptitle(text, fontweight="bold")
         return _encoded(figure, kind)
 
 
@@ -93,4 +95,5 @@ def _approach(ax: Axes, a: Valley, pair: Between) -> None:
     up = [0.0, 1.0] if y is None else [float(p[y]) for p in ends]
     ax.plot([float(p[x]) for p in ends], up, color=INK, linewidth=1.2, linestyle=(0, (2, 2)), zorder=5)
     words = f"closest: {pair.approach.distance:.2g} posterior sd apart" if pair.approach.distance > 0 else "they meet"
-    ax.text(0.02, 0.98, f"{words}\ndots: posterior draws", transform=ax.transAxes, va="top", color=INK)
+    # Above the panel, where no draws lie.
+    ax.set_title(words, loc="right", color=INK, fontweight="normal", fontsize="medium")
