@@ -138,11 +138,8 @@ class Composition:
         force, state = virgin, State(self.path, given, virgin, slope)
         for effect, p in self._acting(Carried, x):
             force = effect.carried(p, force, state)
-        memory = self._acting(Memory, x)
-        for effect, p in memory:
+        for effect, p in self._acting(Memory, x):
             force = effect.remember(p, force, self.path)
-        if memory and not getattr(law, "pushes", False):
-            force = np.maximum(force, 0.0)
         with np.errstate(all="ignore"):
             part = np.where(virgin > 0, np.clip(force / virgin, 0.0, 10.0), 0.0)
         return force, slope * part

@@ -84,7 +84,7 @@ def test_relaxation_is_the_convolution() -> None:
     time = np.cumsum(rng.uniform(0.2, 8.0, d.size))
     m = measured(d, time)
     g, tau, decades = 0.4, 12.0, 1.5
-    f = force(m, "viscoelastic", x=np.array([g, tau, decades]))
+    f, pushed = (force(m, "viscoelastic", x=np.array([g, tau, decades, held])) for held in (0.0, 1.0))
     clock = m.path.clock
     knots, values = np.concatenate([[0.0], clock]), np.concatenate([[0.0], direct("yeoh", d)])
     times = tau * 10 ** (decades * np.linspace(-5 / 12, 5 / 12, 6))
@@ -94,6 +94,7 @@ def test_relaxation_is_the_convolution() -> None:
     for n in (0, 5, 20, d.size - 1):
         past = middle < clock[n]
         kernel = 1 - g * (1 - np.mean(np.exp(-(clock[n] - middle[past][:, None]) / times), axis=1))
+        assert pushed[n] == pytest.approx(kernel @ rate[past], rel=1e-4, abs=1e-6)
         assert f[n] == pytest.approx(max(kernel @ rate[past], 0.0), rel=1e-4, abs=1e-6)
 
 
@@ -171,8 +172,7 @@ def test_odd_protocols_are_fine() -> None:
     names = ("mullins", "viscoelastic", "rate", "friction", "clamp_slip", "permanent_set", "machine_compliance")
     d = np.array([0.01, 0.03, 0.02, 0.03, 0.03, 0.03, 0.001, 0.04, 0.04])
     time = np.array([1.0, 2.0, 2.1, 30.0, 31.0, 90.0, 91.0, 91.5, 400.0])
-    f = force(measured(d, time), *names)
-    assert np.all(f >= -0.1)
+    assert np.isfinite(force(measured(d, time), *names)).all()
     held = force(measured(d, time), "viscoelastic")
     assert held[5] < held[4] < held[3]
     one = Measurement(np.array([0.02]), np.array([1.0]), RIG, Specimen("film", 5e-5), time=np.array([3.0]))

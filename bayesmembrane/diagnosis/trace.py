@@ -24,7 +24,12 @@ LOOKALIKES = ((15.0, 8.0), (30.0, 5.0))
 """(degrees, the same for rivals whose trace makes less than that with the winner's)."""
 ENERGY_DECISIVE, ENERGY_SHARE = 8.0, 0.05
 """The same for other energies, and as a part of the best effect's: an instrument is blamed only far beyond them."""
-FOREIGN_SHARE = 0.1  # of the best effect's ln K: how far beyond it a sudden change must be, for forms differ
+FORM_SHARE = 0.4
+"""Of the ln K that the best leaves beyond noise: a rival nearer than that is not out, for the best's form is farther
+off than what sets them apart."""
+FOREIGN, FOREIGN_SHARE = 1.0, 0.02
+"""A sudden change from outside is rarer than an effect: how far beyond the best one's ln K it must be to be its rival,
+and, as a part of that but by no less than `DECISIVE`, to put it out."""
 UNEXPLAINED, ALLOWED, LEVEL, MODEST = 0.2, 0.05, 0.01, 1.5
 """A model explains the curve if what is left is no more than chance makes of the second part of the misfit: of a small
 misfit, noise alone leaves a larger part. Or if no more than the second part is left, or no more than the first where

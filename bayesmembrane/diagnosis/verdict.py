@@ -17,7 +17,9 @@ from bayesmembrane.diagnosis.trace import (
     EARNS,
     ENERGY_DECISIVE,
     ENERGY_SHARE,
+    FOREIGN,
     FOREIGN_SHARE,
+    FORM_SHARE,
     LEVEL,
     LOOKALIKES,
     Judged,
@@ -35,7 +37,7 @@ from bayesmembrane.parameters import Array
 class Verdict:
     """What the candidates come to.
 
-    step : a sudden change that explains the curve as well as the members do, or better
+    step : a sudden change that explains the curve as well as the members do, or better; beside a name, nearly as well
     form : part of the plain material's misfit that an adequate model leaves, where the tests do see it
     """
 
@@ -123,14 +125,18 @@ def _rivals(tracer: Tracer, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
 
 
 def _decisive(tracer: Tracer, a: Judged, b: Judged) -> float:
-    """ln of the Bayes factor that sets two candidates apart: more where their traces, as fitted, look alike."""
+    """ln of the Bayes factor that sets two candidates apart: more where their traces, as fitted, look alike, or where
+    the better one leaves much.
+    """
     shared = set(a.candidate.names) & set(b.candidate.names)
     # What two pairs have in common tells nothing of what sets them apart.
     common = orthonormal(tracer.search.noise.white(a.candidate.slopes_of(shared)))
     traces = (_trace(tracer, c.candidate) for c in (a, b))
     one, two = (t - common @ (common.T @ t) for t in traces)
     degrees = angle(one, two, fold=False)
-    return next((needed for nearer, needed in LOOKALIKES if degrees < nearer), DECISIVE)
+    needed = next((needed for nearer, needed in LOOKALIKES if degrees < nearer), DECISIVE)
+    left = a.unexplained / (1 - a.unexplained) * a.gain if a.fit.p_value < LEVEL and a.unexplained < 1 else 0.0
+    return max(needed, FORM_SHARE * left)
 
 
 def _trace(tracer: Tracer, candidate: Candidate) -> Array:
@@ -144,12 +150,14 @@ def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged
     if not explaining:
         return _without_effects(tracer, others)
     rivals = _rivals(tracer, explaining)
+    best = rivals[0].gain
     step = sudden(tracer.search, tracer.null)
-    if step is not None and tracer.explained_by(step.residual, step.slopes):
-        best = rivals[0].gain
+    if step is not None and not (step.gain > best - DECISIVE and tracer.explained_by(step.residual, step.slopes)):
+        step = None
+    if step is not None:
         if step.gain > best + max(DECISIVE, FOREIGN_SHARE * best):
             return Verdict("unknown", (), step)
-        if step.gain > best - DECISIVE:
+        if step.gain > best + FOREIGN:
             # One moment has all of it: an effect that happens to come then is no better a guess than what is foreign.
             return Verdict("ambiguous", rivals, step)
     single_valued = tracer.single_valued(rivals[0].candidate)
@@ -163,7 +171,7 @@ def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged
             return Verdict("unknown", rivals)
         # One of them is enough, but its form is not the machine's: neither can be told from its look-alikes.
         rivals = (*_rivals(tracer, alone), *rivals)
-    return Verdict("named" if len(rivals) == 1 else "ambiguous", rivals)
+    return Verdict("named" if len(rivals) == 1 else "ambiguous", rivals, step if len(rivals) == 1 else None)
 
 
 def _comes_near(energy: Judged, effect: Judged) -> bool:

@@ -37,7 +37,7 @@ def sentence_of(
 ) -> str:
     """What to read first: the verdict, how sure, how large, and what to do; in the units ``shown`` of the rig.
 
-    ``step`` : a sentence on a sudden change that explains an ambiguous curve just as well
+    ``step`` : a sentence on a sudden change that explains a curve nearly as well, or just as well if it is ambiguous
     """
     factor, unit = shown["N"]
     title = null.hypothesis.material.title
@@ -54,7 +54,8 @@ def sentence_of(
         f"{after.reduced_chi2:.2f} in reduced chi-square."
     )
     if verdict == "named":
-        return f"{start}{_effects(members[0], null, shown)}. {error}{_bounds(members[0])}{_signature(members[0], null)}"
+        text = f"{start}{_effects(members[0], null, shown)}. {error}{_bounds(members[0])}{_signature(members[0], null)}"
+        return f"{text} {step}".rstrip()
     if verdict == "material":
         better = members[0].hypothesis.material.title
         return (

@@ -6,11 +6,14 @@ import numba
 import numpy as np
 
 from bayesmembrane.effects.base import EffectParameter, running_max
-from bayesmembrane.parameters import Array, LogNormal, Uniform
+from bayesmembrane.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.protocol import Path
 
 EXPONENT = EffectParameter(
     "exponent", "-", "power of the deflection with which it grows", LogNormal(2.0, 0.7), (0.2, 20.0)
+)
+SATURATION = EffectParameter(
+    "saturation", "-", "how far it has saturated at the end of the range, 0: not at all", HalfNormal(2.0), (0.0, 100.0)
 )
 REPEATED = EffectParameter(
     "repeated",
@@ -21,14 +24,17 @@ REPEATED = EffectParameter(
 )
 
 
-def growth(exponent: Array, repeated: Array, deflection: Array, path: Path) -> Array:
-    """G (B, N) = (1 - c) (m / D)^a + c (a + 1) sum over loading steps of (x / D)^a dx / D, never falling.
+def growth(exponent: Array, repeated: Array, deflection: Array, path: Path, saturation: Array | float = 0.0) -> Array:
+    """G (B, N) = (1 - c) H + c (a + 1) sum over loading steps of (x / D)^a dx / D, never falling; with
+    H = (1 + s) (m / D)^a / (1 + s (m / D)^a).
 
-    m is the largest deflection so far, D the full range of the test, a ``exponent`` and c ``repeated``, each (B, 1).
-    A first loading up to D ends at G = 1 for any a and c; the second part goes on growing when it is repeated.
+    m is the largest deflection so far, D the full range of the test, a ``exponent``, c ``repeated`` and s
+    ``saturation``, each (B, 1): a power if s = 0, a threshold or a quick rise that comes to its end if not. A first
+    loading up to D ends at G = 1 for any of them; the second part goes on growing when it is repeated.
     """
     x = np.maximum(deflection, 0.0) / path.full_range
-    first = running_max(x) ** exponent
+    power = running_max(x) ** exponent
+    first = (1 + saturation) * power / (1 + saturation * power)
     if not np.any(repeated > 0):
         return first
     power = np.maximum(x, 0.0) ** (exponent + 1)

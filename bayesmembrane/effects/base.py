@@ -196,7 +196,10 @@ class Memory(Effect, ABC):
 
     @abstractmethod
     def remember(self, p: Array, force: Array, path: Path) -> Array:
-        """(B, N) N: the force, from that (B, N) of a film without memory of time."""
+        """(B, N) N: the force, from that (B, N) of a film without memory of time.
+
+        What would push is for the effect to give up: a slack film carries no force.
+        """
 
 
 class Compliance(Effect, ABC):

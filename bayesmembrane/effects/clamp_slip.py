@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bayesmembrane.effects._history import EXPONENT, REPEATED, growth
+from bayesmembrane.effects._history import EXPONENT, REPEATED, SATURATION, growth
 from bayesmembrane.effects.base import EffectParameter, Slack
 from bayesmembrane.parameters import Array, HalfNormal
 from bayesmembrane.protocol import Path
@@ -33,7 +33,8 @@ class ClampSlip(Slack):
         ),
         EXPONENT,
         REPEATED,
+        SATURATION,
     )
 
     def excess(self, p: Array, deflection: Array, path: Path) -> Array:
-        return p[:, :1] * growth(p[:, 1:2], p[:, 2:3], deflection, path)
+        return p[:, :1] * growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4])

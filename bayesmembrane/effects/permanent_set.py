@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.effects._history import EXPONENT
+from bayesmembrane.effects._history import EXPONENT, REPEATED, SATURATION, growth
 from bayesmembrane.effects.base import Deflection, EffectParameter, running_max
 from bayesmembrane.parameters import Array, HalfNormal, Uniform
 from bayesmembrane.protocol import Path
@@ -15,9 +15,10 @@ from bayesmembrane.protocol import Path
 
 @dataclass(frozen=True)
 class PermanentSet(Deflection):
-    """delta_film = delta - set (m / D)^exponent (1 - rejoin delta / m), slack below; m: largest deflection so far.
+    """delta_film = delta - set G (1 - rejoin delta / m), slack below; m: largest deflection so far.
 
-    D is the full range of the test. ``rejoin`` 1 comes back to the first loading curve at m, 0 keeps the whole shift.
+    G is the growth law of the test (1 after a first loading to its full range). ``rejoin`` 1 comes back to the first
+    loading curve at m, 0 keeps the whole shift.
     """
 
     name: ClassVar[str] = "permanent_set"
@@ -40,11 +41,13 @@ class PermanentSet(Deflection):
             Uniform(0.0, 1.0),
             (0.0, 1.0),
         ),
+        REPEATED,
+        SATURATION,
     )
 
     def deflect(self, p: Array, deflection: Array, path: Path) -> Array:
         largest = running_max(deflection)
-        lasting = p[:, :1] * (largest / path.full_range) ** p[:, 1:2]
+        lasting = p[:, :1] * growth(p[:, 1:2], p[:, 3:4], deflection, path, p[:, 4:5])
         with np.errstate(all="ignore"):
             part = np.where(largest > 0, np.maximum(deflection, 0.0) / largest, 0.0)
         return np.asarray(deflection - lasting * (1 - p[:, 2:3] * part))

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.effects._history import follow
 from bayesmembrane.effects.base import EffectParameter, Memory
-from bayesmembrane.parameters import Array, HalfNormal, LogNormal
+from bayesmembrane.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.protocol import Path
 
 TERMS = 6
@@ -17,11 +17,12 @@ TERMS = 6
 
 @dataclass(frozen=True)
 class Viscoelastic(Memory):
-    """F(t) = F_e(t) - strength int (1 - sum_i exp(-(t - s) / time_i) / n) dF_e(s), n = 6.
+    """F(t) = F_e(t) - strength int (1 - sum_i exp(-(t - s) / time_i) / n) dF_e(s), n = 6; F below zero counts ``held``.
 
     The times are evenly spread in log time within ``decades`` decades around ``time``: one relaxation time if it is
     zero, a broad spectrum if not. F_e is the instantaneous force. Without times the clock is the distance
-    travelled at 1 mm/s.
+    travelled at 1 mm/s. After a fast return F is negative: a thin film is slack then (held = 0), one that is stiff or
+    sticks to the disc withstands some of it, a block all (held = 1).
     """
 
     name: ClassVar[str] = "viscoelastic"
@@ -37,6 +38,7 @@ class Viscoelastic(Memory):
         ),
         EffectParameter("time", "s", "middle relaxation time", LogNormal(30.0, 1.5), (0.05, 2e4)),
         EffectParameter("decades", "-", "width of the spectrum of times", HalfNormal(1.0), (0.0, 6.0)),
+        EffectParameter("held", "-", "part of a push that it withstands before slack", Uniform(0.0, 1.0), (0.0, 1.0)),
     )
 
     def remember(self, p: Array, force: Array, path: Path) -> Array:
@@ -46,4 +48,6 @@ class Viscoelastic(Memory):
         for place in (np.arange(TERMS) + 0.5) / TERMS - 0.5:
             time = p[:, 1:2] * 10.0 ** (place * p[:, 2:3])
             kept += follow(force, gap / time, start) / TERMS
-        return np.asarray(force - p[:, :1] * (force - kept))
+        relaxed = force - p[:, :1] * (force - kept)
+        least = np.minimum(force, 0.0)
+        return np.asarray(np.maximum(relaxed, least) + p[:, 3:4] * np.minimum(relaxed - least, 0.0))

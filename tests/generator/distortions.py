@@ -233,13 +233,13 @@ def relaxed_share(active: Active, lag: Array) -> Array:
 
 
 def convolved(active: Active, force: Array, time: Array) -> Array:
-    """F(t) = F_e(t) - size int (1 - k(t - s)) dF_e(s), F_e linear between the samples."""
+    """F(t) = F_e(t) - size int (1 - k(t - s)) dF_e(s), F_e linear between the samples; slack where that would push."""
     grid = (time[-1] - time[0]) * np.linspace(0, 1, 3000) ** 2
     share = relaxed_share(active, grid)
     integral = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]) * np.diff(grid))])
     lag = np.interp(np.maximum(time[:, None] - time[None, :], 0.0), grid, integral)
     weight = (lag[:, :-1] - lag[:, 1:]) / np.diff(time)
-    return force - active.size * (weight @ np.diff(force))
+    return np.maximum(force - active.size * (weight @ np.diff(force)), 0.0)
 
 
 def rate_factor(active: Active, path: Path) -> Array:
