@@ -208,15 +208,15 @@ def _moments(p: Parameter) -> tuple[float, float]:
 
 
 def _at_bound(objective: Objective, x: Array) -> tuple[str, ...]:
-    """Coordinates at a bound that is not simply the absence of an effect."""
+    """Coordinates at a bound that stops them: not at the absence of an effect, nor where its law ends of itself."""
     out = []
     for i, p in enumerate(objective.parameters):
         low, high = p.bounds
         # Bounds that are decades apart are near in the logarithm.
         by = np.log if low > 0 else np.asarray
         tolerance = NEAR_BOUND * float(by(high) - by(low))
-        null = getattr(p, "null", None)
+        ends = {getattr(p, "null", None), *map(float, p.prior.distribution().support())}
         for bound in (low, high):
-            if abs(float(by(x[i]) - by(bound))) <= tolerance and bound != null:
+            if abs(float(by(x[i]) - by(bound))) <= tolerance and bound not in ends:
                 out.append(p.name)
     return tuple(out)

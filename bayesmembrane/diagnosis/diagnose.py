@@ -26,7 +26,7 @@ from bayesmembrane.diagnosis.trace import (
 )
 from bayesmembrane.diagnosis.verdict import Verdict, explained
 from bayesmembrane.diagnosis.whitening import OwnNoise, own_noise
-from bayesmembrane.diagnosis.wording import form_sentence, noise_sentence, sentence_of
+from bayesmembrane.diagnosis.wording import energy_sentence, form_sentence, noise_sentence, sentence_of
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.forward import Solve
 from bayesmembrane.hypothesis import Hypothesis
@@ -37,6 +37,7 @@ from bayesmembrane.parameters import Array
 
 VERDICTS = ("adequate", "named", "ambiguous", "material", "unknown")
 NEAR = 20.0  # degrees between signatures below which a protocol cannot separate two effects
+BETTER = 1.0  # ln of the Bayes factor by which another optimum of the plain model counts as better
 SPARE = 3  # points beyond the parameters, at least
 
 
@@ -167,11 +168,29 @@ def diagnose(
     verdict = Verdict("adequate", (everything[0],))
     if not detection.adequate:
         form = _form_left(tracer)
+        verdict = replace(verdict, form=form)
         if form is None:
-            tracer, verdict, everything = explained(tracer, effects, found, rng, say)
-        else:
-            verdict = replace(verdict, form=form)
+            visible = {f.effect.name for f in found}
+            singles = tracer.singles([e for e in effects if e.name in visible], say)
+            if (better := _better_null(tracer.search, null, singles)) is not None:
+                tracer = replace(tracer, null=better)
+                found = signatures(measurement, better, effects, search.noise, solve)
+                detection = detect(measurement, better, basis, found, search.noise, rng)
+                everything = [tracer.judged(better)]
+                verdict = Verdict("adequate", (everything[0],))
+            if not detection.adequate:
+                tracer, verdict, everything = explained(tracer, effects, singles, found, rng, say)
     return _told(tracer, detection, verdict, everything, found, seed, say)
+
+
+def _better_null(search: Search, null: Candidate, singles: Sequence[Judged]) -> Candidate | None:
+    """The plain model from where effects have led its material, if that is a better fit than the first search found.
+
+    Else effects of no size would seem to explain the curve.
+    """
+    starts = [j.candidate.x[: null.x.size] for j in singles]
+    found = search.fit(null.hypothesis, [null.x, *starts]) if starts else None
+    return found if found is not None and found.log_evidence > null.log_evidence + BETTER else None
 
 
 def _form_left(tracer: Tracer) -> float | None:
@@ -252,6 +271,8 @@ def _told(
     )
     if verdict.form is not None:
         sentence = form_sentence(null, verdict.form, detection)
+    if verdict.better is not None:
+        sentence += energy_sentence(verdict.better, verdict.members[0])
     return Diagnosis(
         verdict=verdict.verdict,
         effects=effects,

@@ -24,7 +24,7 @@ LOOKALIKES = ((15.0, 8.0), (30.0, 5.0))
 """(degrees, the same for rivals whose trace makes less than that with the winner's)."""
 ENERGY_DECISIVE, ENERGY_SHARE = 8.0, 0.05
 """The same for other energies, and as a part of the best effect's: an instrument is blamed only far beyond them."""
-FORM_SHARE = 0.4
+FORM_SHARE = 0.25
 """Of the ln K that the best leaves beyond noise: a rival nearer than that is not out, for the best's form is farther
 off than what sets them apart."""
 FOREIGN, FOREIGN_SHARE = 1.0, 0.02
@@ -40,6 +40,7 @@ the second part of the squares that a model takes away, the model explains nothi
 BEAM, EARNS, EARNED_SHARE = 4, 15.0, 0.045  # of pairs: how many singles are followed, ln K and part of chi^2 to gain
 SINGLE_VALUED = 0.02  # part of a signature that deflection alone does not explain
 LEAST_WEIGHT = 0.05
+FOLLOWED = 3  # explanations that are tried with other energies
 
 Tell = Callable[[str], None]
 
@@ -157,6 +158,27 @@ class Tracer:
             found = self.search.fit(other, self.search.sane(other))
             if found is not None:
                 out.append(self.judged(found))
+        return ranked(out)
+
+    def elsewhere(self, judged: Sequence[Judged], tell: Tell) -> list[Judged]:
+        """The effects of the first few of ``judged`` with every other energy; the most probable first.
+
+        A wrong energy leaves structure, and an effect whose law is free may follow that instead of the true one's.
+        """
+        out = []
+        for name, kind in materials().items():
+            if name == self.null.hypothesis.material.name:
+                continue
+            tell(f"trying the energy {kind.title} with effects")
+            for j in judged[:FOLLOWED]:
+                h = j.candidate.hypothesis
+                other, size = replace(h, material=kind), h.material_size
+                starts = [
+                    np.concatenate([x[: other.material_size], j.candidate.x[size:]]) for x in self.search.sane(other)
+                ]
+                found = self.search.fit(other, starts)
+                if found is not None:
+                    out.append(self.judged(found))
         return ranked(out)
 
     def again(self, judged: Iterable[Judged]) -> list[Judged]:

@@ -38,21 +38,30 @@ class Verdict:
     """What the candidates come to.
 
     step : a sudden change that explains the curve as well as the members do, or better; beside a name, nearly as well
+    better : the same effects or others with another energy, where that is decisively more probable
     form : part of the plain material's misfit that an adequate model leaves, where the tests do see it
     """
 
     verdict: str
     members: tuple[Judged, ...]
     step: Step | None = None
+    better: Judged | None = None
     form: float | None = None
 
 
 def explained(
-    tracer: Tracer, effects: Sequence[Effect], found: Sequence[Signature], rng: np.random.Generator, say: Tell
+    tracer: Tracer,
+    effects: Sequence[Effect],
+    singles: list[Judged],
+    found: Sequence[Signature],
+    rng: np.random.Generator,
+    say: Tell,
 ) -> tuple[Tracer, Verdict, list[Judged]]:
-    """(tracer with the noise of the best model, verdict, every candidate) of a model that misses something."""
+    """(tracer with the noise of the best model, verdict, every candidate) of a model that misses something.
+
+    singles : it with each effect
+    """
     visible = {f.effect.name for f in found}
-    singles = tracer.singles([e for e in effects if e.name in visible], say)
     others: list[Judged] = []
     if not singles:
         others = tracer.materials(say)
@@ -69,8 +78,12 @@ def explained(
     rivals = _rivals(tracer, explaining)
     if not rivals or rivals[0].p_value <= LEVEL or tracer.single_valued(rivals[0].candidate):
         others = tracer.materials(say)
-    every = ranked([*pairs, *singles, *others, tracer.judged(tracer.null)])
-    return tracer, _decide(tracer, explaining, [j for j in singles if j.explains], others), every
+    elsewhere: list[Judged] = []
+    if rivals and rivals[0].fit.p_value <= LEVEL:
+        elsewhere = tracer.elsewhere(explaining, say)
+    every = ranked([*pairs, *singles, *others, *elsewhere, tracer.judged(tracer.null)])
+    verdict = _decide(tracer, explaining, [j for j in singles if j.explains], others)
+    return tracer, _with_other_energies(verdict, elsewhere), every
 
 
 def _renewed(tracer: Tracer, judged: list[Judged]) -> tuple[Tracer, list[Judged]]:
@@ -172,6 +185,32 @@ def _decide(tracer: Tracer, explaining: Sequence[Judged], alone: Sequence[Judged
         # One of them is enough, but its form is not the machine's: neither can be told from its look-alikes.
         rivals = (*_rivals(tracer, alone), *rivals)
     return Verdict("named" if len(rivals) == 1 else "ambiguous", rivals, step if len(rivals) == 1 else None)
+
+
+def _with_other_energies(verdict: Verdict, elsewhere: Sequence[Judged]) -> Verdict:
+    """A name that depends on the energy is none: another effect, decisively better with another energy, is a rival; and
+    one that falls behind with the better energies is none any more.
+    """
+    best = next((j for j in elsewhere if j.explains), None)
+    if verdict.verdict not in ("named", "ambiguous") or best is None:
+        return verdict
+    first, *rest = verdict.members
+    if best.gain < first.gain + ENERGY_DECISIVE:
+        return verdict
+    names = set(best.candidate.names)
+    if names == set(first.candidate.names):
+        kept = [m for m in rest if _profile(m, elsewhere) > best.gain - ENERGY_DECISIVE]
+        alone = bool(rest) and not kept
+        return replace(verdict, verdict="named" if alone else verdict.verdict, members=(first, *kept), better=best)
+    if any(names == set(m.candidate.names) for m in rest):
+        return replace(verdict, better=best)
+    return replace(verdict, verdict="ambiguous", members=(*verdict.members, best), better=best)
+
+
+def _profile(member: Judged, elsewhere: Sequence[Judged]) -> float:
+    """ln K of its effects with the best of the energies that they were tried with."""
+    names = set(member.candidate.names)
+    return max(member.gain, *(j.gain for j in elsewhere if set(j.candidate.names) == names), -np.inf)
 
 
 def _comes_near(energy: Judged, effect: Judged) -> bool:

@@ -92,6 +92,15 @@ def form_sentence(null: Candidate, left: float, detection: Detection) -> str:
     )
 
 
+def energy_sentence(better: Judged, best: Judged) -> str:
+    """On another energy with which the same effect, or another one, is decisively more probable."""
+    h = better.candidate.hypothesis
+    return (
+        f" The energy matters here: with {h.material.title} and {' and '.join(e.title for e in h.effects)} "
+        f"the curve is more probable still, by {better.gain - best.gain:.3g} in ln K."
+    )
+
+
 def noise_sentence(noise: OwnNoise) -> str:
     """What the readings say against the stated noise; "" if nothing."""
     if noise.excess == 1:
@@ -120,7 +129,8 @@ def _effects(candidate: Candidate, null: Candidate, shown: Shown) -> str:
             continue
         p = effect.size
         words.append(f"{effect.title} ({p.name} {size_in_words(values[f'{effect.name}.{p.name}'], p.unit, shown)})")
-    return " and ".join(words)
+    other = candidate.hypothesis.material.title
+    return " and ".join(words) + (f" with {other}" if other != null.hypothesis.material.title else "")
 
 
 def size_in_words(value: float, unit: str, shown: Shown = SCALES) -> str:

@@ -25,6 +25,7 @@ from bayesmembrane.measurement import read_measurement
 from bayesmembrane.registry import materials
 from tests.generator.datasets import Dataset, generate
 from tests.generator.film import NoSolutionError
+from tests.studies.loop_intervals import held
 from tests.studies.loop_plan import Case, plan
 from tests.studies.loop_table import report
 
@@ -49,7 +50,13 @@ def run_case(case: Case) -> dict[str, Any]:
         found = diagnose(measurement, Hypothesis(materials()[case.material]))
     except BayesmembraneError as error:
         return head | truth_of(data) | {"verdict": "error", "effects": [], "sentence": str(error)}
-    return head | truth_of(data) | {"seconds": time.process_time() - begun} | answer_of(found, data)
+    seconds = time.process_time() - begun
+    answer = {"seconds": seconds} | answer_of(found, data)
+    if found.verdict == "named" and data.truth["family"] == case.material:
+        answer |= {
+            f"held_{k}": held(found, c, measurement, data) for k, c in (("null", found.null), ("best", found.best))
+        }
+    return head | truth_of(data) | answer
 
 
 def warmed() -> None:
