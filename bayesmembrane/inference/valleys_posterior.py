@@ -132,8 +132,12 @@ def spread_of_grid(found: Grid, cells: Array, mode: str, seed: int = 0, size: in
     z = found.z.reshape(-1, found.z.shape[-1])
     mean = w @ z
     centred = z - mean
-    draws = z[np.random.default_rng(seed).choice(len(z), size=size, p=w / w.sum())]
-    return Spread(mean, (centred * w[:, None]).T @ centred, draws, "grid")
+    rng = np.random.default_rng(seed)
+    cell = rng.choice(len(z), size=size, p=w / w.sum())
+    # Anywhere in its cell: draws at the middles only would stand in lines.
+    steps = [np.gradient(found.z, axis=i).reshape(z.shape)[cell] for i in range(z.shape[1])]
+    within = np.sum(rng.uniform(-0.5, 0.5, (z.shape[1], size, 1)) * np.array(steps), axis=0)
+    return Spread(mean, (centred * w[:, None]).T @ centred, z[cell] + within, "grid")
 
 
 class Normal:

@@ -24,10 +24,11 @@ def beside_picture(found: Beside, kind: str = "png") -> Picture:
     with _style():
         figure = _figure(4.6)
         axes = figure.subplots(1, count, squeeze=False)[0]
+        shown = _shown(found.without.ranges[0])
         for ax, pair, a, b in zip(axes, found.pairs, found.without.ranges, found.added.ranges, strict=True):
             for v, c, words in ((a, RANGE_COLOURS[0], "without"), (b, RANGE_COLOURS[1], f"with {names}")):
-                _valley(ax, a, v, c, f"{words}: least loss {v.best_loss:.3g} N")
-            _approach(ax, a, pair)
+                _valley(ax, shown, a, v, c, f"{words}: least loss {v.best_loss:.3g} N")
+            _approach(ax, shown, a, pair)
             ax.set_title(label(a))
             ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16))
         title = found.added.hypothesis.material.title
@@ -37,18 +38,19 @@ def beside_picture(found: Beside, kind: str = "png") -> Picture:
 
 
 def _shown(v: Valley) -> tuple[int, int | None]:
-    """Which of the material's parameters are x and y; only x if there is one."""
+    """Which of the material's parameters are x and y, alike in all panels; only x if there is one."""
     k = v.best.size
     if k == 1:
         return 0, None
     spread = np.diag(v.spread.covariance).copy()
     spread[v.along] = -1.0
-    return v.along, int(np.argmax(spread))
+    x, y = sorted((v.along, int(np.argmax(spread))))
+    return x, y
 
 
-def _valley(ax: Axes, plain: Valley, v: Valley, c: str, text: str) -> None:
-    """Floor, optimum and posterior of one valley over parameters of ``plain``."""
-    x, y = _shown(plain)
+def _valley(ax: Axes, shown: tuple[int, int | None], plain: Valley, v: Valley, c: str, text: str) -> None:
+    """Floor, optimum and posterior of one valley over two parameters of ``plain``."""
+    x, y = shown
     k = plain.best.size
     height = 0.0 if v is plain else 1.0
     star = _natural(plain, v.best_z[None, :k])
@@ -89,8 +91,8 @@ def _name(v: Valley, i: int) -> str:
     return f"-{name}" if v.chart.log[i] and v.chart.sign[i] < 0 else name
 
 
-def _approach(ax: Axes, a: Valley, pair: Between) -> None:
-    x, y = _shown(a)
+def _approach(ax: Axes, shown: tuple[int, int | None], a: Valley, pair: Between) -> None:
+    x, y = shown
     ends: Sequence[Array] = [_natural(a, p[None, :])[0] for p in (pair.approach.first, pair.approach.second)]
     up = [0.0, 1.0] if y is None else [float(p[y]) for p in ends]
     ax.plot([float(p[x]) for p in ends], up, color=INK, linewidth=1.2, linestyle=(0, (2, 2)), zorder=5)
