@@ -20,7 +20,7 @@ from bayesmembrane.registry import materials
 
 DECISIVE = 4.0
 """ln of the Bayes factor beyond which a rival is out."""
-LOOKALIKES = ((15.0, 8.0), (30.0, 5.0))
+LOOKALIKES = ((15.0, 6.0), (30.0, 5.0))
 """(degrees, the same for rivals whose trace makes less than that with the winner's)."""
 ENERGY_DECISIVE, ENERGY_SHARE = 8.0, 0.05
 """The same for other energies, and as a part of the best effect's: an instrument is blamed only far beyond them."""

@@ -10,7 +10,7 @@ from bayesmembrane.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.protocol import Path
 
 EXPONENT = EffectParameter(
-    "exponent", "-", "power of the deflection with which it grows", LogNormal(2.0, 0.7), (0.2, 20.0)
+    "exponent", "-", "power of the deflection with which it grows", LogNormal(2.0, 0.5), (0.4, 12.0)
 )
 SATURATION = EffectParameter(
     "saturation", "-", "how far it has saturated at the end of the range, 0: not at all", HalfNormal(2.0), (0.0, 100.0)
