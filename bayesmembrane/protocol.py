@@ -15,6 +15,8 @@ REVERSAL = 0.005
 """A reversal of the deflection counts as a new leg beyond this part of the whole range; less is jitter."""
 
 
+HELD, STILL = 12, 0.1
+"""Readings of a hold, at least, and the part of the speed before it at which the disc counts as standing still."""
 NOMINAL_SPEED = 1e-3
 """m/s: without times the disc counts as moved at this speed, so that a second is a millimetre of travel."""
 SLOWEST = 1e-3
@@ -113,6 +115,25 @@ def first_loading(deflection: Array, leg: NDArray[np.int8]) -> NDArray[np.bool_]
     """(N,) True where the film is loaded to a deflection that it has not seen before."""
     reached = np.maximum.accumulate(deflection)
     return np.asarray((leg > 0) & (deflection >= reached - _jitter(deflection)))
+
+
+def holds(deflection: Array) -> list[NDArray[np.intp]]:
+    """The readings of each time at which the disc stands still: `HELD` and more of them within the jitter, after a way
+    at least ten times as fast.
+    """
+    tolerance, n = _jitter(deflection), deflection.size
+    found, i = [], 0
+    while i + HELD <= n:
+        away = np.flatnonzero(np.abs(deflection[i:] - deflection[i]) > tolerance)
+        end = i + int(away[0]) if away.size else n
+        before = abs(deflection[i] - deflection[max(i - HELD, 0)]) / HELD
+        during = abs(deflection[end - 1] - deflection[i]) / max(end - i, 1)
+        if end - i >= HELD and during < STILL * before:
+            found.append(np.arange(i, end))
+            i = end
+        else:
+            i += 1
+    return found
 
 
 def check_time(time: Array, places: list[str]) -> None:

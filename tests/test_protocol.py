@@ -5,7 +5,7 @@ import pytest
 
 from bayesmembrane.inference.storage import inference_data, measurement_of
 from bayesmembrane.measurement import Measurement, Specimen
-from bayesmembrane.protocol import NOMINAL_SPEED, Path
+from bayesmembrane.protocol import NOMINAL_SPEED, Path, holds
 from bayesmembrane.rigs.annulus import Annulus
 
 D = np.concatenate([np.linspace(1e-3, 0.02, 20), np.linspace(0.019, 1e-3, 19), np.linspace(2e-3, 0.04, 39)])
@@ -62,3 +62,15 @@ def test_a_stored_selection_comes_back() -> None:
         part.data_hash
         != Measurement(**{k: getattr(part, k) for k in ("deflection", "force", "rig", "specimen", "time")}).data_hash
     )
+
+
+def test_a_hold_is_where_the_disc_stands_still_and_not_where_it_goes_slowly() -> None:
+    rng = np.random.default_rng(8)
+    up, down = np.linspace(0.0, 0.04, 60), np.linspace(0.04, 0.0, 60)
+    d = np.concatenate([up, np.full(50, 0.04), down, np.zeros(30), up])
+    found = holds(d + 2e-6 * rng.standard_normal(d.size))
+    assert [(h[0], h[-1]) for h in found] == [(59, 110), (169, 200)]
+    assert holds(np.concatenate([up, down])) == []
+    assert holds(np.linspace(0.0, 0.04, 5000)) == []
+    # Ten times as many readings on a leg, as of one ten times as slow that is read at the same rate.
+    assert holds(np.concatenate([up, np.linspace(0.04, 0.0, 600)])) == []

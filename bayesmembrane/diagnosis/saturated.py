@@ -13,11 +13,13 @@ from scipy.stats import chi2, f, ncf, ncx2
 from bayesmembrane.diagnosis.whitening import FEW, OwnNoise, orthonormal
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.parameters import Array
+from bayesmembrane.protocol import holds
 
 SPLINE, PER_LEG = 20, 6
 SHARE = 3  # points for each column of the reference, at least
 SHORT_LEG = 12  # points; a shorter leg gets a constant only
 REVERSAL = 0.05  # of a leg: how fast its start may relax
+RELAXATIONS = (0.01, 0.03, 0.1, 0.3, 1.0)  # of a hold: how fast it may
 
 
 @dataclass(frozen=True)
@@ -54,27 +56,31 @@ class LackOfFit:
 
 
 def reference_basis(measurement: Measurement) -> Array:
-    """(N, p): B-splines in the deflection, and on each leg Legendre polynomials and a quick relaxation at its start.
+    """(N, p): B-splines in the deflection; on each leg Legendre polynomials and a quick relaxation at its start; on
+    each hold a constant and relaxations.
 
     Splines have no more columns than a third of the points, all together two thirds at most; splines come first, then
     what tells legs apart.
     """
     d = measurement.deflection
     room = max(len(measurement) // SHARE, 1)
-    columns = [splines(d, min(SPLINE, room, max(np.unique(d).size // 2, 1)))]
+    still = holds(d)
+    moving = np.delete(d, np.concatenate(still)) if still else d
+    columns = [splines(d, min(SPLINE, room, max(np.unique(moving).size // 2, 1)), moving)]
     starts = np.flatnonzero(np.diff(measurement.leg.astype(int))) + 1
     legs = np.split(np.arange(d.size), starts)
     if len(legs) > 1:
         each = PER_LEG if columns[0].shape[1] + PER_LEG * len(legs) <= 2 * room else 1
         columns += [_on_leg(d, leg, each) for leg in legs]
+    columns += [_on_hold(measurement.path.clock[measurement.on_path], hold) for hold in still]
     return np.concatenate(columns, axis=1)
 
 
-def splines(d: Array, count: int) -> Array:
-    """Cubic B-splines of ``count`` degrees of freedom with knots at quantiles of the deflections (N,)."""
+def splines(d: Array, count: int, at: Array | None = None) -> Array:
+    """Cubic B-splines of ``count`` degrees of freedom at deflections d (N,), with knots at quantiles of ``at`` or d."""
     if count < 4:
         return np.vander((d - d.mean()) / max(np.ptp(d), 1e-12), count)
-    inner = np.quantile(np.unique(d), np.linspace(0, 1, count - 2)[1:-1])
+    inner = np.quantile(np.unique(d if at is None else at), np.linspace(0, 1, count - 2)[1:-1])
     low, high = float(d.min()), float(d.max())
     knots = np.concatenate([[low] * 4, inner, [high] * 4])
     return np.asarray(BSpline.design_matrix(np.clip(d, low, high), knots, 3).toarray())
@@ -91,6 +97,13 @@ def _on_leg(d: Array, leg: NDArray[np.intp], count: int) -> Array:
         s = way / way.max()
     out[leg, :-1] = legvander(2 * s - 1, count - 2)
     out[leg, -1] = np.exp(-s / REVERSAL)
+    return out
+
+
+def _on_hold(time: Array, hold: NDArray[np.intp]) -> Array:
+    s = (time[hold] - time[hold[0]]) / max(float(np.ptp(time[hold])), 1e-300)
+    out = np.zeros((time.size, 1 + len(RELAXATIONS)))
+    out[hold] = np.column_stack([np.ones(hold.size), *(np.exp(-s / part) for part in RELAXATIONS)])
     return out
 
 

@@ -10,8 +10,9 @@ from bayesmembrane.diagnosis.diagnose import VERDICTS, Diagnosis, diagnose
 from bayesmembrane.errors import SettingsError
 from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.materials.ogden import Ogden
-from bayesmembrane.measurement import read_measurement
+from bayesmembrane.measurement import Measurement, Specimen, read_measurement
 from bayesmembrane.registry import components, materials
+from bayesmembrane.rigs.uniaxial import Uniaxial
 from tests.diagnosis.curves import measured
 from tests.generator.datasets import Dataset, generate
 
@@ -124,6 +125,23 @@ def test_what_the_form_of_a_named_effect_leaves_is_no_further_effect(tmp_path) -
     assert second.verdict == "adequate"
     assert second.detection.p_value < 0.01
     assert "form" in second.sentence
+
+
+def test_a_relaxation_test_shows_relaxation() -> None:
+    """A strip is pulled within five seconds and held; the convolution is summed here, with a stretched exponential."""
+    time = np.concatenate([np.linspace(0.1, 5, 100), np.linspace(5.3, 100, 300)])
+    stretch = 1 + 0.8 * np.minimum(time / 5, 1)
+    elastic = np.concatenate([[0.0], 60 * (stretch - 1 / stretch**2)])
+    ticks = np.concatenate([[0.0], time])
+    lag = time[:, None] - 0.5 * (ticks[1:] + ticks[:-1])
+    kernel = np.where(lag > 0, 1 - 0.35 * -np.expm1(-((np.maximum(lag, 0) / 12) ** 0.6)), 0.0)
+    rig = Uniaxial()
+    force = rig.width * (kernel @ np.diff(elastic))
+    noisy = force + 3e-3 * force.max() * np.random.default_rng(50811).standard_normal(time.size)
+    m = Measurement(rig.length * (stretch - 1), noisy, rig, Specimen("strip", 1e-3), time=time)
+    found = diagnose(m, Hypothesis(materials()["neo_hookean"]))
+    assert (found.verdict, found.effects) == ("named", ("viscoelastic",))
+    assert found.best.parameters["viscoelastic.strength"] == pytest.approx(0.35, rel=0.25)
 
 
 def test_a_stated_deviation_that_the_readings_contradict_raises_no_alarm(tmp_path) -> None:
