@@ -21,6 +21,7 @@ from bayesmembrane.registry import components
 
 ITERATIONS, SANE = 40, 3
 SIZES = (0.1, 0.6)  # of the expected size of an effect: where searches for it start
+BEHIND = 4.0  # times the least sum of squares: a search as far off as that is not waited for
 NEAR_BOUND = 1e-3  # of the expected size, or of the width of the bounds
 
 
@@ -105,7 +106,7 @@ class Search:
                 np.concatenate([root * j, pull], axis=1),
             )
 
-        x, size = descend(residuals, np.array(rows), objective.low, objective.high, ITERATIONS)
+        x, size = descend(residuals, np.array(rows), objective.low, objective.high, ITERATIONS, behind=BEHIND)
         if not np.any(np.isfinite(size)):
             return None
         return self._candidate(objective, x[int(np.argmin(size))], float(np.min(size)))

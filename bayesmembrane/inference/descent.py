@@ -15,6 +15,7 @@ Residuals = Callable[[Array], tuple[Array, Array]]
 DAMPING, EASIER, HARDER, HOPELESS = 1e-2, 0.2, 5.0, 1e12
 SLOW = 1e-9  # relative decrease of |r|^2 below which a step counts as slow
 PATIENCE = 3  # slow steps in a row that end a search
+CRAWL, CRAWLS = 1e-3, 4  # the same of a search that is far behind the best one
 
 
 def descend(
@@ -24,13 +25,15 @@ def descend(
     high: Array,
     iterations: int,
     held: NDArray[np.bool_] | None = None,
+    behind: float = np.inf,
 ) -> tuple[Array, Array]:
     """min |r(x)|^2 within low <= x <= high from each row of start (M, k), by Marquardt's damped steps
 
         (J^T J + m diag(J^T J)) s = -J^T r,
 
     with coordinates at a bound left out while the step would leave it, and those in ``held`` (M, k) left out always.
-    Returns x (M, k) and |r| (M,), inf where a start has no residuals.
+    A row whose |r|^2 is more than ``behind`` times the least is given up when it crawls: films at the edge of what can
+    be solved cost most. Returns x (M, k) and |r| (M,), inf where a start has no residuals.
 
     D. W. Marquardt, J. SIAM 11 (1963) 431; a row that finds no better point with any damping is done.
     """
@@ -38,7 +41,7 @@ def descend(
     free = np.ones(x.shape, bool) if held is None else ~held
     r, jacobian = residuals(x)
     size = _square(r)
-    damping, slow = np.full(len(x), DAMPING), np.zeros(len(x), int)
+    damping, slow, crawl = np.full(len(x), DAMPING), np.zeros(len(x), int), np.zeros(len(x), int)
     going = np.isfinite(size)
     for _ in range(iterations):
         rows = np.flatnonzero(going)
@@ -52,6 +55,8 @@ def descend(
         take = rows[better]
         gain = (size[take] - new_size[better]) / np.maximum(size[take], 1e-300)
         slow[take] = np.where(gain < SLOW, slow[take] + 1, 0)
+        crawl[rows] += 1
+        crawl[take[gain > CRAWL]] = 0
         x[take], r[take], jacobian[take], size[take] = (
             trial[better],
             new_r[better],
@@ -60,7 +65,8 @@ def descend(
         )
         damping[rows] *= np.where(better, EASIER, HARDER)
         damping = np.maximum(damping, 1e-12)
-        going[rows] = (damping[rows] < HOPELESS) & (slow[rows] < PATIENCE)
+        lost = (crawl[rows] >= CRAWLS) & (size[rows] > behind * np.min(size))
+        going[rows] = (damping[rows] < HOPELESS) & (slow[rows] < PATIENCE) & ~lost
     return x, np.sqrt(size)
 
 
