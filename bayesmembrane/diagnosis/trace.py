@@ -21,6 +21,8 @@ from bayesmembrane.registry import materials
 
 DECISIVE = 4.0
 """ln of the Bayes factor beyond which a rival is out."""
+PROBABLE = 3.0
+"""ln of the Bayes factor over the null model that an explanation needs: the tests may have raised a false alarm."""
 LOOKALIKES = ((15.0, 6.0), (30.0, 5.0))
 """(degrees, the same for rivals whose trace makes less than that with the winner's)."""
 ENERGY_DECISIVE, ENERGY_SHARE = 8.0, 0.05
@@ -65,8 +67,8 @@ class Judged:
 
     @property
     def explains(self) -> bool:
-        """True if it is more probable than the null model and leaves noise, or little beside what was there."""
-        return little(self.fit, self.unexplained, self.p_value) and self.gain > 0 and not self.ripples
+        """True if the null model is no rival of it, and it leaves noise, or little beside what was there."""
+        return little(self.fit, self.unexplained, self.p_value) and self.gain > PROBABLE and not self.ripples
 
     @property
     def log_evidence(self) -> float:

@@ -65,7 +65,7 @@ def descend(
         )
         damping[rows] *= np.where(better, EASIER, HARDER)
         damping = np.maximum(damping, 1e-12)
-        lost = (crawl[rows] >= CRAWLS) & (size[rows] > behind * np.min(size))
+        lost = (crawl[rows] >= CRAWLS) & (size[rows] / behind > np.min(size))
         going[rows] = (damping[rows] < HOPELESS) & (slow[rows] < PATIENCE) & ~lost
     return x, np.sqrt(size)
 
