@@ -18,7 +18,7 @@ from bayesmembrane.parameters import Array
 from bayesmembrane.registry import material as material_named
 
 SOLVERS: MappingProxyType[str, Callable[[Problem, bool, str, float], Curves]] = MappingProxyType(
-    {"ritz": fallback.solve, "shooting": shooting.solve}
+    {"ritz": fallback.solve, "ritz_alone": ritz.solve, "shooting": shooting.solve}
 )
 __all__ = ["SOLVERS", "force_curve", "profile", "ritz", "solve"]
 
@@ -46,7 +46,7 @@ def solve(
     inner_radius, outer_radius : radii of disc and ring as clamped, m
     prestretch : scalar or (B,) equibiaxial stretch before clamping
     sensitivities : also dF/d(parameters), from the factorisation that is there anyway
-    solver : "ritz" (batched, exact derivatives; films it cannot resolve go to shooting) or "shooting"
+    solver : "ritz" (batched, exact derivatives; films it cannot resolve go to shooting), "ritz_alone" or "shooting"
     only : "convex" or "elliptic" saves effort on films that turn out not to be so: their flags need not be final
     exact_up_to : m; beyond it the Ritz solver only sees to it that films stay stable, and forces are good to 1e-3
 

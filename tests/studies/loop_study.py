@@ -29,7 +29,7 @@ from tests.studies.loop_intervals import held
 from tests.studies.loop_plan import Case, plan
 from tests.studies.loop_table import report
 
-SEED = 170000
+SEED = 180000
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "reports" / "study-loop" / "results.jsonl"
 TABLE = ROOT / "docs" / "studies" / "loop.md"
