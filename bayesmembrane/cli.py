@@ -46,7 +46,7 @@ SpecimenFile = Annotated[Path, typer.Option("--specimen", help="TOML with film, 
 Effects = Annotated[str, typer.Option("--effects", help="Physical effects beside the material, by commas.")]
 MaxDeflection = Annotated[float | None, typer.Option("--max-deflection-mm", help="Use the curve up to here only, mm.")]
 Convexity = Annotated[str, typer.Option("--convexity", help="Convexity prior: reached, box, elliptic or none.")]
-Noise = Annotated[str, typer.Option("--noise", help="Noise model: white or ar1.")]
+Noise = Annotated[str, typer.Option("--noise", help="Noise model: white, ar1 or ar1_readings.")]
 Ess = Annotated[float, typer.Option("--ess", help="Wanted effective sample size of the worst parameter.")]
 Runs = Annotated[Path, typer.Option("--out", help="Folder of the runs.")]
 
@@ -429,7 +429,7 @@ def loop(
     max_deflection_mm: MaxDeflection = None,
     convexity: Convexity = "reached",
     noise: Annotated[
-        str, typer.Option(help="white, ar1, or auto: ar1 if neighbouring readings turn out to be correlated.")
+        str, typer.Option(help="A noise model, or auto: correlated if neighbouring readings turn out to be so.")
     ] = "auto",
     ess: Ess = 1000.0,
     out_folder: Runs = Path("chains"),

@@ -23,6 +23,7 @@ from bayesmembrane.inference.sampling import Callback
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.mechanics import api
 from bayesmembrane.noise.ar1 import AR1
+from bayesmembrane.noise.ar1_readings import AR1Readings
 
 MOST_ROUNDS, LEADERS = 3, 3
 BAND = 0.9
@@ -144,7 +145,9 @@ def loop(
 
     rounds: list[Round] = []
     found = diagnosed(hypothesis)
-    noise = AR1() if adapt_noise and found.noise.remembers else hypothesis.noise
+    noise = hypothesis.noise
+    if adapt_noise and found.noise.remembers:
+        noise = AR1Readings() if found.noise.clock == "readings" else AR1()
     stage = staged(replace(hypothesis, noise=noise))
     seen = {stage.run.hypothesis.label()}
     while True:

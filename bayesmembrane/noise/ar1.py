@@ -51,11 +51,14 @@ class AR1(Noise):
 
 
 class AR1Likelihood(NoiseLikelihood):
-    """O(N) by a Kalman filter where the points' own noise is independent, else one Cholesky factor for each draw."""
+    """O(N) by a Kalman filter where the points' own noise is independent, else one Cholesky factor for each draw.
 
-    def __init__(self, measurement: Measurement) -> None:
+    gap : (N - 1,) steps between neighbours by the noise's clock; else those of `AR1`
+    """
+
+    def __init__(self, measurement: Measurement, gap: Array | None = None) -> None:
         self.scale = force_scale(measurement)
-        self.gap = _gaps(measurement)
+        self.gap = _gaps(measurement) if gap is None else gap
         self.given = measurement.covariance
         n = len(measurement)
         self.variance = np.zeros(n) if measurement.force_sd is None else measurement.force_sd**2

@@ -129,3 +129,20 @@ def test_stated_noise_alone_must_be_stated() -> None:
     assert White(extra=False).bind(measurement("sd")).log_likelihood(np.zeros((1, N)), np.empty((1, 0))).shape == (1,)
     with pytest.raises(SettingsError, match="no noise at all"):
         White(extra=False).bind(measurement("none"))
+
+
+def test_a_filter_of_readings_is_found_where_the_speed_changes() -> None:
+    """Every reading remembers half of the one before, on a slow leg and on one ten times as fast alike."""
+    rng = np.random.default_rng(SEED + 9)
+    r = rng.standard_normal(400)
+    for i in range(1, r.size):
+        r[i] = 0.5 * r[i - 1] + np.sqrt(0.75) * r[i]
+    time = np.cumsum(np.where(np.arange(400) < 200, 1.0, 0.1))
+    d = np.linspace(1e-3, 0.04, 400)
+    m = Measurement(d, 100 * d, Annulus(0.01, 0.035), Specimen("film", 5e-5), time=time)
+    by_reading, by_time = (components("noise")[n]().bind(m) for n in ("ar1_readings", "ar1"))
+    lengths = np.linspace(-2.0, 3.0, 101)
+    x = np.column_stack([np.full(101, np.log(1 / by_reading.scale)), lengths])
+    values, others = (b.log_likelihood(np.tile(r, (101, 1)), x) for b in (by_reading, by_time))
+    assert np.exp(-np.exp(-lengths[np.argmax(values)])) == pytest.approx(0.5, abs=0.1)
+    assert values.max() > others.max() + 5
