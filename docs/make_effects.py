@@ -109,16 +109,16 @@ Effects act in this order, in whatever order they are named, and each is one fil
 
 - Histories (slip, set, tearing, softening) are functions of the deflections reached, relative to the full range D of
   the measurement. What has been left out of a fit (other cycles, points beyond a limit) is still remembered.
-- A slack film carries no force: where no deflection is left for the film its force is zero, and so is that of a film
-  that relaxation would push.
+- A slack film carries no force: where no deflection is left for the film its force is zero. Of a film that relaxation
+  would push, `viscoelastic.held` is the part that it withstands: none if it is thin, all if it is a block.
 - Without times, the clock of `viscoelastic` and `force_drift` is the distance travelled at 1 mm/s, so that their
   seconds are millimetres of travel: right for a machine that moves at one speed and does not pause. `rate` needs times.
 - The frame yields to the force of the film after everything that it remembers, by a fixed point at every point of the
   curve; what the load cell adds comes after.
 - `clamp_slip`, `permanent_set` and `tearing` keep their mechanism, but grow by a law with a free power, since a machine
-  does not follow the power of a textbook: G = (1 - c) (m / D)^a + c (a + 1) int (x / D)^a dx / D over all loading,
-  with the largest deflection m so far. One first loading to D ends at G = 1; c is the part that grows on when it is
-  repeated.
+  does not follow the power of a textbook: G = (1 - c) H + c (a + 1) int (x / D)^a dx / D over all loading, with
+  H = (1 + s) (m / D)^a / (1 + s (m / D)^a) of the largest deflection m so far. One first loading to D ends at G = 1; c
+  is the part that grows on when it is repeated, s says how far growth has saturated (slip and set only).
 - One-sided effects have their null value as a bound.
 - Not here: the weight of a disc that hangs on the load cell is a constant, `force_offset`. Wrinkling: of 2000 films
   drawn from the priors, clamped with stretch 1 and 1.03, none with a convex energy had a state with P1 > 0 > P2 up to
