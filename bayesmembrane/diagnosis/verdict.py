@@ -138,8 +138,8 @@ def _rivals(tracer: Tracer, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
 
 
 def _decisive(tracer: Tracer, a: Judged, b: Judged) -> float:
-    """ln of the Bayes factor that sets two candidates apart: more where their traces, as fitted, look alike, or where
-    the better one leaves much.
+    """ln of the Bayes factor that sets two candidates apart: more where their traces, as fitted, look alike, where the
+    better one leaves much, or where the law of the other is known to vary.
     """
     shared = set(a.candidate.names) & set(b.candidate.names)
     # What two pairs have in common tells nothing of what sets them apart.
@@ -149,7 +149,8 @@ def _decisive(tracer: Tracer, a: Judged, b: Judged) -> float:
     degrees = angle(one, two, fold=False)
     needed = next((needed for nearer, needed in LOOKALIKES if degrees < nearer), DECISIVE)
     left = a.unexplained / (1 - a.unexplained) * a.gain if a.fit.p_value < LEVEL and a.unexplained < 1 else 0.0
-    return max(needed, FORM_SHARE * left)
+    varies = max((e.form for e in b.candidate.hypothesis.effects if e.name not in a.candidate.names), default=0.0)
+    return max(needed, FORM_SHARE * left, varies * a.gain)
 
 
 def _trace(tracer: Tracer, candidate: Candidate) -> Array:

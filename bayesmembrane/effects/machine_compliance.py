@@ -13,7 +13,10 @@ from bayesmembrane.parameters import Array, HalfNormal
 
 @dataclass(frozen=True)
 class MachineCompliance(Compliance):
-    """delta_film = delta - compliance F."""
+    """delta_film = delta - compliance F.
+
+    Joints seat and grips give: the compliance of real frames changes with the load, by tens of percents.
+    """
 
     name: ClassVar[str] = "machine_compliance"
     title: ClassVar[str] = "compliance of the machine"
@@ -22,6 +25,7 @@ class MachineCompliance(Compliance):
         "Too soft where the force is high: the residual follows force times slope, alike on all legs, and a blank run "
         "shows it."
     )
+    form: ClassVar[float] = 0.15
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("compliance", "m/N", "travel lost per newton", HalfNormal(3e-4), (0.0, 1e-2), 0.0),
     )

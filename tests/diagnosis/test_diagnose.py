@@ -69,6 +69,14 @@ def test_an_effect_with_a_look_alike_stays_inside_the_answer(tmp_path) -> None:
     assert found.after.rmse_N < 1.1 * data.truth["noise"]["sd"]
 
 
+def test_a_frame_that_stiffens_with_the_load_stays_inside_the_answer(tmp_path) -> None:
+    """The library's frame is linear: a shift of the zero fits this one better by ten percent of what it gains."""
+    data, found = answered(tmp_path, "machine_compliance", "ogden", "two_speeds", "ar1:0.3+quantised+uneven", 120074)
+    assert data.truth["effects"]["machine_compliance"]["form"] == "hardening"
+    assert found.members[0].candidate.names == ("zero_offset",)
+    assert (found.verdict, set(found.effects)) == ("ambiguous", {"zero_offset", "machine_compliance"})
+
+
 def test_what_is_not_in_the_library_gets_no_name(tmp_path) -> None:
     _, found = answered(tmp_path, "ripple", "gent", "staircase", "white", 521)
     assert found.verdict == "unknown"
