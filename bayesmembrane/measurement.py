@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bayesmembrane.errors import DataError, SettingsError, StorageError
 from bayesmembrane.parameters import Array
 from bayesmembrane.protocol import Path as Motion
-from bayesmembrane.protocol import check_order, check_time, first_loading
+from bayesmembrane.protocol import check_order, check_time, first_loading, holds
 from bayesmembrane.registry import components
 from bayesmembrane.rigs.base import Rig
 from bayesmembrane.settings import Section, load_toml
@@ -139,6 +139,11 @@ class Measurement:
     def is_first_loading(self) -> NDArray[np.bool_]:
         """(N,) True where the film is loaded to a deflection that it has not seen before."""
         return first_loading(self.path.deflection, self.path.leg)[self.on_path]
+
+    @cached_property
+    def holds(self) -> list[NDArray[np.intp]]:
+        """The points of each time at which the disc stands still."""
+        return holds(self.deflection)
 
     @property
     def noise_covariance(self) -> Array | None:

@@ -124,6 +124,9 @@ def holds(deflection: Array) -> list[NDArray[np.intp]]:
     tolerance, n = _jitter(deflection), deflection.size
     found, i = [], 0
     while i + HELD <= n:
+        if abs(deflection[i + HELD - 1] - deflection[i]) > tolerance:
+            i += 1
+            continue
         away = np.flatnonzero(np.abs(deflection[i:] - deflection[i]) > tolerance)
         end = i + int(away[0]) if away.size else n
         before = abs(deflection[i] - deflection[max(i - HELD, 0)]) / HELD

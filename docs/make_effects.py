@@ -110,7 +110,7 @@ Effects act in this order, in whatever order they are named, and each is one fil
 - Histories (slip, set, tearing, softening) are functions of the deflections reached, relative to the full range D of
   the measurement. What has been left out of a fit (other cycles, points beyond a limit) is still remembered.
 - A slack film carries no force: where no deflection is left for the film its force is zero. Of a film that relaxation
-  would push, `viscoelastic.held` is the part that it withstands: none if it is thin, all if it is a block.
+  would push, `viscoelastic.withstood` is the part that it withstands: none if it is thin, all if it is a block.
 - Without times, the clock of `viscoelastic` and `force_drift` is the distance travelled at 1 mm/s, so that their
   seconds are millimetres of travel: right for a machine that moves at one speed and does not pause. `rate` needs times.
 - The frame yields to the force of the film after everything that it remembers, by a fixed point at every point of the

@@ -84,7 +84,7 @@ def test_relaxation_is_the_convolution() -> None:
     time = np.cumsum(rng.uniform(0.2, 8.0, d.size))
     m = measured(d, time)
     g, tau, decades = 0.4, 12.0, 1.5
-    f, pushed = (force(m, "viscoelastic", x=np.array([g, tau, decades, held])) for held in (0.0, 1.0))
+    f, pushed = (force(m, "viscoelastic", x=np.array([g, tau, decades, withstood])) for withstood in (0.0, 1.0))
     clock = m.path.clock
     knots, values = np.concatenate([[0.0], clock]), np.concatenate([[0.0], direct("yeoh", d)])
     times = tau * 10 ** (decades * np.linspace(-5 / 12, 5 / 12, 6))

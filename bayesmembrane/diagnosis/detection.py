@@ -14,7 +14,6 @@ from bayesmembrane.diagnosis.scores import ScoreTest, Signature, score_test
 from bayesmembrane.diagnosis.whitening import OwnNoise, orthonormal
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.parameters import Array
-from bayesmembrane.protocol import holds
 
 LEVEL = 0.01
 """A curve is adequate unless the smallest p-value, times the number of tests, lies below this."""
@@ -93,7 +92,7 @@ def periodicity(measurement: Measurement, residual: Array, basis: Array, noise: 
     t = np.arange(n, dtype=float) if measurement.time is None else measurement.time
     found = [_peak(t, rest, q, "time", SLOWEST_PART * n / 2)]
     # Where the disc stands still, all times have one deflection.
-    if not holds(measurement.deflection):
+    if not measurement.holds:
         found.append(_peak(measurement.deflection, rest, q, "deflection", SPLINE / 2))
     best = min(found, key=lambda f: f.p_value)
     return replace(best, p_value=min(1.0, len(found) * best.p_value))

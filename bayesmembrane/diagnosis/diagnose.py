@@ -17,14 +17,8 @@ from bayesmembrane.diagnosis.saturated import reference_basis
 from bayesmembrane.diagnosis.scores import Signature, angle, signatures, smallest_sizes
 from bayesmembrane.diagnosis.separation import Experiment, experiments
 from bayesmembrane.diagnosis.sudden import sudden
-from bayesmembrane.diagnosis.trace import (
-    EARNED_SHARE,
-    LEVEL,
-    Judged,
-    Tell,
-    Tracer,
-)
-from bayesmembrane.diagnosis.verdict import Verdict, explained
+from bayesmembrane.diagnosis.trace import EARNED_SHARE, LEVEL, Judged, Tell, Tracer
+from bayesmembrane.diagnosis.verdict import Verdict, explained, visible
 from bayesmembrane.diagnosis.whitening import OwnNoise, own_noise
 from bayesmembrane.diagnosis.wording import energy_sentence, form_sentence, noise_sentence, sentence_of
 from bayesmembrane.errors import SettingsError
@@ -170,8 +164,7 @@ def diagnose(
         form = _form_left(tracer)
         verdict = replace(verdict, form=form)
         if form is None:
-            visible = {f.effect.name for f in found}
-            singles = tracer.singles([e for e in effects if e.name in visible], say)
+            singles = tracer.singles(visible(effects, found), say)
             if (better := _better_null(tracer.search, null, singles)) is not None:
                 tracer = replace(tracer, null=better)
                 found = signatures(measurement, better, effects, search.noise, solve)

@@ -13,7 +13,6 @@ from scipy.stats import chi2, f, ncf, ncx2
 from bayesmembrane.diagnosis.whitening import FEW, OwnNoise, orthonormal
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.parameters import Array
-from bayesmembrane.protocol import holds
 
 SPLINE, PER_LEG = 20, 6
 SHARE = 3  # points for each column of the reference, at least
@@ -64,7 +63,7 @@ def reference_basis(measurement: Measurement) -> Array:
     """
     d = measurement.deflection
     room = max(len(measurement) // SHARE, 1)
-    still = holds(d)
+    still = measurement.holds
     moving = np.delete(d, np.concatenate(still)) if still else d
     columns = [splines(d, min(SPLINE, room, max(np.unique(moving).size // 2, 1)), moving)]
     starts = np.flatnonzero(np.diff(measurement.leg.astype(int))) + 1

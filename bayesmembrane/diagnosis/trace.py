@@ -16,7 +16,6 @@ from bayesmembrane.effects.base import Effect
 from bayesmembrane.hypothesis import Hypothesis
 from bayesmembrane.measurement import Measurement
 from bayesmembrane.parameters import Array
-from bayesmembrane.protocol import holds
 from bayesmembrane.registry import materials
 
 DECISIVE = 4.0
@@ -194,8 +193,7 @@ class Tracer:
 
     def single_valued(self, candidate: Candidate) -> bool:
         """True if its effects change the curve by a function of deflection alone, on this path."""
-        deflection = self.measurement.path.deflection
-        if np.all(np.diff(deflection) >= 0) and not holds(deflection):
+        if np.all(np.diff(self.measurement.path.deflection) >= 0) and not self.measurement.holds:
             return True
         n = candidate.hypothesis.material_size
         d = self.measurement.deflection

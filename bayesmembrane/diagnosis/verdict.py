@@ -61,7 +61,7 @@ def explained(
 
     singles : it with each effect
     """
-    visible = {f.effect.name for f in found}
+    seen = visible(effects, found)
     others: list[Judged] = []
     if not singles:
         others = tracer.materials(say)
@@ -69,7 +69,7 @@ def explained(
     tracer, singles = _renewed(tracer, singles)
     best, pairs = singles[0], []
     if _more_is_missing(tracer, best, effects, rng):
-        pairs = tracer.pairs(singles, [e for e in effects if e.name in visible], say)
+        pairs = tracer.pairs(singles, seen, say)
         pairs = [p for p in pairs if _earns(tracer, p, singles)]
         if pairs:
             tracer, pairs = _renewed(tracer, pairs)
@@ -84,6 +84,12 @@ def explained(
     every = ranked([*pairs, *singles, *others, *elsewhere, tracer.judged(tracer.null)])
     verdict = _decide(tracer, explaining, [j for j in singles if j.explains], others)
     return tracer, _with_other_energies(verdict, elsewhere), every
+
+
+def visible(effects: Sequence[Effect], found: Sequence[Signature]) -> list[Effect]:
+    """Those of the effects that leave a trace in this test."""
+    names = {f.effect.name for f in found}
+    return [e for e in effects if e.name in names]
 
 
 def _renewed(tracer: Tracer, judged: list[Judged]) -> tuple[Tracer, list[Judged]]:
@@ -149,7 +155,7 @@ def _decisive(tracer: Tracer, a: Judged, b: Judged) -> float:
     degrees = angle(one, two, fold=False)
     needed = next((needed for nearer, needed in LOOKALIKES if degrees < nearer), DECISIVE)
     left = a.unexplained / (1 - a.unexplained) * a.gain if a.fit.p_value < LEVEL and a.unexplained < 1 else 0.0
-    varies = max((e.form for e in b.candidate.hypothesis.effects if e.name not in a.candidate.names), default=0.0)
+    varies = max((e.law_varies for e in b.candidate.hypothesis.effects if e.name not in a.candidate.names), default=0.0)
     return max(needed, FORM_SHARE * left, varies * a.gain)
 
 
@@ -211,7 +217,7 @@ def _with_other_energies(verdict: Verdict, elsewhere: Sequence[Judged]) -> Verdi
 def _profile(member: Judged, elsewhere: Sequence[Judged]) -> float:
     """ln K of its effects with the best of the energies that they were tried with."""
     names = set(member.candidate.names)
-    return max(member.gain, *(j.gain for j in elsewhere if set(j.candidate.names) == names), -np.inf)
+    return max([member.gain, *(j.gain for j in elsewhere if set(j.candidate.names) == names)])
 
 
 def _comes_near(energy: Judged, effect: Judged) -> bool:

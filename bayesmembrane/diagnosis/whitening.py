@@ -11,6 +11,7 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import chi2
 
 from bayesmembrane.measurement import Measurement
+from bayesmembrane.noise.ar1 import gaps_of
 from bayesmembrane.parameters import Array
 
 LARGEST_RHO = 0.97
@@ -100,19 +101,6 @@ def decorrelated(values: Array, rho: float, gaps: Array) -> Array:
     out = np.array(values, dtype=float)
     out[1:] = (values[1:] - phi * values[:-1]) / np.sqrt(1 - phi**2)
     return out
-
-
-def gaps_of(measurement: Measurement, clock: str = "time") -> Array:
-    """(N - 1,) steps between neighbours over the median step: of time, or else of the distance travelled.
-
-    By the clock "readings" every step is 1.
-    """
-    if clock == "readings":
-        return np.ones(len(measurement) - 1)
-    place = measurement.deflection if measurement.time is None else measurement.time
-    gap = np.abs(np.diff(place))
-    middle = float(np.median(gap)) if gap.size else 1.0
-    return np.asarray(np.maximum(gap / middle, 1e-3)) if middle > 0 else np.ones(gap.size)
 
 
 def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:

@@ -71,7 +71,7 @@ class Effect(ABC):
     rigs : kinds of rig on which it can occur
     needs_time : True if it means nothing without times
     absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
-    form : part of the trace by which real ones differ from this law; a rival that falls behind by no more is not out
+    law_varies : part of its evidence by which real ones may differ from this law; as a rival it is out only beyond that
     rank : orders effects within a stage; equal ranks go by name
     """
 
@@ -83,7 +83,7 @@ class Effect(ABC):
     rigs: ClassVar[tuple[str, ...]] = RIGS
     needs_time: ClassVar[bool] = False
     absorbed: ClassVar[str] = ""
-    form: ClassVar[float] = 0.0
+    law_varies: ClassVar[float] = 0.0
     rank: ClassVar[int] = 0
     stage: ClassVar[str]
 

@@ -17,12 +17,14 @@ TERMS = 6
 
 @dataclass(frozen=True)
 class Viscoelastic(Memory):
-    """F(t) = F_e(t) - strength int (1 - sum_i exp(-(t - s) / time_i) / n) dF_e(s), n = 6; F below zero counts ``held``.
+    """F(t) = F_e(t) - strength int (1 - sum_i exp(-(t - s) / time_i) / n) dF_e(s), n = 6.
 
     The times are evenly spread in log time within ``decades`` decades around ``time``: one relaxation time if it is
     zero, a broad spectrum if not. F_e is the instantaneous force. Without times the clock is the distance
-    travelled at 1 mm/s. After a fast return F is negative: a thin film is slack then (held = 0), one that is stiff or
-    sticks to the disc withstands some of it, a block all (held = 1).
+    travelled at 1 mm/s.
+
+    After a fast return F is negative, and counts ``withstood``: a thin film is slack then (0), one that is stiff or
+    sticks to the disc withstands some of it, a block all (1).
     """
 
     name: ClassVar[str] = "viscoelastic"
@@ -38,7 +40,7 @@ class Viscoelastic(Memory):
         ),
         EffectParameter("time", "s", "middle relaxation time", LogNormal(30.0, 1.5), (0.05, 2e4)),
         EffectParameter("decades", "-", "width of the spectrum of times", HalfNormal(1.0), (0.0, 6.0)),
-        EffectParameter("held", "-", "part of a push that it withstands before slack", Uniform(0.0, 1.0), (0.0, 1.0)),
+        EffectParameter("withstood", "-", "part of a push that does not make it slack", Uniform(0.0, 1.0), (0.0, 1.0)),
     )
 
     def remember(self, p: Array, force: Array, path: Path) -> Array:

@@ -58,7 +58,7 @@ class AR1Likelihood(NoiseLikelihood):
 
     def __init__(self, measurement: Measurement, gap: Array | None = None) -> None:
         self.scale = force_scale(measurement)
-        self.gap = _gaps(measurement) if gap is None else gap
+        self.gap = gaps_of(measurement) if gap is None else gap
         self.given = measurement.covariance
         n = len(measurement)
         self.variance = np.zeros(n) if measurement.force_sd is None else measurement.force_sd**2
@@ -126,8 +126,13 @@ def _filter(residual, power, rate, gap, own):  # type: ignore[no-untyped-def]
     return out
 
 
-def _gaps(measurement: Measurement) -> Array:
-    """(N - 1,) steps between points relative to their median: of time, or else of the distance travelled."""
+def gaps_of(measurement: Measurement, clock: str = "time") -> Array:
+    """(N - 1,) steps between points relative to their median: of time, or else of the distance travelled.
+
+    By the clock "readings" every step is 1.
+    """
+    if clock == "readings":
+        return np.ones(max(len(measurement) - 1, 0))
     place = measurement.deflection if measurement.time is None else measurement.time
     gap = np.abs(np.diff(place))
     if gap.size == 0 or np.median(gap) == 0:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from bayesmembrane.measurement import Measurement
-from bayesmembrane.noise.ar1 import AR1, AR1Likelihood
+from bayesmembrane.noise.ar1 import AR1, AR1Likelihood, gaps_of
 
 
 @dataclass(frozen=True)
@@ -19,4 +17,4 @@ class AR1Readings(AR1):
     title: ClassVar[str] = "noise that remembers by the reading, AR(1)"
 
     def bind(self, measurement: Measurement) -> AR1Likelihood:
-        return AR1Likelihood(measurement, np.ones(max(len(measurement) - 1, 0)))
+        return AR1Likelihood(measurement, gaps_of(measurement, "readings"))

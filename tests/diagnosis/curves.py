@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesmembrane.diagnosis.whitening import OwnNoise, gaps_of
+from bayesmembrane.diagnosis.whitening import OwnNoise
 from bayesmembrane.measurement import Measurement, Specimen
+from bayesmembrane.noise.ar1 import gaps_of
 from bayesmembrane.parameters import Array
 from bayesmembrane.rigs.annulus import Annulus
 

@@ -15,7 +15,7 @@ DRAWS, INTERVAL = 400, (0.05, 0.95)
 PLACES = (0.5, 1.0)  # of the largest deflection
 
 
-def held(found: Diagnosis, candidate: Candidate, measurement: Measurement, data: Dataset) -> dict[str, bool]:
+def covered(found: Diagnosis, candidate: Candidate, measurement: Measurement, data: Dataset) -> dict[str, bool]:
     """{parameter, or "force at half" and "force at the end": True if its interval holds the truth}.
 
     Intervals are those of Laplace's approximation. Ogden's terms may change places, so only its forces are judged.

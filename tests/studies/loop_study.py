@@ -25,7 +25,7 @@ from bayesmembrane.measurement import read_measurement
 from bayesmembrane.registry import materials
 from tests.generator.datasets import Dataset, generate
 from tests.generator.film import NoSolutionError
-from tests.studies.loop_intervals import held
+from tests.studies.loop_intervals import covered
 from tests.studies.loop_plan import Case, plan
 from tests.studies.loop_table import report
 
@@ -54,7 +54,8 @@ def run_case(case: Case) -> dict[str, Any]:
     answer = {"seconds": seconds} | answer_of(found, data)
     if found.verdict == "named" and data.truth["family"] == case.material:
         answer |= {
-            f"held_{k}": held(found, c, measurement, data) for k, c in (("null", found.null), ("best", found.best))
+            f"covered_{k}": covered(found, c, measurement, data)
+            for k, c in (("null", found.null), ("best", found.best))
         }
     return head | truth_of(data) | answer
 

@@ -221,7 +221,7 @@ def _intervals(rows: Sequence[Row]) -> str:
     lines = []
     for name, asked in (("parameters of the material", False), ("force of the film without faults", True)):
         sides = []
-        for side in ("held_null", "held_best"):
+        for side in ("covered_null", "covered_best"):
             found = [v for r in good for k, v in r.get(side, {}).items() if k.startswith("force") == asked]
             sides.append(share(sum(found), len(found)))
         lines.append((name, *sides))
