@@ -484,9 +484,10 @@ def _shown(document: dict[str, Any], measurement: Measurement) -> None:
     """A diagnosis on the terminal, in the units of the rig."""
     factor, unit = measurement.rig.shown(measurement.specimen.thickness)["N"]
     out.print(document["sentence"])
+    several = len({r["material"] for r in document["ranking"]}) > 1
     rows = [
         [
-            r["effect"],
+            f"{r['effect']} with {r['material']}" if several and r["effect"] != r["material"] else r["effect"],
             f"{r['log_bayes_factor']:.1f}",
             f"{100 * r['unexplained']:.0f} %",
             ", ".join(f"{k.split('.')[-1]} {v:.4g}" for k, v in r["parameters"].items()),

@@ -111,7 +111,7 @@ def candidate_title(candidate: Candidate, null: Candidate) -> str:
     have = {e.name for e in null.hypothesis.effects}
     added = [e.title for e in candidate.hypothesis.effects if e.name not in have]
     if candidate.hypothesis.material is not null.hypothesis.material:
-        return f"the energy {candidate.hypothesis.material.title}"
+        added.append(f"the energy {candidate.hypothesis.material.title}")
     return " and ".join(added) or "nothing: the model as it was"
 
 

@@ -32,6 +32,7 @@ from bayesmembrane.reporting.loop_section import (
     validation_sentences,
 )
 from bayesmembrane.reporting.loop_tables import (
+    candidate_title,
     confounded_table,
     errors_table,
     moved_table,
@@ -139,6 +140,14 @@ def test_candidates_are_ranked_against_the_model_as_it_was(named: Loop) -> None:
     assert [r["candidate"] for r in rows if r["in_answer"]] == ["friction in the guide"]
     size = 1e3 * d.best.parameters["friction.level"]
     assert rows[0]["size"] == f"level {size:.3g} mN"
+
+
+def test_an_effect_with_another_energy_keeps_its_name(named: Loop) -> None:
+    d = named.rounds[0].diagnosis
+    best = d.ranking[0].candidate
+    other = replace(best, hypothesis=replace(best.hypothesis, material=hypothesis("gent").material))
+    effect = best.hypothesis.effects[0].title
+    assert candidate_title(other, d.null) == f"{effect} and the energy Gent"
 
 
 def test_sizes_are_told_in_the_units_that_people_read() -> None:
