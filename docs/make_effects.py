@@ -15,12 +15,12 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from bayesmembrane.effects.base import Effect, stage_number
-from bayesmembrane.forward import Forward
-from bayesmembrane.hypothesis import hypothesis
-from bayesmembrane.measurement import Measurement, Specimen
-from bayesmembrane.registry import components
-from bayesmembrane.rigs.annulus import Annulus
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.effects.base import Effect, stage_number
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.annulus import Annulus
 
 HERE = Path(__file__).parent
 PICTURE = HERE / "images" / "effects.png"

@@ -5,14 +5,14 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from bayesmembrane.demo import shipped_measurement
-from bayesmembrane.hypothesis import hypothesis
-from bayesmembrane.inference.run import load_run
-from bayesmembrane.inference.valleys import valleys_of
-from bayesmembrane.reporting.figures import first_look
-from bayesmembrane.reporting.page import look_of
-from bayesmembrane.reporting.reading import read
-from bayesmembrane.reporting.valley_figures import valley_picture
+from bayesmembrane.app.demo import shipped_measurement
+from bayesmembrane.calibration.run import load_run
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.report.canvas import first_look
+from bayesmembrane.report.page import look_of
+from bayesmembrane.report.reading import read
+from bayesmembrane.report.sections.valleys.figures import valley_picture
+from bayesmembrane.valleys.follow import valleys_of
 
 RANGES = ("op1", "op2")
 MATERIALS = ("neo_hookean", "mooney_rivlin", "gent", "yeoh", "ogden")

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from bayesmembrane.errors import SettingsError
-from bayesmembrane.shipped import data_folder, shipped
+from bayesmembrane.data.shipped import data_folder, shipped
+from bayesmembrane.ground.errors import SettingsError
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -109,7 +109,7 @@ def test_readme_names_the_two_commands_and_only_verbs_that_exist() -> None:
     assert "make test" in first_screen
     verbs = re.findall(r"^\| `(\w+)` \|", readme, re.MULTILINE)
     assert len(verbs) >= 8
-    program = "from bayesmembrane.cli import main; main()"
+    program = "from bayesmembrane.app.cli import main; main()"
     environment = {**os.environ, "COLUMNS": "120", "NO_COLOR": "1"}
     done = subprocess.run(
         [sys.executable, "-c", program, "--help"], env=environment, capture_output=True, text=True, check=True

@@ -8,16 +8,16 @@ from functools import cache, cached_property, partial
 
 import numpy as np
 
+from bayesmembrane.calibration.descent import descend
+from bayesmembrane.calibration.objective import Objective, apart
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.whitening import OwnNoise
-from bayesmembrane.effects.base import Effect, EffectParameter
-from bayesmembrane.forward import Solve
-from bayesmembrane.hypothesis import Hypothesis
-from bayesmembrane.inference.descent import descend
-from bayesmembrane.inference.objective import Objective, apart
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.mechanics import api
-from bayesmembrane.parameters import Array, HalfNormal, Parameter
-from bayesmembrane.registry import components
+from bayesmembrane.ground.parameters import Array, HalfNormal, Parameter
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.effects.base import Effect, EffectParameter
+from bayesmembrane.physics.forward import Solve
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.mechanics import api
 
 ITERATIONS, SANE = 40, 3
 SIZES = (0.1, 0.6)  # of the expected size of an effect: where searches for it start

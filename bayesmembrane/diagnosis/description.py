@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.detection import Periodicity
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.parameters import Array
+from bayesmembrane.ground.parameters import Array
 
 UNEVEN = 1.5  # times the root mean square of the rest: then it is said
 PERIODIC = 0.01

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import lombscargle
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates import Candidate
 from bayesmembrane.diagnosis.saturated import SPLINE, LackOfFit, lack_of_fit
 from bayesmembrane.diagnosis.scores import ScoreTest, Signature, score_test
 from bayesmembrane.diagnosis.whitening import OwnNoise, orthonormal
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.parameters import Array
+from bayesmembrane.ground.parameters import Array
 
 LEVEL = 0.01
 """A curve is adequate unless the smallest p-value, times the number of tests, lies below this."""

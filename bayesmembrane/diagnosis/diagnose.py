@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.calibration.posterior import enough_points
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates import Candidate, Search, absorbed, available
 from bayesmembrane.diagnosis.description import describe
 from bayesmembrane.diagnosis.detection import Detection, detect
@@ -21,13 +23,11 @@ from bayesmembrane.diagnosis.trace import EARNED_SHARE, LEVEL, Judged, Tell, Tra
 from bayesmembrane.diagnosis.verdict import Verdict, explained, visible
 from bayesmembrane.diagnosis.whitening import OwnNoise, own_noise
 from bayesmembrane.diagnosis.wording import energy_sentence, form_sentence, noise_sentence, sentence_of
-from bayesmembrane.errors import SettingsError
-from bayesmembrane.forward import Solve
-from bayesmembrane.hypothesis import Hypothesis
-from bayesmembrane.inference.posterior import enough_points
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.mechanics import api
-from bayesmembrane.parameters import Array
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.forward import Solve
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.mechanics import api
 
 VERDICTS = ("adequate", "named", "ambiguous", "material", "unknown")
 NEAR = 20.0  # degrees between signatures below which a protocol cannot separate two effects

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.whitening import OwnNoise
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.parameters import Array
+from bayesmembrane.ground.parameters import Array
 
 LENGTHS = (0.001, 0.002, 0.004, 0.01, 0.03, 0.1, 0.3)  # of the way: where the search for a correlation length starts
 AMPLITUDES = (0.3, 1.0, 5.0)  # of the noise

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates import Candidate, Search
-from bayesmembrane.forward import Forward
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.parameters import Array
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.forward import Forward
 
 BLOCKS, EVERY = 20, 4
 LEAST_POINTS = 12

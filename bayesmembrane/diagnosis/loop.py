@@ -9,21 +9,21 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.prior import Mass
+from bayesmembrane.calibration.run import Run, sample
+from bayesmembrane.calibration.sampling.walk import Callback
+from bayesmembrane.comparison.evidence.bridge import bridge
+from bayesmembrane.comparison.evidence.target import PosteriorTarget
+from bayesmembrane.comparison.leave_out.score import leave_one_out
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
 from bayesmembrane.diagnosis.discrepancy import Discrepancy, discrepancy
-from bayesmembrane.forward import Solve
-from bayesmembrane.hypothesis import Hypothesis
-from bayesmembrane.inference.evidence_bridge import bridge
-from bayesmembrane.inference.evidence_target import PosteriorTarget
-from bayesmembrane.inference.posterior import Posterior
-from bayesmembrane.inference.predictive_comparison import leave_one_out
-from bayesmembrane.inference.prior import Mass
-from bayesmembrane.inference.run import Run, sample
-from bayesmembrane.inference.sampling import Callback
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.mechanics import api
-from bayesmembrane.noise.ar1 import AR1
-from bayesmembrane.noise.ar1_readings import AR1Readings
+from bayesmembrane.physics.forward import Solve
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.mechanics import api
+from bayesmembrane.physics.noise.ar1 import AR1
+from bayesmembrane.physics.noise.ar1_readings import AR1Readings
 
 MOST_ROUNDS, LEADERS = 3, 3
 BAND = 0.9

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.stats import chi2, f, ncf, ncx2
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.whitening import FEW, OwnNoise, orthonormal
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.parameters import Array
+from bayesmembrane.ground.parameters import Array
 
 SPLINE, PER_LEG = 20, 6
 SHARE = 3  # points for each column of the reference, at least

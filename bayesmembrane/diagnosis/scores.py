@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates import Candidate, with_effects
 from bayesmembrane.diagnosis.whitening import OwnNoise, orthonormal
-from bayesmembrane.effects.base import Effect
-from bayesmembrane.forward import Forward, Solve
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.parameters import Array
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.effects.base import Effect
+from bayesmembrane.physics.forward import Forward, Solve
 
 SHAPES = (0.5, 0.15, 0.85)  # quantiles of the priors of shape parameters
 SMALL = 0.02  # of the expected size: how far the signature's difference reaches

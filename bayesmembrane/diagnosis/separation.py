@@ -8,14 +8,14 @@ from itertools import combinations
 
 import numpy as np
 
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.motion import Path
 from bayesmembrane.diagnosis.candidates import Candidate
-from bayesmembrane.effects.base import Compliance
-from bayesmembrane.errors import BayesmembraneError
-from bayesmembrane.forward import Forward, Solve
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.parameters import Array
-from bayesmembrane.protocol import Path
-from bayesmembrane.rigs.annulus import Annulus
+from bayesmembrane.ground.errors import BayesmembraneError
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.effects.base import Compliance
+from bayesmembrane.physics.forward import Forward, Solve
+from bayesmembrane.physics.rigs.annulus import Annulus
 
 POINTS = 240
 FASTER = 10.0

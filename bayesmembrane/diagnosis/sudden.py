@@ -10,7 +10,7 @@ from scipy.special import expit
 
 from bayesmembrane.diagnosis.candidates import Candidate, Search
 from bayesmembrane.diagnosis.whitening import orthonormal
-from bayesmembrane.parameters import Array
+from bayesmembrane.ground.parameters import Array
 
 PLACES, MARGIN = 160, 0.04  # moments that are tried, and the part of the readings at either end that is not
 WIDTHS = (1e-6, 0.006, 0.018)  # of the whole test: how long the change takes

@@ -8,15 +8,15 @@ from functools import cached_property
 
 import numpy as np
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates import Candidate, Search, starts_with, with_effects
 from bayesmembrane.diagnosis.detection import periodicity
 from bayesmembrane.diagnosis.saturated import SPLINE, LackOfFit, lack_of_fit, splines
 from bayesmembrane.diagnosis.whitening import orthonormal
-from bayesmembrane.effects.base import Effect
-from bayesmembrane.hypothesis import Hypothesis
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.parameters import Array
-from bayesmembrane.registry import materials
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import materials
+from bayesmembrane.physics.effects.base import Effect
+from bayesmembrane.physics.hypothesis import Hypothesis
 
 DECISIVE = 4.0
 """ln of the Bayes factor beyond which a rival is out."""

@@ -29,8 +29,8 @@ from bayesmembrane.diagnosis.trace import (
     ranked,
 )
 from bayesmembrane.diagnosis.whitening import orthonormal, own_noise
-from bayesmembrane.effects.base import Effect
-from bayesmembrane.parameters import Array
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.effects.base import Effect
 
 
 @dataclass(frozen=True, eq=False)

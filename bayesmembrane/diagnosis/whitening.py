@@ -10,9 +10,9 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi2
 
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.noise.ar1 import gaps_of
-from bayesmembrane.parameters import Array
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.noise.ar1 import gaps_of
 
 LARGEST_RHO = 0.97
 TRIALS = np.linspace(0.0, LARGEST_RHO, 25)

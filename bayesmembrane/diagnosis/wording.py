@@ -12,7 +12,7 @@ from bayesmembrane.diagnosis.heldout import Error
 from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.diagnosis.trace import DECISIVE, Judged
 from bayesmembrane.diagnosis.whitening import OwnNoise
-from bayesmembrane.registry import components
+from bayesmembrane.ground.registry import components
 
 SHOWN = 3
 HALF = 0.5  # unexplained: beyond it a candidate is no part of the answer

@@ -21,13 +21,15 @@ from functools import partial
 
 import numpy as np
 
-from bayesmembrane.cache import CachedSolver
-from bayesmembrane.materials.base import Material
-from bayesmembrane.mechanics import fallback, reference, ritz, shooting, solve
-from bayesmembrane.mechanics.convexity import reached_convexity
-from bayesmembrane.mechanics.problem import Problem, problem
-from bayesmembrane.parameters import Array
-from bayesmembrane.registry import materials
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import materials
+from bayesmembrane.physics.cache import CachedSolver
+from bayesmembrane.physics.materials.base import Material
+from bayesmembrane.physics.mechanics import fallback, reference, solve
+from bayesmembrane.physics.mechanics.convexity import reached_convexity
+from bayesmembrane.physics.mechanics.problem import Problem, problem
+from bayesmembrane.physics.mechanics.ritz import solver as ritz
+from bayesmembrane.physics.mechanics.shooting import solver as shooting
 
 SEED = 20240607
 RADII = {"inner_radius": 0.010, "outer_radius": 0.035}

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.whitening import OwnNoise
-from bayesmembrane.measurement import Measurement, Specimen
-from bayesmembrane.noise.ar1 import gaps_of
-from bayesmembrane.parameters import Array
-from bayesmembrane.rigs.annulus import Annulus
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.noise.ar1 import gaps_of
+from bayesmembrane.physics.rigs.annulus import Annulus
 
 SD = 0.004
 RIG, SPECIMEN = Annulus(0.010, 0.035), Specimen("film", 50e-6)

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bayesmembrane.data.measurement import Measurement, Specimen, read_measurement
 from bayesmembrane.diagnosis.diagnose import VERDICTS, Diagnosis, diagnose
-from bayesmembrane.errors import SettingsError
-from bayesmembrane.hypothesis import Hypothesis
-from bayesmembrane.materials.ogden import Ogden
-from bayesmembrane.measurement import Measurement, Specimen, read_measurement
-from bayesmembrane.registry import components, materials
-from bayesmembrane.rigs.uniaxial import Uniaxial
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.registry import components, materials
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.materials.ogden import Ogden
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.diagnosis.curves import measured
 from tests.generator.datasets import Dataset, generate
 

@@ -5,9 +5,9 @@ from bayesmembrane.diagnosis.candidates import Search, with_effects
 from bayesmembrane.diagnosis.heldout import error_of, held_out, validate
 from bayesmembrane.diagnosis.saturated import reference_basis
 from bayesmembrane.diagnosis.whitening import own_noise
-from bayesmembrane.hypothesis import Hypothesis
-from bayesmembrane.materials.neo_hookean import NeoHookean
-from bayesmembrane.registry import components
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.materials.neo_hookean import NeoHookean
 from tests.diagnosis.curves import SD, measured, triangle
 from tests.generator.datasets import generate
 

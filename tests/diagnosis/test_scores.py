@@ -8,9 +8,9 @@ from bayesmembrane.diagnosis.candidates import Search, available
 from bayesmembrane.diagnosis.saturated import reference_basis
 from bayesmembrane.diagnosis.scores import Signature, angle, score_test, signatures, smallest_sizes
 from bayesmembrane.diagnosis.whitening import own_noise
-from bayesmembrane.hypothesis import Hypothesis
-from bayesmembrane.materials.neo_hookean import NeoHookean
-from bayesmembrane.mechanics import api
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.materials.neo_hookean import NeoHookean
+from bayesmembrane.physics.mechanics import api
 from tests.diagnosis.curves import RIG, SD, SPECIMEN, measured, triangle, white_noise, without
 from tests.generator.datasets import generate
 

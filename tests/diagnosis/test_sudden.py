@@ -3,8 +3,8 @@ import pytest
 
 from bayesmembrane.diagnosis.candidates import Candidate, Search
 from bayesmembrane.diagnosis.sudden import sudden
-from bayesmembrane.hypothesis import Hypothesis
-from bayesmembrane.materials.neo_hookean import NeoHookean
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.materials.neo_hookean import NeoHookean
 from tests.diagnosis.curves import RIG, SD, measured, triangle, white_noise
 
 N = 400

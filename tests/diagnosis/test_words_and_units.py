@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.description import describe
 from bayesmembrane.diagnosis.wording import SCALES, size_in_words
-from bayesmembrane.measurement import Measurement, Specimen
-from bayesmembrane.registry import components
-from bayesmembrane.rigs.annulus import Annulus
-from bayesmembrane.rigs.base import Rig
-from bayesmembrane.rigs.uniaxial import Uniaxial
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.base import Rig
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 
 THICKNESS = 1e-3
 STRETCH = np.concatenate([np.linspace(1.01, 1.5, 30), np.linspace(1.49, 1.01, 30)])

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bayesmembrane.mechanics.convexity import box_convexity, box_ellipticity
-from bayesmembrane.registry import material
+from bayesmembrane.ground.registry import material
+from bayesmembrane.physics.mechanics.convexity import box_convexity, box_ellipticity
 
 FILE = Path(__file__).parents[2] / "data" / "paper_convexity.csv"
 THICKNESS = 50e-6

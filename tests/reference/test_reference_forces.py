@@ -7,8 +7,8 @@ from decimal import Decimal
 import numpy as np
 import pytest
 
-from bayesmembrane.mechanics import SOLVERS, force_curve, solve
-from bayesmembrane.registry import material
+from bayesmembrane.ground.registry import material
+from bayesmembrane.physics.mechanics import SOLVERS, force_curve, solve
 
 DEFLECTIONS = np.array([0.5, 2.0, 5.0, 10.0, 20.0, 35.1, 60.0, 91.5]) * 1e-3
 # N, as printed (six digits, trailing zeros left out); parameters in N/m, exponents and Gent's limit dimensionless.

@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import solve_bvp
 from scipy.optimize import minimize_scalar
 
-from bayesmembrane.mechanics.film_law import Gap, film_law
-from bayesmembrane.registry import material
+from bayesmembrane.ground.registry import material
+from bayesmembrane.physics.mechanics.film_law import Gap, film_law
 
 R1, R2 = 0.010, 0.035
 YEOH, FILM = material("yeoh"), np.array([8.0, -0.2, 0.03])

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.special import logsumexp
 
-from bayesmembrane.inference.posterior import Posterior
+from bayesmembrane.calibration.posterior import Posterior
 
 DEEP = 18.0  # what lies this much below the largest term, in ln, is left out
 NOISE = 240

@@ -6,15 +6,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bayesmembrane.demo import shipped_measurement
-from bayesmembrane.hypothesis import hypothesis
-from bayesmembrane.inference.evidence_bridge import bridge
-from bayesmembrane.inference.evidence_convexity import by_convexity
-from bayesmembrane.inference.evidence_nested import nested
-from bayesmembrane.inference.evidence_sensitivity import prior_widths, scaled
-from bayesmembrane.inference.evidence_target import PosteriorTarget
-from bayesmembrane.inference.posterior import Posterior
-from bayesmembrane.inference.sampling import Settings, run_ensembles
+from bayesmembrane.app.demo import shipped_measurement
+from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.sampling.walk import Settings, run_ensembles
+from bayesmembrane.comparison.convexity_modes import by_convexity
+from bayesmembrane.comparison.evidence.bridge import bridge
+from bayesmembrane.comparison.evidence.nested import nested
+from bayesmembrane.comparison.evidence.target import PosteriorTarget
+from bayesmembrane.comparison.prior_widths import prior_widths, scaled
+from bayesmembrane.physics.hypothesis import hypothesis
 from tests.statistics.cubature import log_evidence
 
 MATERIALS = ("neo_hookean", "mooney_rivlin", "gent")

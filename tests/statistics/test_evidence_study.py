@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesmembrane.demo import shipped_measurement
-from bayesmembrane.hypothesis import hypothesis
-from bayesmembrane.inference.evidence_bridge import bridge
-from bayesmembrane.inference.evidence_nested import nested
-from bayesmembrane.inference.evidence_target import PosteriorTarget
-from bayesmembrane.inference.posterior import Posterior
+from bayesmembrane.app.demo import shipped_measurement
+from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.comparison.evidence.bridge import bridge
+from bayesmembrane.comparison.evidence.nested import nested
+from bayesmembrane.comparison.evidence.target import PosteriorTarget
+from bayesmembrane.physics.hypothesis import hypothesis
 from tests.statistics.cubature import log_evidence
 from tests.statistics.evidence_targets import Banana, Cut, Funnel, Linear, Modes, NormalGamma, Shells, Tails
 

@@ -10,14 +10,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bayesmembrane.materials.base import Material
-from bayesmembrane.materials.yeoh import Yeoh
-from bayesmembrane.mechanics import Status, fallback, ritz, ritz_kernels, shooting
-from bayesmembrane.mechanics.problem import Problem
-from bayesmembrane.mechanics.solution import Curves
-from bayesmembrane.parameters import Array
-from bayesmembrane.registry import materials
-from tests.mechanics.films import FIFTEEN, INNER, MM, asked, prior_draws
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import materials
+from bayesmembrane.physics.materials.base import Material
+from bayesmembrane.physics.materials.yeoh import Yeoh
+from bayesmembrane.physics.mechanics import Status, fallback
+from bayesmembrane.physics.mechanics.problem import Problem
+from bayesmembrane.physics.mechanics.ritz import kernels as ritz_kernels
+from bayesmembrane.physics.mechanics.ritz import solver as ritz
+from bayesmembrane.physics.mechanics.shooting import solver as shooting
+from bayesmembrane.physics.mechanics.solution import Curves
+from tests.physics.mechanics.films import FIFTEEN, INNER, MM, asked, prior_draws
 
 SEED, DRAWS, EXACT = 20240611, 2000, 1e-6
 AT = np.concatenate([[0.05 * MM, 0.5 * MM, 2 * MM], FIFTEEN, [100 * MM]])

@@ -14,20 +14,20 @@ from pathlib import Path
 
 import numpy as np
 
-from bayesmembrane.demo import paper_losses, shipped_ranges
-from bayesmembrane.hypothesis import hypothesis
-from bayesmembrane.inference.comparison import compare_ranges
-from bayesmembrane.inference.comparison_result import Comparison
-from bayesmembrane.inference.reconstruction_table import read_published_table
-from bayesmembrane.registry import materials
-from bayesmembrane.reporting.comparison_section import (
+from bayesmembrane.app.demo import paper_losses, shipped_ranges
+from bayesmembrane.comparison.compare import compare_ranges
+from bayesmembrane.comparison.result import Comparison
+from bayesmembrane.data.published import read_published_table
+from bayesmembrane.ground.registry import materials
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.report.sections.comparison.section import (
     comparison_sentences,
     evidence_table,
     modes_table,
     ranking_table,
     widths_table,
 )
-from bayesmembrane.reporting.tables import Table
+from bayesmembrane.report.tables import Table
 
 TARGET = Path(__file__).resolve().parents[2] / "docs" / "studies" / "comparison.md"
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates import Candidate, Search
 from bayesmembrane.diagnosis.diagnose import Diagnosis
 from bayesmembrane.diagnosis.trace import effective_weight
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.mechanics import api
+from bayesmembrane.physics.mechanics import api
 from tests.generator.datasets import Dataset
 
 DRAWS, INTERVAL = 400, (0.05, 0.95)

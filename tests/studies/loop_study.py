@@ -18,11 +18,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from bayesmembrane.data.measurement import read_measurement
 from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
-from bayesmembrane.errors import BayesmembraneError
-from bayesmembrane.hypothesis import Hypothesis
-from bayesmembrane.measurement import read_measurement
-from bayesmembrane.registry import materials
+from bayesmembrane.ground.errors import BayesmembraneError
+from bayesmembrane.ground.registry import materials
+from bayesmembrane.physics.hypothesis import Hypothesis
 from tests.generator.datasets import Dataset, generate
 from tests.generator.film import NoSolutionError
 from tests.studies.loop_intervals import covered

@@ -15,14 +15,14 @@ import numpy as np
 from scipy import stats
 from scipy.interpolate import PchipInterpolator
 
-from bayesmembrane.forward import Forward
-from bayesmembrane.hypothesis import hypothesis
-from bayesmembrane.inference.optimum import fit
-from bayesmembrane.inference.published import BreakPoint, paper_break_points, paper_rates
-from bayesmembrane.measurement import Measurement, read_measurement
-from bayesmembrane.parameters import Array
-from bayesmembrane.registry import material, materials
-from bayesmembrane.shipped import shipped
+from bayesmembrane.calibration.beside_paper import BreakPoint, paper_break_points, paper_rates
+from bayesmembrane.calibration.fit import fit
+from bayesmembrane.data.measurement import Measurement, read_measurement
+from bayesmembrane.data.shipped import shipped
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import material, materials
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
 
 TARGET = Path(__file__).resolve().parents[2] / "docs" / "studies" / "paper_breaks.md"
 LEVEL = 0.05

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
-from bayesmembrane.inference.published import BreakPoint, SpeedTest
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.parameters import Array
+from bayesmembrane.calibration.beside_paper import BreakPoint, SpeedTest
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.parameters import Array
 from tests.studies.paper_breaks import (
     LEVEL,
     SPEEDS_AT,

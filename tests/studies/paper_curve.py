@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
+from bayesmembrane.data.measurement import Measurement, read_measurement
+from bayesmembrane.data.shipped import shipped
 from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
 from bayesmembrane.diagnosis.trace import Judged
 from bayesmembrane.diagnosis.wording import size_in_words
-from bayesmembrane.hypothesis import hypothesis
-from bayesmembrane.measurement import Measurement, read_measurement
-from bayesmembrane.registry import components, materials
-from bayesmembrane.shipped import shipped
+from bayesmembrane.ground.registry import components, materials
+from bayesmembrane.physics.hypothesis import hypothesis
 
 TARGET = Path(__file__).resolve().parents[2] / "docs" / "studies" / "paper_curve.md"
 CURVES = {"to 35.1 mm": "elastosil_50um_op1", "both ranges": "elastosil_50um_first_loading"}

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bayesmembrane.inference.published import BreakPoint, SpeedTest
-from bayesmembrane.measurement import Measurement, Specimen
-from bayesmembrane.mechanics.api import force_curve
-from bayesmembrane.rigs.annulus import Annulus
+from bayesmembrane.calibration.beside_paper import BreakPoint, SpeedTest
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.physics.mechanics.api import force_curve
+from bayesmembrane.physics.rigs.annulus import Annulus
 from tests.studies.paper_breaks import Scatter, between, beyond_scatter, films, scaled, specimens_needed, trend, within
 from tests.studies.paper_breaks_page import page
 

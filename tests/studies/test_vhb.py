@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates import Candidate
-from bayesmembrane.errors import DataError
-from bayesmembrane.forward import Forward
-from bayesmembrane.hypothesis import hypothesis
-from bayesmembrane.measurement import Measurement
+from bayesmembrane.ground.errors import DataError
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
 from tests.studies.vhb import Trial, Tried, predicted
 from tests.studies.vhb_data import FOLDER, RIG, TAPE, Cycle, cycles, difference, even, fast_cycle, kPa, read_cycle
 from tests.studies.vhb_page import winners

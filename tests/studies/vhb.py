@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates import Candidate
 from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
-from bayesmembrane.forward import Forward
-from bayesmembrane.hypothesis import hypothesis
-from bayesmembrane.measurement import Measurement
-from bayesmembrane.registry import materials
+from bayesmembrane.ground.registry import materials
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
 from tests.studies.vhb_data import FOLDER, RIG, Cycle, cycles, fast_cycle, kPa
 
 TARGET = Path(__file__).resolve().parents[2] / "docs" / "studies" / "vhb.md"

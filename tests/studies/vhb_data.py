@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from bayesmembrane.data.measurement import Measurement, Specimen, curve_columns
+from bayesmembrane.data.tables import parse_table, read_text
 from bayesmembrane.diagnosis.saturated import reference_basis
 from bayesmembrane.diagnosis.whitening import orthonormal
-from bayesmembrane.errors import DataError
-from bayesmembrane.measurement import Measurement, Specimen, curve_columns
-from bayesmembrane.parameters import Array
-from bayesmembrane.rigs.uniaxial import Uniaxial
-from bayesmembrane.tables import parse_table, read_text
+from bayesmembrane.ground.errors import DataError
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "effects"
 FAST = "vhb4910_miles.csv"

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from bayesmembrane.registry import components, material
+from bayesmembrane.ground.registry import components, material
 from tests.studies.vhb import FIRST, Quick, Trial, Tried
 from tests.studies.vhb_data import Cycle, difference, even, scatter
 

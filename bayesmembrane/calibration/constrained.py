@@ -1,0 +1,89 @@
+"""Least squares among the films that meet the convexity prior."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import Bounds, NonlinearConstraint, minimize
+
+from bayesmembrane.calibration.objective import Objective, apart
+from bayesmembrane.calibration.prior import JointPrior
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.mechanics.solution import Status
+
+STARTS = 2
+MOST_ITERATIONS, TOLERANCE = 50, 1e-7
+
+
+def constrained_optimum(objective: Objective, pool: Array, free: Array) -> Array | None:
+    """x (k,) of the least |r(x)| among films that meet the convexity prior, None if none was found.
+
+    ``pool`` (M, k) are starts, the best first, ``free`` (k,) is the optimum without the constraint.
+    """
+    prior = JointPrior(objective.hypothesis)
+    prediction = objective.forward(pool)
+    size, inside = objective.many(prediction), prior.inside(prediction)
+    feasible = pool[inside & np.isfinite(size)]
+    if not len(feasible):
+        return None
+    anchor = feasible[0]
+    starts = [*apart(feasible, objective.spread, STARTS - 1), _pulled(objective, free, anchor)]
+    found = [_pulled(objective, _constrained_search(objective, s), anchor) for s in starts]
+    sizes = objective.many(objective.forward(np.array(found), reached=False))
+    return np.asarray(found[int(np.argmin(sizes))])
+
+
+def _constrained_search(objective: Objective, start: Array) -> Array:
+    """Sequential quadratic programming for min |r|^2 with all margins >= 0, from start (k,)."""
+    scale = max(float(np.linalg.norm(objective(start)[0])) ** 2, 1e-300)
+
+    def value(x: Array) -> float:
+        r = objective(x)[0]
+        return float(r @ r / scale) if np.all(np.isfinite(r)) else 1e6
+
+    def slope(x: Array) -> Array:
+        r, jacobian = objective(x)
+        return np.asarray(np.nan_to_num(2 * r @ jacobian / scale, posinf=0.0, neginf=0.0))
+
+    def margins(x: Array) -> Array:
+        return np.asarray(_margins(objective, x[None, :])[0])
+
+    def margin_slopes(x: Array) -> Array:
+        h = 1e-5 * objective.spread
+        both = _margins(objective, np.concatenate([x + np.diag(h), x - np.diag(h)]))
+        return np.asarray((both[: x.size] - both[x.size :]).T / (2 * h))
+
+    done = minimize(
+        value,
+        start,
+        jac=slope,
+        method="SLSQP",
+        bounds=Bounds(objective.low, objective.high),
+        constraints=NonlinearConstraint(margins, 0.0, np.inf, jac=margin_slopes),
+        options={"maxiter": MOST_ITERATIONS, "ftol": TOLERANCE},
+    )
+    return np.asarray(np.clip(done.x, objective.low, objective.high))
+
+
+def _margins(objective: Objective, x: Array) -> Array:
+    """Convexity margins (B, M) of x (B, k), one for each deflection or one for the box; 1 where there is no state."""
+    prediction, mode = objective.forward(x), objective.hypothesis.convexity
+    if mode == "box":
+        values = prediction.margin(mode, objective.hypothesis)[:, None]
+    else:
+        values = prediction.convexity_at if mode == "reached" else prediction.ellipticity_at
+    return np.where(np.isnan(values), 1.0, np.clip(values, -1e3, 1e3))
+
+
+def _pulled(objective: Objective, x: Array, anchor: Array) -> Array:
+    """The point nearest to x on the way to ``anchor`` that meets the convexity prior and has a curve."""
+    prior = JointPrior(objective.hypothesis)
+    low, high = 0.0, 1.0
+    for _ in range(4):
+        t = np.concatenate([[low], low + (high - low) * np.geomspace(1e-6, 1.0, 15)])
+        prediction = objective.forward(x + t[:, None] * (anchor - x))
+        good = prior.inside(prediction) & np.all(prediction.status == Status.OK, axis=1)
+        first = int(np.argmax(good)) if np.any(good) else t.size - 1
+        if first == 0:
+            return np.asarray(x + t[0] * (anchor - x))
+        low, high = float(t[first - 1]), float(t[first])
+    return np.asarray(x + high * (anchor - x))

@@ -1,0 +1,95 @@
+"""Least squares from many starts at once: the solver's price is per batch, so a start more is nearly free."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesmembrane.ground.parameters import Array
+
+Residuals = Callable[[Array], tuple[Array, Array]]
+"""x (B, k) -> r (B, N) and dr/dx (B, N, k); nan where there is nothing to compare."""
+
+DAMPING, EASIER, HARDER, HOPELESS = 1e-2, 0.2, 5.0, 1e12
+SLOW = 1e-9  # relative decrease of |r|^2 below which a step counts as slow
+PATIENCE = 3  # slow steps in a row that end a search
+CRAWL, CRAWLS = 1e-3, 4  # the same of a search that is far behind the best one
+
+
+def descend(
+    residuals: Residuals,
+    start: Array,
+    low: Array,
+    high: Array,
+    iterations: int,
+    held: NDArray[np.bool_] | None = None,
+    behind: float = np.inf,
+) -> tuple[Array, Array]:
+    """min |r(x)|^2 within low <= x <= high from each row of start (M, k), by Marquardt's damped steps
+
+        (J^T J + m diag(J^T J)) s = -J^T r,
+
+    with coordinates at a bound left out while the step would leave it, and those in ``held`` (M, k) left out always.
+    A row whose |r|^2 is more than ``behind`` times the least is given up when it crawls: films at the edge of what can
+    be solved cost most. Returns x (M, k) and |r| (M,), inf where a start has no residuals.
+
+    D. W. Marquardt, J. SIAM 11 (1963) 431; a row that finds no better point with any damping is done.
+    """
+    x = np.clip(start, low, high)
+    free = np.ones(x.shape, bool) if held is None else ~held
+    r, jacobian = residuals(x)
+    size = _square(r)
+    damping, slow, crawl = np.full(len(x), DAMPING), np.zeros(len(x), int), np.zeros(len(x), int)
+    going = np.isfinite(size)
+    for _ in range(iterations):
+        rows = np.flatnonzero(going)
+        if not rows.size:
+            break
+        step = _step(x[rows], r[rows], jacobian[rows], damping[rows], free[rows], low, high)
+        trial = np.clip(x[rows] + step, low, high)
+        new_r, new_jacobian = residuals(trial)
+        new_size = _square(new_r)
+        better = new_size < size[rows]
+        take = rows[better]
+        gain = (size[take] - new_size[better]) / np.maximum(size[take], 1e-300)
+        slow[take] = np.where(gain < SLOW, slow[take] + 1, 0)
+        crawl[rows] += 1
+        crawl[take[gain > CRAWL]] = 0
+        x[take], r[take], jacobian[take], size[take] = (
+            trial[better],
+            new_r[better],
+            new_jacobian[better],
+            new_size[better],
+        )
+        damping[rows] *= np.where(better, EASIER, HARDER)
+        damping = np.maximum(damping, 1e-12)
+        lost = (crawl[rows] >= CRAWLS) & (size[rows] / behind > np.min(size))
+        going[rows] = (damping[rows] < HOPELESS) & (slow[rows] < PATIENCE) & ~lost
+    return x, np.sqrt(size)
+
+
+def _square(r: Array) -> Array:
+    """|r|^2 (M,) of r (M, N); inf where it is not a number."""
+    with np.errstate(over="ignore"):
+        size = np.sum(r * r, axis=1)
+    return np.where(np.isfinite(size), size, np.inf)
+
+
+def _step(
+    x: Array, r: Array, jacobian: Array, damping: Array, free: NDArray[np.bool_], low: Array, high: Array
+) -> Array:
+    gradient = np.einsum("mnk,mn->mk", jacobian, r)
+    moves = free & ~((x <= low) & (gradient > 0)) & ~((x >= high) & (gradient < 0))
+    j = np.where(moves[:, None, :], jacobian, 0.0)
+    normal = np.einsum("mnk,mnl->mkl", j, j)
+    diagonal = np.einsum("mkk->mk", normal)
+    diagonal = np.maximum(diagonal, 1e-12 * np.max(diagonal, axis=1, keepdims=True) + 1e-300)
+    k = x.shape[1]
+    # In the metric of the diagonal the matrix has ones on it, so that its conditioning is that of the problem.
+    root = np.sqrt(diagonal)
+    scaled = normal / root[:, :, None] / root[:, None, :]
+    scaled[:, np.arange(k), np.arange(k)] += damping[:, None] + ~moves
+    right = np.where(moves, -gradient / root, 0.0)
+    return np.asarray(np.linalg.solve(scaled, right[:, :, None])[:, :, 0] / root)

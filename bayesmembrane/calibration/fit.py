@@ -1,0 +1,232 @@
+"""Least squares: the global optimum of a hypothesis on a measurement, without and with the convexity prior's bound."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayesmembrane.calibration.constrained import constrained_optimum
+from bayesmembrane.calibration.descent import descend
+from bayesmembrane.calibration.objective import Objective, apart
+from bayesmembrane.calibration.posterior import enough_points
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.forward import Solve
+from bayesmembrane.physics.hypothesis import CONVEXITY, Hypothesis
+from bayesmembrane.physics.mechanics import api
+
+STARTED, POLISHED = 12, 2
+APART, DISTINCT = 1.5, 0.3  # least distance of starts, and of what they lead to, in prior standard deviations
+HOPEFUL = 10.0  # a start that misses the data by this many times the best one's |r| is not followed
+FEW, ROUGH = 50, 1e-4  # evaluations and tolerance of a first search
+NEAR = 1e-3  # of the width of the bounds: an estimate this close is at the bound
+FLAT = 1e-4  # a loss that rises by less than this part on the way to the bound has no minimum before it
+TO_BOUND = 40  # iterations towards a bound
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted parameter; ``sd`` is None where the data set no scale (at a bound, or no degree of freedom left)."""
+
+    value: float
+    sd: float | None
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The optimum of one loss.
+
+    Attributes
+    ----------
+    hypothesis : what was fitted; its noise model plays no part
+    loss : "euclidean" (|F - y|_2, the loss of the source paper) or "weighted" (by the measurement's own noise)
+    coordinates : (k,) coordinates that shape the curve, at the optimum
+    covariance : (k, k) of the coordinates, from the Jacobian and the residual variance; nan at a bound
+    parameters : natural parameters by full name
+    deflection, force : (N,) m and N, of the fitted curve
+    loss_N, rmse_N, max_N : |F - y|_2, its root mean square, and the largest |F - y|, N
+    objective : what was minimised: `loss_N`, or the root of the weighted sum of squares
+    margins : by how much each convexity mode is met; below 0 it is not
+    at_bound : coordinates without an optimum inside their bounds: the loss falls, or is flat, up to the bound
+    status : "converged", or why the search ended
+    constrained : the optimum among films that meet the convexity prior; this one if it does; None without any
+    """
+
+    hypothesis: Hypothesis
+    loss: str
+    coordinates: Array
+    covariance: Array
+    parameters: dict[str, Estimate]
+    deflection: Array
+    force: Array
+    loss_N: float  # noqa: N815 - the unit is part of the name that users read
+    rmse_N: float  # noqa: N815
+    max_N: float  # noqa: N815
+    objective: float
+    margins: dict[str, float]
+    at_bound: tuple[str, ...]
+    status: str
+    constrained: Fit | None = field(default=None, repr=False)
+
+    @property
+    def convex(self) -> bool:
+        """True if the hypothesis' convexity prior holds; for the mode "none", that of "reached"."""
+        mode = self.hypothesis.convexity
+        margin = self.margins["reached" if mode == "none" else mode]
+        return margin > 0 if mode == "elliptic" else margin >= 0
+
+    def summary(self) -> dict[str, Any]:
+        """Plain values for the JSON answer of ``fit``; parameters under their short names."""
+        material = f"{self.hypothesis.material.name}."
+        short = {k.removeprefix(material): {"value": e.value, "sd": e.sd} for k, e in self.parameters.items()}
+        answer: dict[str, Any] = {
+            "material": self.hypothesis.material.name,
+            "loss": self.loss,
+            "parameters": short,
+            "rmse_N": self.rmse_N,
+            "loss_N": self.loss_N,
+            "max_N": self.max_N,
+            "convex": self.convex,
+            "margins": {k: v if np.isfinite(v) else None for k, v in self.margins.items()},
+            "at_bound": list(self.at_bound),
+            "status": self.status,
+        }
+        if self.constrained is not None and self.constrained is not self:
+            answer["constrained"] = self.constrained.summary()
+        return answer
+
+
+def fit(
+    measurement: Measurement,
+    hypothesis: Hypothesis,
+    *,
+    loss: str = "euclidean",
+    seed: int = 0,
+    starts: Iterable[ArrayLike] = (),
+    solve: Solve = api.solve,
+) -> Fit:
+    """The global minimum of |F(x) - y|_2, or of |L^-1 (F(x) - y)|_2 with the measurement's noise L L^T ("weighted").
+
+    Draws from the prior, and from a wider one, are brought to their best modulus, which is linear; from the best ones
+    that lie apart, and from ``starts`` (membrane parameters (n,), for example published ones), a trust-region method
+    descends with exact derivatives, at first a little and then from the best ones to the end. Bounds are those of the
+    coordinates, not the prior, which plays no part but for the convexity constraint. Ogden films are sought among
+    those with c_i a_i > 0 only, which its coordinates cover.
+
+    Standard errors are s^2 (J^T J)^-1 with s^2 = |r|^2 / (N - k): the misfit counts as noise.
+
+    Raises `SettingsError` for fewer points than parameters, a loss that is unknown or lacks a noise, and a material
+    whose films cannot reach the data.
+    """
+    enough_points(hypothesis, measurement)
+    objective = Objective(hypothesis, measurement, loss, solve)
+    rng = np.random.default_rng(seed)
+    pool, size = objective.pool(rng)
+    x, status = _global(objective, pool[size < HOPEFUL * size[0]], [np.asarray(s, dtype=float) for s in starts])
+    free = _result(objective, x, status)
+    if hypothesis.convexity == "none" or free.convex:
+        return replace(free, constrained=free)
+    y = constrained_optimum(objective, pool, free.coordinates)
+    held = None if y is None else _result(objective, y, "converged")
+    if held is not None and held.objective < free.objective:
+        # The constraint led to a better valley: it is open without the constraint too.
+        x, _, status = objective.polish(held.coordinates)
+        free = _result(objective, x, status)
+        held = free if free.convex else held
+    return replace(free, constrained=held)
+
+
+def _global(objective: Objective, pool: Array, published: list[Array]) -> tuple[Array, str]:
+    """The best of all polished starts, (x, status)."""
+    h = objective.hypothesis
+    starts = apart(pool, objective.spread * APART, STARTED)
+    for films in published:
+        start = h.material.to_coordinates(h.material.from_vector(films).vector)
+        if np.all(np.isfinite(start)):
+            starts.append(np.concatenate([start, starts[0][h.material_size :]]))
+    first = sorted((objective.polish(s, FEW, ROUGH) for s in starts if np.all(np.isfinite(objective(s)[0]))), key=_size)
+    best = apart(np.array([x for x, _, _ in first]), objective.spread * DISTINCT, POLISHED)
+    best_x, _, status = min((objective.polish(b) for b in best), key=_size)
+    return best_x, status
+
+
+def _size(found: tuple[Array, float, str]) -> float:
+    return found[1]
+
+
+# ---- what is said of it ----------------------------------------------------------------------------------------------
+
+
+def _result(objective: Objective, x: Array, status: str) -> Fit:
+    """Everything about the optimum x (k,)."""
+    r, jacobian = objective(x)
+    prediction = objective.forward(x)
+    misfit = prediction.force[0] - objective.measurement.force
+    bound = _at_bound(objective, x, float(np.linalg.norm(r)))
+    covariance = _covariance(r, jacobian, bound)
+    return Fit(
+        hypothesis=objective.hypothesis,
+        loss=objective.loss,
+        coordinates=x,
+        covariance=covariance,
+        parameters=_estimates(objective, x, covariance),
+        deflection=objective.measurement.deflection,
+        force=prediction.force[0],
+        loss_N=float(np.linalg.norm(misfit)),
+        rmse_N=float(np.sqrt(np.mean(misfit**2))),
+        max_N=float(np.max(np.abs(misfit))),
+        objective=float(np.linalg.norm(r)),
+        margins={m: float(prediction.margin(m, objective.hypothesis)[0]) for m in CONVEXITY[:3]},
+        at_bound=tuple(p.name for p, b in zip(objective.parameters, bound, strict=True) if b),
+        status=status,
+    )
+
+
+def _at_bound(objective: Objective, x: Array, size: float) -> NDArray[np.bool_]:
+    """(k,) True where the loss falls, or stays flat, up to a bound while the others follow."""
+    near = np.minimum(x - objective.low, objective.high - x) < NEAR * (objective.high - objective.low)
+    sd = np.sqrt(np.diag(_covariance(*objective(x), np.zeros(x.size, bool))))
+    open_ = np.flatnonzero(~near & ~(sd < 0.5 * objective.spread))
+    if open_.size:
+        moved, held = np.tile(x, (2 * open_.size, 1)), np.zeros((2 * open_.size, x.size), bool)
+        for row, (i, bound) in enumerate((i, b[i]) for i in open_ for b in (objective.low, objective.high)):
+            moved[row, i], held[row, i] = bound, True
+        _, reached = descend(objective.batch, moved, objective.low, objective.high, TO_BOUND, held)
+        near[open_] = np.min(reached.reshape(-1, 2), axis=1) < size * (1 + FLAT)
+    return np.asarray(near)
+
+
+def _estimates(objective: Objective, x: Array, covariance: Array) -> dict[str, Estimate]:
+    """Natural parameters, with errors by d natural / d x."""
+    h, n = objective.hypothesis, objective.hypothesis.material_size
+    values = h.films(x[None, :])[0]
+    jacobian = objective.forward.jacobian(x[None, :])[0][:, :n]
+    held = np.isnan(np.diag(covariance))
+    inner = np.where(held[:n, None] | held[None, :n], 0.0, covariance[:n, :n])
+    sd = np.sqrt(np.einsum("ij,jk,ik->i", jacobian, inner, jacobian))
+    # A parameter that moves with a held coordinate has no error to speak of.
+    sd[np.any((np.abs(jacobian) > 1e-9 * np.abs(values[:, None])) & held[:n], axis=1)] = np.nan
+    every = np.concatenate([values, x[n:]]), np.concatenate([sd, np.sqrt(np.diag(covariance))[n:]])
+    return {
+        name: Estimate(float(value), float(s) if np.isfinite(s) else None, unit)
+        for name, value, s, unit in zip(h.natural_names, *every, h.natural_units, strict=False)
+    }
+
+
+def _covariance(r: Array, jacobian: Array, held: NDArray[np.bool_]) -> Array:
+    """s^2 (J^T J)^-1 (k, k) without the coordinates that are ``held``, which are nan; nan if N = k."""
+    k = jacobian.shape[1]
+    out = np.full((k, k), np.nan)
+    free = np.flatnonzero(~held)
+    dof = len(r) - free.size
+    if free.size and dof > 0:
+        _, s, vt = np.linalg.svd(jacobian[:, free], full_matrices=False)
+        with np.errstate(divide="ignore", over="ignore"):
+            root = vt.T / np.maximum(s, 1e-150)
+        out[np.ix_(free, free)] = root @ root.T * (r @ r) / dof
+    return out

@@ -1,0 +1,63 @@
+"""How well a curve fits, judged by the measurement's own noise and never by the noise that was inferred."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.parameters import Array
+
+
+@dataclass(frozen=True)
+class Goodness:
+    """Residuals of one curve with k parameters on N points.
+
+    Attributes
+    ----------
+    rmse_N, max_N : root mean square and largest size of y - F, N
+    loss_N : |y - F|_2, N
+    reduced_chi2 : r^T Sigma^-1 r / (N - k) with the noise the measurement states; None if it states none, or N <= k
+    p_value : probability of a chi-square at least as large if the model were right; None likewise
+    own_noise_N : root mean square of the stated standard deviation, N; None likewise
+    """
+
+    rmse_N: float  # noqa: N815 - the unit is part of the name that users read
+    max_N: float  # noqa: N815
+    loss_N: float  # noqa: N815
+    reduced_chi2: float | None
+    p_value: float | None
+    own_noise_N: float | None  # noqa: N815
+
+    def summary(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def goodness(measurement: Measurement, force: Array, parameters: int) -> Goodness:
+    """The fit of ``force`` (N,) in N, a curve with ``parameters`` free parameters."""
+    r = measurement.force - force
+    covariance, dof = measurement.noise_covariance, len(measurement) - parameters
+    reduced, p_value, own = None, None, None
+    if covariance is not None:
+        own = float(np.sqrt(np.mean(np.diag(covariance))))
+    if covariance is not None and dof > 0:
+        total = float(r @ np.linalg.solve(covariance, r))
+        reduced, p_value = total / dof, float(chi2.sf(total, dof))
+    size = float(np.linalg.norm(r))
+    return Goodness(size / float(np.sqrt(len(r))), float(np.max(np.abs(r))), size, reduced, p_value, own)
+
+
+def dominates(own_noise: float | None, extra_sd: Array) -> bool:
+    """True if the posterior puts more than half its weight on an inferred noise (B,) above the stated one, both N."""
+    return own_noise is not None and bool(np.mean(extra_sd > own_noise) > 0.5)
+
+
+def dominates_sentence(own_noise: float, extra_sd: Array) -> str:
+    """What an engineer should read when it does."""
+    return (
+        f"The inferred extra noise ({1e3 * float(np.median(extra_sd)):.3g} mN) exceeds what the measurement states "
+        f"({1e3 * own_noise:.3g} mN): the model misses something, and its misfit is counted as noise."
+    )

@@ -1,0 +1,167 @@
+"""What least squares minimises: residuals of many films at once, weighted or not, with exact slopes."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.optimize import least_squares
+
+from bayesmembrane.calibration.prior import JointPrior
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.errors import SettingsError, unknown_name
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.forward import Forward, Prediction, Solve
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.rigs.annulus import Annulus
+
+LOSSES = ("euclidean", "weighted")
+SCREENED, INFLATED = 768, 256
+INFLATION = 2.5
+MOST = 300  # evaluations of one search
+ON_THE_WAY = 24  # states at which a film is looked at before it is solved
+
+
+class Objective:
+    """r(x) = L^-1 (F(x) - y) of coordinates that shape the curve, with its Jacobian."""
+
+    def __init__(self, hypothesis: Hypothesis, measurement: Measurement, loss: str, solve: Solve) -> None:
+        if loss not in LOSSES:
+            raise unknown_name("loss", loss, LOSSES)
+        covariance = measurement.noise_covariance
+        if loss == "weighted" and covariance is None:
+            raise SettingsError(
+                'the loss "weighted" needs the noise of the measurement, and it states none',
+                remedy='give force_sd_N in the specimen file, or use "euclidean"',
+            )
+        self.hypothesis, self.measurement, self.loss = hypothesis, measurement, loss
+        self.root = np.linalg.cholesky(covariance) if loss == "weighted" and covariance is not None else None
+        self.forward = Forward(hypothesis, measurement, measurement.deflection, solve)
+        self.parameters = hypothesis.parameters[: hypothesis.curve_size]
+        self.low, self.high = np.array([p.bounds for p in self.parameters], dtype=float).T
+        self._last: tuple[Array, Array, Array] | None = None
+
+    def whiten(self, r: Array) -> Array:
+        """L^-1 r along the first axis of r (N, ...)."""
+        return r if self.root is None else np.asarray(solve_triangular(self.root, r, lower=True, check_finite=False))
+
+    def batch(self, x: Array) -> tuple[Array, Array]:
+        """r (B, N) and J (B, N, k) of x (B, k); nan where there is no curve."""
+        p = self.forward(x, sensitivities=True, reached=False)
+        assert p.sensitivity is not None
+        r, j = p.force - self.measurement.force, p.sensitivity
+        if self.root is None:
+            return r, j
+        wide = np.concatenate([r[:, :, None], j], axis=2)
+        white = self.whiten(np.moveaxis(wide, 1, 0).reshape(r.shape[1], -1))
+        white = np.moveaxis(white.reshape(r.shape[1], *wide.shape[::2]), 0, 1)
+        return white[:, :, 0], white[:, :, 1:]
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        """(r (N,), J (N, k)) of one x (k,), remembered: a search asks for them one after the other."""
+        if self._last is None or not np.array_equal(self._last[0], x):
+            r, j = self.batch(x[None, :])
+            self._last = (x.copy(), r[0], j[0])
+        return self._last[1], self._last[2]
+
+    def many(self, prediction: Prediction) -> Array:
+        """|r| (B,); inf where there is no curve."""
+        size = np.linalg.norm(self.whiten((prediction.force - self.measurement.force).T), axis=0)
+        return np.where(np.isnan(size), np.inf, size)
+
+    def rescaled(self, films: Array) -> tuple[Array, Array]:
+        """Coordinates (M, k) of the films (B, n) that reach the data, at the modulus that fits best, and |r| (M,).
+
+        F(s c) = s F(c), so that s = <F, y> / <F, F> is exact.
+        """
+        scales = np.asarray(self.hypothesis.material.scales)
+        force = self.whiten(self.forward.film_force(films).T)
+        y = self.whiten(self.measurement.force)
+        with np.errstate(all="ignore"):
+            s = y @ force / np.sum(force**2, axis=0)
+            size = np.linalg.norm(s * force - y[:, None], axis=0)
+            x = self.hypothesis.material.to_coordinates((films * np.where(scales == 1, s[:, None], 1.0)).T).T
+            n = x.shape[1]
+            good = np.all((x >= self.low[:n]) & (x <= self.high[:n]), axis=1) & (s > 0) & np.isfinite(size)
+        return x[good], size[good]
+
+    def pool(self, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Rescaled draws (M, k) and |r| (M,), the best first: of the prior and of a wider one, or of the bounds."""
+        n, k = self.hypothesis.material_size, self.hypothesis.curve_size
+        prior = JointPrior(self.hypothesis).draw(rng, SCREENED + INFLATED)[:, :k]
+        prior[SCREENED:] = self.centre + INFLATION * (prior[SCREENED:] - self.centre)
+        anywhere = rng.uniform(self.low, self.high, prior.shape)
+        for candidates in (np.clip(prior, self.low, self.high), anywhere):
+            films = self.hypothesis.films(candidates)
+            start, size = self.rescaled(films[self._likely(films)])
+            if len(start):
+                # Draws of the effects are independent of those of the material: any of them will do.
+                start = np.concatenate([start, candidates[: len(start), n:]], axis=1)
+                order = np.argsort(size, kind="stable")
+                return start[order], size[order]
+        raise SettingsError(
+            f"no {self.hypothesis.label()} film with admissible parameters reaches "
+            f"{1e3 * np.max(self.measurement.deflection):g} mm",
+            remedy="use a shorter range or another material, and check the units of the deflection",
+        )
+
+    def _likely(self, films: Array) -> NDArray[np.bool_]:
+        """(B,) True where P1 > 0 and P11 > 0 on l2 = 1 up to the mean meridional stretch at the largest deflection.
+
+        Films without are told late, and hardly ever reach the data: they are not worth a solution in a search.
+        """
+        rig = self.measurement.rig
+        if not isinstance(rig, Annulus):
+            return np.ones(len(films), bool)
+        rise = np.max(np.abs(self.measurement.deflection)) / (rig.outer_radius - rig.inner_radius)
+        stretch = np.linspace(1.0, np.sqrt(1.0 + rise * rise), ON_THE_WAY + 1)[1:, None]
+        with np.errstate(all="ignore"):
+            _, p1, _, p11, _, _ = self.hypothesis.material.derivatives(
+                films.T[:, None, :], stretch, np.ones_like(stretch)
+            )
+        return np.asarray(np.all((p1 > 0) & (p11 > 0), axis=0))
+
+    @cached_property
+    def centre(self) -> Array:
+        """Prior medians (k,)."""
+        return np.array([float(p.prior.quantile(0.5)) for p in self.parameters])
+
+    @cached_property
+    def spread(self) -> Array:
+        """Prior standard deviations (k,): the scale on which starts lie apart."""
+        return np.array([float(p.prior.distribution().std()) for p in self.parameters])
+
+    def polish(self, x: Array, evaluations: int = MOST, tolerance: float = 1e-8) -> tuple[Array, float, str]:
+        """(x, |r|, status) after a trust-region search from x (k,)."""
+        room = 1e-6 * (self.high - self.low)
+        done = least_squares(
+            self._residual,
+            np.clip(x, self.low + room, self.high - room),
+            jac=self._slope,
+            bounds=(self.low, self.high),
+            x_scale="jac",
+            ftol=tolerance,
+            xtol=tolerance,
+            gtol=None,
+            max_nfev=evaluations,
+        )
+        return done.x, float(np.sqrt(2 * done.cost)), "converged" if done.status > 0 else "evaluation limit"
+
+    def _residual(self, x: Array) -> Array:
+        return self(x)[0]
+
+    def _slope(self, x: Array) -> Array:
+        return self(x)[1]
+
+
+def apart(pool: Array, distance: Array, count: int) -> list[Array]:
+    """The first ``count`` rows of pool (M, k) that lie further from each other than ``distance`` (k,)."""
+    chosen: list[Array] = []
+    for x in pool:
+        if all(np.max(np.abs(x - c) / distance) > 1 for c in chosen):
+            chosen.append(x)
+        if len(chosen) == count:
+            break
+    return chosen

@@ -1,0 +1,173 @@
+"""ln p(x | y) + const of a hypothesis, for many draws at once, with the reason where it is zero."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayesmembrane.calibration.prior import JointPrior
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.forward import Forward, Solve
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.mechanics import api
+from bayesmembrane.physics.mechanics.solution import Status
+from bayesmembrane.physics.noise.base import NoiseLikelihood
+
+NOTEWORTHY = 1e-3
+"""A part of numerical failures above this is reported in a sentence."""
+
+
+class Outcome(IntEnum):
+    """What became of one draw. All but `OK` have no posterior density; the last two because the numbers failed."""
+
+    OK = 0
+    LOCKED = 1
+    NOT_ELLIPTIC = 2
+    INDEFINITE = 3
+    UNRESOLVED = 4
+    ITERATION_LIMIT = 5
+    NOT_CONVEX = 6
+
+    @property
+    def label(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+
+PHYSICAL = tuple(s for s in Status if s.physical)
+FAILURES = (Outcome.UNRESOLVED, Outcome.ITERATION_LIMIT)
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What the posterior says of B draws.
+
+    log_prior, log_likelihood : (B,), -inf where they are zero; the prior is untruncated times the convexity indicator,
+        so that the normalised one is larger by -ln(mass)
+    force : (B, N) N; nan where there is none, or where a film that the prior rules out was not followed
+    outcome : (B,) `Outcome` codes
+    """
+
+    log_prior: Array
+    log_likelihood: Array
+    force: Array
+    outcome: NDArray[np.int8]
+
+    @property
+    def log_posterior(self) -> Array:
+        """(B,) the sum, without the evidence."""
+        return self.log_prior + self.log_likelihood
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """p(x | y) ~ p0(x) 1[convex] N(y - F(x); 0, Sigma(x)).
+
+    Raises `SettingsError` when made from fewer points than the curve has parameters, or from a noise model that has
+    nothing to go by.
+    """
+
+    hypothesis: Hypothesis
+    measurement: Measurement
+    solve: Solve = api.solve
+
+    def __post_init__(self) -> None:
+        enough_points(self.hypothesis, self.measurement)
+        self.noise  # noqa: B018 - what it cannot do is said at once
+
+    @cached_property
+    def prior(self) -> JointPrior:
+        return JointPrior(self.hypothesis)
+
+    @cached_property
+    def forward(self) -> Forward:
+        return Forward(self.hypothesis, self.measurement, self.measurement.deflection, self.solve)
+
+    @cached_property
+    def noise(self) -> NoiseLikelihood:
+        return self.hypothesis.noise.bind(self.measurement)
+
+    @property
+    def size(self) -> int:
+        """k, the number of coordinates."""
+        return len(self.hypothesis.parameters)
+
+    def evaluate(self, x: ArrayLike) -> Evaluation:
+        """Prior, likelihood, force and outcome of x (B, k), from one batched solution."""
+        x = np.atleast_2d(np.asarray(x, dtype=float))
+        mode = self.hypothesis.convexity
+        only = {"reached": "convex", "elliptic": "elliptic"}.get(mode, "all")
+        prediction = self.forward(x, reached=mode in ("reached", "elliptic"), only=only)
+        inside = self.prior.inside(prediction)
+        ok = prediction.ok
+        log_likelihood = np.full(len(x), -np.inf)
+        if np.any(ok):
+            residual = self.measurement.force - prediction.force[ok]
+            noise = self.hypothesis.noise_coordinates(x[ok])
+            with np.errstate(over="ignore", invalid="ignore"):
+                value = self.noise.log_likelihood(residual, noise)
+            log_likelihood[ok] = np.where(np.isnan(value), -np.inf, value)
+        log_prior = np.where(inside, self.prior.log_density(x), -np.inf)
+        return Evaluation(log_prior, log_likelihood, prediction.force, _outcome(prediction.status, inside))
+
+    def log_prior(self, x: ArrayLike) -> Array:
+        """ln p0(x) where the convexity prior holds, -inf elsewhere; (B,)."""
+        return self.evaluate(x).log_prior
+
+    def log_likelihood(self, x: ArrayLike) -> Array:
+        """ln p(y | x), (B,); -inf where the film has no curve, or is not followed since the prior rules it out."""
+        return self.evaluate(x).log_likelihood
+
+    def given(self, force: Array, x: Array) -> Array:
+        """(B,) ln p0(x) + ln p(y | x) if the curves of x (B, k) were ``force`` (B, N): what an emulator asks."""
+        residual = self.measurement.force - force
+        return self.prior.log_density(x) + self.noise.log_likelihood(residual, self.hypothesis.noise_coordinates(x))
+
+    def pointwise(self, x: Array, force: Array) -> Array:
+        """ln p(y_i | other y, x) of draws x (B, k) with curves ``force`` (B, N), shape (B, N)."""
+        return self.noise.pointwise(self.measurement.force - force, self.hypothesis.noise_coordinates(x))
+
+
+def _outcome(status: NDArray[np.int8], inside: NDArray[np.bool_]) -> NDArray[np.int8]:
+    """(B,) from statuses (B, N): what physics or the prior rules out is no failure of the numbers."""
+    outcome = np.where(inside, Outcome.OK, Outcome.NOT_CONVEX).astype(np.int8)
+    bad = status != Status.OK
+    if not np.any(bad):
+        return outcome
+    physical = np.isin(status, PHYSICAL)
+    first = np.min(np.where(physical, status, np.iinfo(np.int8).max), axis=1)
+    outcome = np.where(inside, np.max(status, axis=1), outcome)
+    return np.where(np.any(physical, axis=1), first, outcome).astype(np.int8)
+
+
+def tally(outcome: NDArray[np.int8]) -> Counter[str]:
+    """How many draws met each outcome, by label."""
+    counts = np.bincount(outcome, minlength=len(Outcome))
+    return Counter({o.label: int(counts[o]) for o in Outcome if counts[o]})
+
+
+def failure_sentence(counts: Mapping[str, int]) -> str:
+    """What is to be said of numerical failures: "" unless they are more than `NOTEWORTHY` of all draws."""
+    failed, total = sum(counts.get(o.label, 0) for o in FAILURES), sum(counts.values())
+    if failed <= NOTEWORTHY * total:
+        return ""
+    return (
+        f"{failed} of {total} draws ({100 * failed / total:.2g} %) could not be solved to 1e-6 after every refinement "
+        "and count as impossible; if they lie near the posterior, it is narrower than it should be."
+    )
+
+
+def enough_points(hypothesis: Hypothesis, measurement: Measurement) -> None:
+    """Raise `SettingsError` if the curve has more parameters than the measurement has points."""
+    if len(measurement) < hypothesis.curve_size:
+        raise SettingsError(
+            f"{len(measurement)} points cannot fix the {hypothesis.curve_size} parameters of {hypothesis.label()}",
+            remedy="use a longer range or a simpler material",
+        )

@@ -1,0 +1,417 @@
+"""What a report needs of a run and the run's draws do not say by themselves: computed once, stored beside them.
+
+Bands of the curve inside and beyond the fitted range, residuals, the states that the film reaches, the map of its
+convexity, its deformed shapes, and what thicker films of the same silicone should do. A report reads this and solves
+nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import h5netcdf
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayesmembrane.calibration.beside_paper import BreakPoint
+from bayesmembrane.calibration.run import Run
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.forward import Forward, Solve, annulus
+from bayesmembrane.physics.hypothesis import CONVEXITY, Hypothesis
+from bayesmembrane.physics.materials.base import Material
+from bayesmembrane.physics.mechanics import api
+from bayesmembrane.physics.mechanics.convexity import least_eigenvalue
+from bayesmembrane.physics.mechanics.solution import Status
+from bayesmembrane.physics.rigs.base import Strip
+
+FILE = "digest.nc"
+QUANTILES = (0.05, 0.5, 0.95)
+DRAWS, SHAPE_DRAWS = 400, 30
+INSIDE, OUTSIDE = 60, 40
+POINTS = 101
+MAP = (161, 101)
+FEWEST = 0.5
+"""Where fewer than this share of the draws have a force, no band is given."""
+
+
+@dataclass(frozen=True, eq=False)
+class Digest:
+    """A run in numbers that can be drawn. SI units; Q stands for 5, 50 and 95 %.
+
+    Attributes
+    ----------
+    at, force, sd : (N,) the fitted points: m, N, and N or nan where the measurement states no noise
+    rest_at, rest_force, rest_sd : (R,) points that were not used, the same
+    end, full_range : largest deflection that was fitted, and of the whole measurement, m
+    deflection, beyond : (G,) m, and True outside the fitted range
+    curve, repeat : (Q, G) N, noiseless curve, and a new measurement of it
+    lost : (L, G) share of the draws without a force, one row per reason in ``reasons``
+    residual : (Q, N) N, measured minus computed
+    rest_residual : (Q, R) N, measured minus predicted measurement: the noise is in the prediction
+    curves_at : (Q, N) N, computed curve at the fitted points
+    film : (n,) membrane parameters of the draw whose curve is nearest to the median one
+    convex : by convexity mode, the share of draws that meet it
+    shape_at : (D,) m, deflections of what follows
+    state_1, state_2 : (D, M) stretches that the film reaches
+    shape_radius, shape_height : (D, P, M) m, deformed radius and height of P draws
+    map_1, map_2, eigenvalue : (A,), (B,), (A, B) stretches, and least eigenvalue of the Hessian of W over G d
+    break_at, break_thickness, break_force : (S,) m, m, N, observed
+    break_predicted, break_lost : (Q, S) N by thickness scaling, (S,) share of the draws without a force there
+    specimens : (S,) names
+    """
+
+    at: Array
+    force: Array
+    sd: Array
+    rest_at: Array
+    rest_force: Array
+    rest_sd: Array
+    end: float
+    full_range: float
+    deflection: Array
+    beyond: NDArray[np.bool_]
+    curve: Array
+    repeat: Array
+    lost: Array
+    reasons: tuple[str, ...]
+    residual: Array
+    rest_residual: Array
+    curves_at: Array
+    film: Array
+    convex: dict[str, float]
+    shape_at: Array
+    state_1: Array
+    state_2: Array
+    shape_radius: Array
+    shape_height: Array
+    map_1: Array
+    map_2: Array
+    eigenvalue: Array
+    break_at: Array
+    break_thickness: Array
+    break_force: Array
+    break_predicted: Array
+    break_lost: Array
+    specimens: tuple[str, ...]
+
+    @property
+    def has_noise(self) -> bool:
+        """Whether the measurement states its own noise."""
+        return bool(np.all(np.isfinite(self.sd)))
+
+    @property
+    def lost_share(self) -> Array:
+        """(G,) share of the draws without a force, for any reason."""
+        return np.asarray(self.lost.sum(axis=0))
+
+
+# Dimensions of the stored arrays, so that other programs read them with names.
+_DIMS = {
+    "at": "point", "force": "point", "sd": "point",
+    "rest_at": "rest", "rest_force": "rest", "rest_sd": "rest",
+    "deflection": "grid", "beyond": "grid", "curve": "quantile grid", "repeat": "quantile grid", "lost": "reason grid",
+    "residual": "quantile point", "rest_residual": "quantile rest", "curves_at": "quantile point",
+    "film": "parameter", "shape_at": "shape", "state_1": "shape radius", "state_2": "shape radius",
+    "shape_radius": "shape draw radius", "shape_height": "shape draw radius",
+    "map_1": "stretch_1", "map_2": "stretch_2", "eigenvalue": "stretch_1 stretch_2",
+    "break_at": "specimen", "break_thickness": "specimen", "break_force": "specimen",
+    "break_predicted": "quantile specimen", "break_lost": "specimen",
+}  # fmt: skip
+
+
+def digest(
+    run: Run,
+    *,
+    up_to: float | None = None,
+    rest: Measurement | None = None,
+    breaks: Sequence[BreakPoint] = (),
+    draws: int = DRAWS,
+    solve: Solve = api.solve,
+) -> Digest:
+    """The digest of a run, stored in its folder as ``digest.nc``; arguments as in `digest_draws`.
+
+    A stored digest of the same draws is read back if it was made with the same arguments, or if none are given.
+    Raises `StorageError` if the folder cannot be written.
+    """
+    seed = int(run.settings["seed"])
+    asked = {"up_to": up_to, "rest": rest.data_hash if rest else None, "draws": draws, "breaks": repr(tuple(breaks))}
+    plain = up_to is None and rest is None and not breaks
+    stored = load_digest(run, None if plain else asked)
+    if stored is not None:
+        return stored
+    found = digest_draws(
+        run.hypothesis,
+        run.measurement,
+        run.draws(),
+        up_to=up_to,
+        rest=rest,
+        breaks=breaks,
+        draws=draws,
+        seed=seed,
+        solve=solve,
+    )
+    if run.path is not None:
+        _store(found, run.path, {"draws_of": _state(run), "asked": asked})
+    return found
+
+
+def load_digest(run: Run, asked: Mapping[str, Any] | None = None) -> Digest | None:
+    """The digest stored with a run; None if there is none, or it is of other draws or not what was ``asked``.
+
+    Raises `StorageError` if it is damaged.
+    """
+    if run.path is None or not (run.path / FILE).is_file():
+        return None
+    found, made = _read(run.path / FILE)
+    same = made.get("draws_of") == _state(run) and (asked is None or made.get("asked") == dict(asked))
+    return found if same else None
+
+
+def _state(run: Run) -> str:
+    """What tells one set of draws from another: an interrupted run that went on has more evaluations."""
+    return f"{run.settings['fingerprint']} {run.status['evaluations']}"
+
+
+def digest_draws(
+    hypothesis: Hypothesis,
+    measurement: Measurement,
+    coordinates: ArrayLike,
+    *,
+    up_to: float | None = None,
+    rest: Measurement | None = None,
+    breaks: Sequence[BreakPoint] = (),
+    draws: int = DRAWS,
+    seed: int = 0,
+    solve: Solve = api.solve,
+) -> Digest:
+    """The digest of posterior draws x (S, k), from at most ``draws`` of them.
+
+    Parameters
+    ----------
+    up_to : deflection in m up to which the curve is predicted; the whole measured range, or a sixth more, unless given
+    rest : points that were not used for the fit
+    breaks : break points of specimens of the same silicone, predicted as F(d') = F(d) d'/d
+    """
+    x = _subset(np.atleast_2d(np.asarray(coordinates, dtype=float)), draws, seed)
+    end = float(np.max(measurement.deflection))
+    last = max(end, up_to if up_to is not None else max(7 / 6 * end, measurement.full_range))
+    grid = _grid(end, last)
+    rng = np.random.default_rng(seed)
+
+    def force(at: Array) -> tuple[Array, NDArray[np.int8]]:
+        found = Forward(hypothesis, measurement, at, solve)(x, reached=False)
+        return found.force, found.status
+
+    here = Forward(hypothesis, measurement, measurement.deflection, solve)(x)
+    curve, status = force(grid)
+    reasons = [s for s in Status if s is not Status.OK and np.any(status == s)]
+    films = hypothesis.films(x)
+    chosen = _representative(here.force)
+    shape_at = _shape_deflections(end, max(end, min(last, measurement.full_range)))
+    film = hypothesis.material.from_vector(films[chosen])
+    states = _profiles(film, shape_at, measurement)
+    own_sd = measurement.force_sd
+    unused = _Points.of(rest)
+    rest_force = force(unused.at)[0] if unused.at.size else np.empty((len(x), 0))
+    rest_force = rest_force + _total_sd(hypothesis, measurement, x, np.nan_to_num(unused.sd)) * rng.standard_normal(
+        rest_force.shape
+    )
+    broken = np.array([b.deflection for b in breaks])
+    at_break = force(broken)[0] if broken.size else np.empty((len(x), 0))
+    thickness = np.array([b.thickness for b in breaks])
+    scaled = at_break * (thickness / measurement.specimen.thickness)
+    some = films[np.linspace(0, len(films) - 1, min(SHAPE_DRAWS, len(films))).astype(int)]
+    shapes = [_profiles(hypothesis.material.from_vector(p), shape_at, measurement) for p in some]
+    lam1, lam2, eigenvalue = _map(film, states)
+    return Digest(
+        at=measurement.deflection,
+        force=measurement.force,
+        sd=own_sd if own_sd is not None else np.full(len(measurement), np.nan),
+        rest_at=unused.at,
+        rest_force=unused.force,
+        rest_sd=unused.sd,
+        end=end,
+        full_range=measurement.full_range,
+        deflection=grid,
+        beyond=grid > end * (1 + 1e-9),
+        curve=_band(curve),
+        repeat=_band(curve + _noise_sd(hypothesis, measurement, x, grid) * rng.standard_normal(curve.shape)),
+        lost=np.array([np.mean(status == s, axis=0) for s in reasons]).reshape(len(reasons), grid.size),
+        reasons=tuple(s.label for s in reasons),
+        residual=_band(measurement.force - here.force),
+        rest_residual=_band(unused.force - rest_force),
+        curves_at=_band(here.force),
+        film=films[chosen],
+        convex={m: float(np.mean(_meets(here.margin(m, hypothesis), m))) for m in CONVEXITY if m != "none"},
+        shape_at=shape_at,
+        state_1=states[2],
+        state_2=states[3],
+        shape_radius=np.stack([s[0] for s in shapes], axis=1),
+        shape_height=np.stack([s[1] for s in shapes], axis=1),
+        map_1=lam1,
+        map_2=lam2,
+        eigenvalue=eigenvalue,
+        break_at=broken,
+        break_thickness=thickness,
+        break_force=np.array([b.force for b in breaks]),
+        break_predicted=_band(scaled),
+        break_lost=np.mean(~np.isfinite(scaled), axis=0),
+        specimens=tuple(b.specimen for b in breaks),
+    )
+
+
+# ---- pieces ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Points:
+    at: Array
+    force: Array
+    sd: Array
+
+    @staticmethod
+    def of(measurement: Measurement | None) -> _Points:
+        if measurement is None:
+            return _Points(*(np.empty(0) for _ in range(3)))
+        sd = measurement.force_sd
+        return _Points(
+            measurement.deflection, measurement.force, sd if sd is not None else np.full(len(measurement), np.nan)
+        )
+
+
+def _subset(x: Array, draws: int, seed: int) -> Array:
+    if len(x) <= draws:
+        return x
+    return x[np.sort(np.random.default_rng(seed).choice(len(x), draws, replace=False))]
+
+
+def _grid(end: float, last: float) -> Array:
+    """Deflections from near zero to ``last``, ``end`` among them."""
+    inside = np.linspace(end / INSIDE, end, INSIDE)
+    outside = np.linspace(end, last, OUTSIDE + 1)[1:] if last > end * (1 + 1e-9) else np.empty(0)
+    return np.concatenate([inside, outside])
+
+
+def _shape_deflections(end: float, last: float) -> Array:
+    """A third, two thirds and all of the fitted range, and the end of the whole one."""
+    at = [end / 3, 2 * end / 3, end]
+    return np.array([*at, last] if last > 1.02 * end else at)
+
+
+def _band(values: Array) -> Array:
+    """Quantiles (Q, G) of values (B, G) that exist; nan where fewer than `FEWEST` do."""
+    out = np.full((len(QUANTILES), values.shape[1]), np.nan)
+    enough = np.flatnonzero(np.mean(np.isfinite(values), axis=0) >= FEWEST)
+    if enough.size:
+        out[:, enough] = np.nanquantile(values[:, enough], QUANTILES, axis=0)
+    return out
+
+
+def _representative(force: Array) -> int:
+    """The draw whose curve is nearest to the median curve."""
+    distance = np.sum((force - np.nanmedian(force, axis=0)) ** 2, axis=1)
+    return int(np.argmin(np.where(np.isfinite(distance), distance, np.inf)))
+
+
+def _noise_sd(hypothesis: Hypothesis, measurement: Measurement, x: Array, at: Array) -> Array:
+    """(B, G) N: the measurement's own noise, carried on between and beyond its points, and the inferred one."""
+    own = measurement.force_sd
+    order = np.argsort(measurement.deflection)
+    given = np.zeros(at.size) if own is None else np.interp(at, measurement.deflection[order], own[order])
+    return _total_sd(hypothesis, measurement, x, given)
+
+
+def _total_sd(hypothesis: Hypothesis, measurement: Measurement, x: Array, given: Array) -> Array:
+    """(B, G) N: the given noise (G,) and the inferred one of each draw."""
+    names = hypothesis.natural_names
+    inferred = np.zeros(len(x))
+    if "noise.sd" in names:
+        inferred = hypothesis.natural(x, measurement)[:, names.index("noise.sd")]
+    return np.sqrt(given**2 + inferred[:, None] ** 2)
+
+
+def _meets(margin: Array, mode: str) -> NDArray[np.bool_]:
+    return np.asarray(margin > 0 if mode == "elliptic" else margin >= 0)
+
+
+def _profiles(film: Material, at: Array, measurement: Measurement) -> Array:
+    """(4, D, M): radius, height, l1 and l2 at each deflection; nan where the film has no state."""
+    if isinstance(measurement.rig, Strip):
+        l1 = np.repeat(1.0 + at[:, None] / measurement.rig.length, POINTS, axis=1)
+        along = np.linspace(0.0, measurement.rig.length, POINTS)
+        return np.stack([l1 * along, 0.0 * l1, l1, measurement.rig.lateral(l1)[0]])
+    rig = annulus(measurement)
+    radii = {"inner_radius": rig.inner_radius, "outer_radius": rig.outer_radius}
+    found = [api.profile(film, float(d), points=POINTS, **radii) for d in at]
+    return np.stack([np.stack([p.f, p.height, p.l1, p.l2]) for p in found], axis=1)
+
+
+def _map(film: Material, states: Array) -> tuple[Array, Array, Array]:
+    """Least eigenvalue of the Hessian over |G d| on stretches that hold the states (4, D, M) with room around them."""
+    top = float(np.nanmax(states[2:])) if np.any(np.isfinite(states[2])) else 2.0
+    low = float(np.nanmin(states[3])) if np.any(np.isfinite(states[3])) else 1.0
+    l1 = np.linspace(0.9, max(2.0, 1.12 * top), MAP[0])
+    l2 = np.linspace(min(0.7, 0.85 * low), max(2.0, 0.5 * top), MAP[1])
+    a, b = np.meshgrid(l1, l2, indexing="ij")
+    hessian = film.hessian(a, b)
+    gd = abs(float(np.asarray(film.shear_modulus(film.vector)))) or 1.0
+    value = least_eigenvalue(hessian[..., 0, 0], hessian[..., 0, 1], hessian[..., 1, 1])
+    return l1, l2, np.asarray(value / gd)
+
+
+# ---- storage ---------------------------------------------------------------------------------------------------------
+
+
+def _store(found: Digest, folder: Path, made: Mapping[str, Any]) -> None:
+    """Write ``digest.nc``, whole or not at all; raises `StorageError` if that cannot be."""
+    path = folder / FILE
+    try:
+        handle, name = tempfile.mkstemp(dir=folder, prefix=f".{FILE}.")
+        os.close(handle)
+        try:
+            _write(found, Path(name), made)
+            os.chmod(name, 0o644)
+            os.replace(name, path)
+        finally:
+            Path(name).unlink(missing_ok=True)
+    except OSError as error:
+        reason = error.strerror or error
+        raise StorageError(f"the digest cannot be written ({reason})", str(path), "free some space") from None
+
+
+def _read(path: Path) -> tuple[Digest, dict[str, Any]]:
+    try:
+        with h5netcdf.File(path, "r") as file:
+            arrays = {name: np.asarray(file.variables[name][...]) for name in _DIMS}
+            values: dict[str, Any] = json.loads(file.attrs["values"])
+            made = json.loads(file.attrs["made"])
+        values |= arrays
+        values["beyond"] = arrays["beyond"].astype(bool)
+        for name in ("reasons", "specimens"):
+            values[name] = tuple(values[name])
+        return Digest(**values), made
+    except (OSError, KeyError, ValueError, TypeError) as error:
+        reason = type(error).__name__
+        raise StorageError(f"the digest is damaged ({reason})", str(path), "remove the file and report again") from None
+
+
+def _write(found: Digest, path: Path, made: Mapping[str, Any]) -> None:
+    values: Mapping[str, Any] = {f.name: getattr(found, f.name) for f in fields(found)}
+    with h5netcdf.File(path, "w") as file:
+        for name, dims in _DIMS.items():
+            array = np.asarray(values[name])
+            array = array.astype(np.int8) if array.dtype == bool else array
+            for dimension, size in zip(dims.split(), array.shape, strict=True):
+                if dimension not in file.dimensions:
+                    file.dimensions[dimension] = size
+            file.create_variable(name, tuple(dims.split()), data=array)
+        file.attrs["values"] = json.dumps({k: v for k, v in values.items() if k not in _DIMS})
+        file.attrs["made"] = json.dumps(made)

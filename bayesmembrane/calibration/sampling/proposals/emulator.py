@@ -1,0 +1,153 @@
+"""A cheap density close to the posterior, on which proposals walk far; the posterior itself judges where they end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesmembrane.calibration.posterior import Evaluation
+from bayesmembrane.ground.parameters import Array
+
+LEARN_FROM, LEAST_DRAWS, HELD_OUT = 4000, 60, 0.25
+DEGREES = (1, 2, 3, 4)
+PER_TERM = 4  # draws for each coefficient of a polynomial
+RIDGE = 1e-8
+DOUBT = 0.02  # weight of the wide density for what the draws have not seen
+TAIL, WIDE = 4.0, 2.0  # its degrees of freedom, and its spread relative to the draws
+INNER = 100  # steps of a walk on the emulator
+FAR = 0.1  # part of them that jump the whole difference between two draws
+
+
+class Emulated(Protocol):
+    """What a posterior must offer to be emulated."""
+
+    def evaluate(self, x: Array) -> Evaluation:
+        """Prior, likelihood, force and outcome of x (B, k)."""
+
+    def given(self, force: Array, x: Array) -> Array:
+        """(B,) ln prior + ln likelihood of x (B, k) if their curves were ``force`` (B, N)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Emulator:
+    """ln q(x) = ln [(1 - e) p(x | F^(x)) + e t(x)], with F^ polynomial in x and t wide; not normalised.
+
+    posterior : turns curves into densities
+    centre, root, inverse : x = centre + root z whitens the draws
+    terms : (T, degree) indices of the factors of each monomial; k stands for a factor one
+    coefficients : (T, N) F^ = monomials(z) coefficients
+    level : ln of the height that the wide density is given at the centre
+    archive : (M, k) draws whose differences are steps
+    """
+
+    posterior: Emulated
+    centre: Array
+    root: Array
+    inverse: Array
+    terms: NDArray[np.intp]
+    coefficients: Array
+    level: float
+    archive: Array
+
+    def log_density(self, x: Array) -> Array:
+        """ln q of x (B, k), shape (B,)."""
+        z = (x - self.centre) @ self.inverse.T
+        with np.errstate(all="ignore"):
+            near = self.posterior.given(monomials(z, self.terms) @ self.coefficients, x)
+        wide = self.level + _log_t(z)
+        return np.asarray(np.logaddexp(np.where(np.isnan(near), -np.inf, near), wide))
+
+    def walk(self, x: Array, rng: np.random.Generator, steps: int = INNER) -> tuple[Array, Array]:
+        """(y, ln q(x) - ln q(y)) after ``steps`` Metropolis steps on q from x (B, k).
+
+        The steps x + g (a - b) with a, b from the archive are symmetric, and so the whole walk satisfies detailed
+        balance with respect to q: as a proposal for the posterior it has the factor q(x) / q(y) (J. S. Liu, Monte Carlo
+        Strategies in Scientific Computing, 2001, section 5.4.4, the surrogate transition method).
+        """
+        n, k = x.shape
+        start = now = self.log_density(x)
+        for _ in range(steps):
+            a, b = self.archive[rng.integers(len(self.archive), size=(2, n))]
+            scale = np.where(rng.random((n, 1)) < FAR, 1.0, 2.38 / np.sqrt(2 * k) * rng.gamma(4.0, 0.25, (n, 1)))
+            y = x + scale * (a - b)
+            there = self.log_density(y)
+            accept = np.log(rng.random(n)) < there - now
+            x, now = np.where(accept[:, None], y, x), np.where(accept, there, now)
+        return x, start - now
+
+
+def emulate(posterior: Emulated, x: Array, rng: np.random.Generator) -> Emulator | None:
+    """An emulator learned from draws x (M, k), of the polynomial degree that predicts held-out densities best.
+
+    None where there are too few possible draws to learn from.
+    """
+    x = np.unique(x, axis=0)
+    x = x[rng.permutation(len(x))[:LEARN_FROM]]
+    found = posterior.evaluate(x)
+    ok = np.isfinite(found.log_posterior) & np.all(np.isfinite(found.force), axis=1)
+    x, force, truth = x[ok], found.force[ok], found.log_posterior[ok]
+    if len(x) < LEAST_DRAWS:
+        return None
+    centre, root = np.mean(x, axis=0), _root(x)
+    inverse: Array = np.asarray(np.linalg.inv(root), dtype=float)
+    z = (x - centre) @ inverse.T
+    terms, coefficients = _best(z, force, lambda f, held: _misfit(posterior.given(f, x[held]), truth[held]))
+    emulator = Emulator(posterior, centre, root, inverse, terms, coefficients, -np.inf, x)
+    level = float(np.median(emulator.log_density(x) - _log_t(z)) + np.log(DOUBT))
+    return Emulator(posterior, centre, root, inverse, terms, coefficients, level, x)
+
+
+def monomials(z: Array, terms: NDArray[np.intp]) -> Array:
+    """Products of the columns of z (B, k) named in ``terms`` (T, degree), shape (B, T)."""
+    wide = np.concatenate([z, np.ones((len(z), 1))], axis=1)
+    out = wide[:, terms[:, 0]]
+    for column in terms.T[1:]:
+        out = out * wide[:, column]
+    return np.asarray(out)
+
+
+def _best(z: Array, force: Array, score: Callable[[Array, NDArray[np.bool_]], float]) -> tuple[NDArray[np.intp], Array]:
+    """Terms and coefficients of the degree whose held-out misfit is least, fitted to all draws."""
+    held = np.arange(len(z)) < HELD_OUT * len(z)
+    choices = []
+    for degree in DEGREES:
+        terms = _terms(z.shape[1], degree)
+        if degree > 1 and PER_TERM * len(terms) > np.count_nonzero(~held):
+            break
+        fit = _fitted(monomials(z[~held], terms), force[~held])
+        choices.append((score(monomials(z[held], terms) @ fit, held), degree))
+    terms = _terms(z.shape[1], min(choices)[1])
+    return terms, _fitted(monomials(z, terms), force)
+
+
+def _misfit(emulated: Array, truth: Array) -> float:
+    """Mean absolute error of ln p, each cut at 5: a few wild draws do not choose the degree."""
+    return float(np.mean(np.minimum(np.nan_to_num(np.abs(emulated - truth), nan=5.0), 5.0)))
+
+
+def _terms(k: int, degree: int) -> NDArray[np.intp]:
+    """(T, degree) all monomials up to ``degree`` in k variables; index k stands for one."""
+    return np.array(list(combinations_with_replacement(range(k + 1), degree)), dtype=np.intp)
+
+
+def _fitted(a: Array, force: Array) -> Array:
+    gram = a.T @ a
+    gram[np.diag_indices_from(gram)] += RIDGE * np.trace(gram) / len(gram)
+    return np.asarray(np.linalg.solve(gram, a.T @ force))
+
+
+def _root(x: Array) -> Array:
+    """Lower triangular R with R R^T the covariance of x (M, k)."""
+    covariance = np.atleast_2d(np.cov(x.T))
+    covariance[np.diag_indices_from(covariance)] *= 1 + 1e-10
+    return np.asarray(np.linalg.cholesky(covariance))
+
+
+def _log_t(z: Array) -> Array:
+    """ln of the wide t-density at whitened z (B, k), relative to its centre."""
+    return np.asarray(-0.5 * (TAIL + z.shape[1]) * np.log1p(np.sum((z / WIDE) ** 2, axis=1) / TAIL))

@@ -1,0 +1,137 @@
+"""Where ensembles start: spread wider than the posterior, each elsewhere, and none at an impossible point."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from bayesmembrane.calibration.descent import descend
+from bayesmembrane.calibration.objective import Objective, apart
+from bayesmembrane.calibration.posterior import Posterior, tally
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.parameters import Array
+
+BROAD, CLOSE, ROUNDS, EACH = 256, 256, 5, 192
+VALLEYS, ITERATIONS = 8, 40
+WIDER = 1.5  # of the Laplace approximation
+DEGREES = 4.0  # of freedom of the t-distribution around a valley
+SPARE = 1.5  # effective number of candidates for each walker
+
+
+def starting_points(
+    posterior: Posterior, rng: np.random.Generator, ensembles: int, walkers: int, counts: Counter[str]
+) -> Array:
+    """Starting points (E, W, k), all possible and all different, drawn without replacement from p(x | y)^b.
+
+    Candidates are prior draws brought to their best modulus, draws around the valleys that a descent finds from them,
+    and what differential evolution makes of the better ones; b <= 1 is the largest power at which the candidates are
+    worth more than the walkers, so that the starts are spread at least as widely as the posterior.
+
+    Raises `SettingsError` if next to no admissible parameters reach the data.
+    """
+    x = _candidates(posterior, rng)
+    lp = _evaluate(posterior, x, counts)
+    wanted = ensembles * walkers
+    for _ in range(ROUNDS):
+        good = np.isfinite(lp)
+        if np.count_nonzero(good) < 4:
+            more = posterior.prior.draw(rng, 2 * EACH)
+        else:
+            parents = x[good][_tempered(lp[good], EACH / 2, EACH, rng)]
+            more = _evolved(parents, rng)
+        x, lp = np.concatenate([x, more]), np.concatenate([lp, _evaluate(posterior, more, counts)])
+    good = np.isfinite(lp)
+    x, lp = x[good], lp[good]
+    if len(x) < wanted:
+        mode = posterior.hypothesis.convexity
+        limit = "" if mode == "none" else f' that meet the convexity prior "{mode}"'
+        raise SettingsError(
+            f"next to no {posterior.hypothesis.label()} films{limit} reach "
+            f"{1e3 * np.max(posterior.measurement.deflection):g} mm",
+            remedy="use a shorter range, another material or another convexity prior",
+        )
+    chosen = _tempered(lp, SPARE * wanted, wanted, rng)
+    return np.asarray(x[rng.permutation(chosen)].reshape(ensembles, walkers, -1))
+
+
+def _evaluate(posterior: Posterior, x: Array, counts: Counter[str]) -> Array:
+    e = posterior.evaluate(x)
+    counts.update(tally(e.outcome))
+    return e.log_posterior
+
+
+def _candidates(posterior: Posterior, rng: np.random.Generator) -> Array:
+    """Broad and close candidates (M, k), with noise coordinates that suit their residuals."""
+    objective = Objective(posterior.hypothesis, posterior.measurement, "euclidean", posterior.solve)
+    pool, size = objective.pool(rng)
+    close = _around_valleys(objective, pool, size[0] / np.sqrt(len(posterior.measurement)), rng)
+    curves = np.concatenate([pool[:: max(1, len(pool) // BROAD)], close])
+    x = posterior.prior.draw(rng, len(curves))
+    k = posterior.hypothesis.curve_size
+    x[:, :k] = curves
+    if x.shape[1] > k:
+        force = posterior.forward(curves, reached=False).force
+        rms = np.sqrt(np.mean((force - posterior.measurement.force) ** 2, axis=1))
+        fits = np.log(rms / posterior.hypothesis.noise.natural(np.zeros((1, x.shape[1] - k)), 1.0)[0, 0])
+        fits -= np.log(np.max(np.abs(posterior.measurement.force)))
+        some = np.isfinite(fits) & (rng.random(len(x)) < 0.7)
+        x[some, k] = fits[some] + 0.5 * rng.standard_normal(int(np.sum(some)))
+    return x
+
+
+def _around_valleys(objective: Objective, pool: Array, rms: float, rng: np.random.Generator) -> Array:
+    """Draws (CLOSE, k) from a wide t-distribution around the optima of likelihood times prior.
+
+    A normal with the prior's median and spread stands for the prior; the noise is the residual of the best start,
+    then of the best optimum.
+    """
+    k, low, high = pool.shape[1], objective.low, objective.high
+    pull = np.diag(1 / objective.spread)
+    own = objective.measurement.force_sd
+    floor = 1e-6 * np.max(np.abs(objective.measurement.force)) if own is None else float(np.sqrt(np.mean(own**2)))
+    sigma = max(rms, floor)
+
+    def residuals(x: Array) -> tuple[Array, Array]:
+        r, j = objective.batch(x)
+        wide = np.broadcast_to(pull, (len(x), k, k))
+        return (
+            np.concatenate([r / sigma, (x - objective.centre) / objective.spread], axis=1),
+            np.concatenate([j / sigma, wide], axis=1),
+        )
+
+    x = np.array(apart(pool, objective.spread, VALLEYS))
+    for _ in range(2):
+        x, size = descend(residuals, x, low, high, ITERATIONS)
+        best = x[int(np.argmin(size))]
+        sigma = max(float(np.sqrt(np.mean(objective(best)[0] ** 2))), floor)
+    x, size = x[np.isfinite(size)], size[np.isfinite(size)]
+    likely = size**2 < np.min(size**2, initial=np.inf) + 40.0
+    _, jacobian = residuals(x[likely])
+    which = rng.integers(np.count_nonzero(likely), size=CLOSE)
+    root = np.linalg.cholesky(np.linalg.inv(np.einsum("mnk,mnl->mkl", jacobian, jacobian)))
+    z = rng.standard_normal((CLOSE, k)) * np.sqrt(DEGREES / rng.chisquare(DEGREES, (CLOSE, 1)))
+    return np.asarray(np.clip(x[likely][which] + WIDER * np.einsum("mkl,ml->mk", root[which], z), low, high))
+
+
+def _tempered(lp: Array, worth: float, count: int, rng: np.random.Generator) -> Array:
+    """Indices of ``count`` of the candidates, without replacement while they last, with weights exp(b lp)."""
+    lp = lp - np.max(lp)
+    low, high = 0.0, 1.0
+    worth = min(worth, 0.9 * len(lp))
+    for _ in range(40):
+        b = 0.5 * (low + high)
+        w = np.exp(b * lp)
+        low, high = (b, high) if np.sum(w) ** 2 / np.sum(w * w) >= worth else (low, b)
+    # The largest of ln w + Gumbel noise are a draw without replacement.
+    order = np.argsort(-(low * lp + rng.gumbel(size=lp.size)))
+    return np.asarray(np.resize(order, count) if len(order) < count else order[:count])
+
+
+def _evolved(parents: Array, rng: np.random.Generator) -> Array:
+    """x_i + g (x_a - x_b), with g about half of what is best for exploring a normal distribution."""
+    n, k = parents.shape
+    a, b = rng.integers(n, size=(2, n))
+    g = 1.2 / np.sqrt(2 * k) * np.exp(0.3 * rng.standard_normal((n, 1)))
+    jitter = 1e-3 * np.std(parents, axis=0) * rng.standard_normal((n, k))
+    return np.asarray(parents + g * (parents[a] - parents[b]) + jitter)

@@ -1,0 +1,168 @@
+"""ln Z under every convexity mode, by importance sampling around the draws of one of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.prior import Mass
+from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
+from bayesmembrane.calibration.starts import starting_points
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.hypothesis import CONVEXITY
+
+ROUNDS, EACH, LAST = 3, 600, 2000
+KNOWN, STARTS = 1000, 64  # draws of the own mode, and starts without one, that the first proposal is fitted to
+LEAST_ESS, LARGEST_SHARE = 100.0, 0.1  # of the weights that a number may stand on
+WIDEST_MASS = 0.3  # standard error of ln mass
+
+
+@dataclass(frozen=True)
+class ByMode:
+    """ln Z under one convexity mode.
+
+    Attributes
+    ----------
+    mode : `CONVEXITY`
+    log_evidence, sd : with the prior renormalised by its mass; None where it cannot be said
+    mass, mass_sd : part of the prior that meets it
+    ess : how many draws the weights are worth
+    reason : "" or why there is no number, as a sentence
+    """
+
+    mode: str
+    log_evidence: float | None
+    sd: float | None
+    mass: float
+    mass_sd: float
+    ess: float
+    reason: str
+
+
+def by_convexity(
+    posterior: Posterior, draws: Array, log_evidence: float, sd: float, masses: Mapping[str, Mass], seed: int = 0
+) -> tuple[ByMode, ...]:
+    """ln Z_m = ln Z_own + ln(sum_b w_b 1_m(x_b) / sum_b w_b 1_own(x_b)) - ln mass_m, w = p0 L / g, x_b from g.
+
+    Parameters
+    ----------
+    draws : (B, k) of ``posterior``, whose own mode is that of its hypothesis
+    log_evidence, sd : of the same, not yet divided by the mass
+    masses : of every mode, from `JointPrior.masses`
+
+    g is a mixture of t-distributions, at first fitted to the draws and to starting points that know of no convexity,
+    then to its own weighted draws (O. Cappé et al., Stat. Comput. 18 (2008) 447), and once more for each mode that is
+    left with few. What g has not found does not count: weights that rest on few draws give a reason and no number.
+    """
+    rng = np.random.default_rng([seed, 6])
+    free = replace(posterior, hypothesis=replace(posterior.hypothesis, convexity="none"))
+    first = draws[rng.choice(len(draws), min(KNOWN, len(draws)), replace=False)]
+    try:
+        starts = starting_points(free, rng, 2, STARTS, Counter()).reshape(-1, free.size)
+    except SettingsError:
+        starts = first[:0]
+    found = _adapted(free, around(np.concatenate([first, starts]), rng), "none", ROUNDS, rng)
+    rows = []
+    for mode in CONVEXITY:
+        part = found if found.ess(mode) >= LEAST_ESS else _again(free, found, mode, rng)
+        rows.append(_row(posterior.hypothesis.convexity, mode, found, part, log_evidence, sd, masses[mode]))
+    return tuple(rows)
+
+
+@dataclass(frozen=True, eq=False)
+class _Weighted:
+    """x (B, k) from a mixture, ln of their weights under no convexity (B,), and which modes they meet."""
+
+    x: Array
+    log_weight: Array
+    inside: Mapping[str, NDArray[np.bool_]]
+
+    def log_weights(self, mode: str) -> Array:
+        return np.where(self.inside[mode], self.log_weight, -np.inf)
+
+    def ess(self, mode: str) -> float:
+        w = self.relative(mode)
+        return float(np.sum(w) ** 2 / np.sum(w * w)) if np.any(w > 0) else 0.0
+
+    def relative(self, mode: str) -> Array:
+        """Weights (B,), the largest of no convexity being one."""
+        return np.asarray(np.exp(self.log_weights(mode) - np.max(self.log_weight)))
+
+    def log_mean(self, mode: str) -> float:
+        """ln of the mean weight: the integral of p0 L 1_mode."""
+        return float(logsumexp(self.log_weights(mode)) - np.log(len(self.x)))
+
+    def log_sd(self, mode: str) -> float:
+        """Standard error of `log_mean`."""
+        w = self.relative(mode)
+        return float(np.std(w) / np.mean(w) / np.sqrt(len(w)))
+
+    def resampled(self, mode: str, count: int, rng: np.random.Generator) -> Array:
+        w = self.relative(mode)
+        # Cut at the root of their number, so that no single draw draws the proposal to itself.
+        w = np.minimum(w, np.sqrt(len(w)) * np.mean(w))
+        return self.x[rng.choice(len(w), count, p=w / np.sum(w))]
+
+
+def _weigh(free: Posterior, g: Mixture, count: int, rng: np.random.Generator) -> _Weighted:
+    x = g.draw(rng, count)
+    prediction = free.forward(x)
+    log_likelihood = np.full(count, -np.inf)
+    ok = prediction.ok
+    if np.any(ok):
+        noise = free.hypothesis.noise_coordinates(x[ok])
+        with np.errstate(over="ignore", invalid="ignore"):
+            log_likelihood[ok] = free.noise.log_likelihood(free.measurement.force - prediction.force[ok], noise)
+    log_weight = free.prior.log_density(x) + log_likelihood - g.log_density(x)
+    inside = {mode: free.prior.inside(prediction, mode) for mode in CONVEXITY}
+    return _Weighted(x, np.where(np.isnan(log_weight), -np.inf, log_weight), inside)
+
+
+def _adapted(free: Posterior, g: Mixture, mode: str, rounds: int, rng: np.random.Generator) -> _Weighted:
+    """The last draws of a proposal that was fitted ``rounds`` times to what it found of ``mode``."""
+    for _ in range(rounds):
+        found = _weigh(free, g, EACH, rng)
+        if found.ess(mode) < free.size + 2:
+            break
+        g = around(found.resampled(mode, EACH, rng), rng)
+    return _weigh(free, g, LAST, rng)
+
+
+def _again(free: Posterior, found: _Weighted, mode: str, rng: np.random.Generator) -> _Weighted:
+    """Draws around those few that meet ``mode``, if there are enough to begin with."""
+    if found.ess(mode) < free.size + 2:
+        return found
+    return _adapted(free, around(found.resampled(mode, EACH, rng), rng), mode, 2, rng)
+
+
+def _row(own: str, mode: str, found: _Weighted, part: _Weighted, log_evidence: float, sd: float, mass: Mass) -> ByMode:
+    if mode == own:
+        total = float(np.hypot(sd, mass.sd / mass.value))
+        return ByMode(mode, log_evidence - float(np.log(mass.value)), total, mass.value, mass.sd, part.ess(mode), "")
+    ess = part.ess(mode)
+    if mass.sd > WIDEST_MASS * mass.value:
+        why = f"Too few films of the prior meet it: its mass is {mass.value:.2g} +- {mass.sd:.2g}."
+        return ByMode(mode, None, None, mass.value, mass.sd, ess, why)
+    few = ess < LEAST_ESS or np.max(part.relative(mode)) > LARGEST_SHARE * np.sum(part.relative(mode))
+    if few or found.ess(own) < LEAST_ESS:
+        why = f"The weights of this mode rest on only {ess:.0f} draws."
+        if not np.any(part.inside[mode]):
+            why = "None of the films that come near the data meets it."
+        return ByMode(mode, None, None, mass.value, mass.sd, ess, why)
+    value = log_evidence + part.log_mean(mode) - found.log_mean(own) - float(np.log(mass.value))
+    if part is found:
+        a, b = found.relative(mode), found.relative(own)
+        pull = a / np.mean(a) - b / np.mean(b)
+        error = float(np.std(pull) / np.sqrt(len(pull)))
+    else:
+        error = float(np.hypot(part.log_sd(mode), found.log_sd(own)))
+    return ByMode(
+        mode, value, float(np.sqrt(error**2 + sd**2 + (mass.sd / mass.value) ** 2)), mass.value, mass.sd, ess, ""
+    )

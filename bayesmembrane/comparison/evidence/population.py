@@ -1,0 +1,128 @@
+"""Draws from a target that nobody has sampled yet: populations that are led from the prior to the posterior."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayesmembrane.comparison.evidence.target import Problem
+from bayesmembrane.ground.parameters import Array
+
+KEPT = 0.5  # effective part of the population after each rise of the power
+ACCEPTED = 4  # moves a walker, and one more for each dimension, between two powers
+MOST_MOVES = 150
+LEAST_PART = 0.02  # of proposals accepted; below that more moves are no help
+JUMP = 0.1  # part of the moves that may change valleys
+
+Base = Callable[[Array], tuple[Array, Array]]
+"""(ln of what is sampled already, ln of what is added by degrees) at x (B, k), (B,) each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Population:
+    """Walkers led to base * added^1.
+
+    x : (S, W, k) snapshots of W walkers
+    log_base, log_added : (S, W)
+    log_ratio, sd : ln of the ratio of the two normalisations by stepping stones, and its standard error
+    """
+
+    x: Array
+    log_base: Array
+    log_added: Array
+    log_ratio: float
+    sd: float
+
+
+def from_prior(problem: Problem, rng: np.random.Generator, walkers: int, snapshots: int) -> Population:
+    """Populations of p(x | y) ~ p0 L by way of p0 L^b; ``log_ratio`` is then an estimate of ln Z."""
+    start = problem.prior_draws(rng, walkers)
+    found = led(problem.terms, start.x[:walkers], rng, snapshots)
+    sd = float(np.hypot(found.sd, start.log_part_sd))
+    return replace(found, log_ratio=found.log_ratio + float(np.log(start.part)), sd=sd)
+
+
+def led(terms: Base, start: Array, rng: np.random.Generator, snapshots: int) -> Population:
+    """Lead draws ``start`` (W, k) of exp(base) to draws of exp(base + added), in steps that keep half of them alive.
+
+    At each power the population is weighted, resampled and moved by differential evolution (P. Del Moral, A. Doucet,
+    A. Jasra, J. R. Stat. Soc. B 68 (2006) 411; C. J. F. ter Braak, Stat. Comput. 16 (2006) 239). The weights give
+    ln of the ratio of normalisations.
+    """
+    x = start.copy()
+    base, added = terms(x)
+    power, log_ratio, variance = 0.0, 0.0, 0.0
+    while power < 1.0:
+        rise = _rise(added, 1.0 - power)
+        log_weight = rise * added
+        top = float(np.max(log_weight))
+        weight = np.exp(log_weight - top)
+        log_ratio += top + float(np.log(np.mean(weight)))
+        variance += float(np.var(weight) / np.mean(weight) ** 2) / len(x)
+        power = min(1.0, power + rise)
+        chosen = _systematic(weight, rng)
+        x, base, added = x[chosen], base[chosen], added[chosen]
+        x, base, added = _moved(terms, x, base, added, power, rng)
+    kept = [(x, base, added)]
+    for _ in range(snapshots - 1):
+        x, base, added = _moved(terms, x, base, added, 1.0, rng)
+        kept.append((x, base, added))
+    snapshots_x, log_base, log_added = (np.stack(part) for part in zip(*kept, strict=True))
+    return Population(snapshots_x, log_base, log_added, log_ratio, float(np.sqrt(variance)))
+
+
+def _rise(added: Array, left: float) -> float:
+    """The largest rise of the power, up to ``left``, that keeps the effective population at `KEPT` of the walkers."""
+
+    def part(rise: float) -> float:
+        w = np.exp(rise * (added - np.max(added)))
+        return float(np.sum(w) ** 2 / np.sum(w * w) / len(w))
+
+    if part(left) >= KEPT:
+        return left
+    low, high = 0.0, left
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if part(middle) >= KEPT else (low, middle)
+    return max(low, 1e-12)
+
+
+def _systematic(weight: Array, rng: np.random.Generator) -> Array:
+    """Indices (W,) drawn in proportion to ``weight`` (W,), from one uniform number."""
+    at = (rng.random() + np.arange(len(weight))) / len(weight)
+    return np.minimum(np.searchsorted(np.cumsum(weight) / np.sum(weight), at), len(weight) - 1)
+
+
+def _moved(
+    terms: Base, x: Array, base: Array, added: Array, power: float, rng: np.random.Generator
+) -> tuple[Array, Array, Array]:
+    """The population after as many moves as it takes for each walker to be elsewhere."""
+    wanted = ACCEPTED + x.shape[1]
+    x, base, added = x.copy(), base.copy(), added.copy()
+    order = rng.permutation(len(x))
+    halves = order[: len(x) // 2], order[len(x) // 2 :]
+    accepted = 0.0
+    for i in range(MOST_MOVES):
+        for here, there in (halves, halves[::-1]):
+            to = x[here] + _steps(x[there], len(here), rng)
+            new_base, new_added = terms(to)
+            gain = new_base - base[here] + power * np.where(new_base > -np.inf, new_added - added[here], 0.0)
+            good = np.log(rng.random(len(here))) < gain
+            rows = here[good]
+            x[rows], base[rows], added[rows] = to[good], new_base[good], new_added[good]
+            accepted += float(np.mean(good)) / 2
+        if accepted >= wanted or (i >= MOST_MOVES // 4 and accepted < LEAST_PART * i):
+            break
+    return x, base, added
+
+
+def _steps(others: Array, count: int, rng: np.random.Generator) -> Array:
+    """g (a - b) for pairs of the other half, (count, k): g about 2.38 / sqrt(2 k), at times 1."""
+    k = others.shape[1]
+    a, b = rng.integers(len(others), size=(2, count))
+    g = 2.38 / np.sqrt(2 * k) * np.exp(rng.normal(-0.2, 0.5, count))
+    g = np.where(rng.random(count) < JUMP, 1.0, g)
+    jitter = 1e-5 * np.std(others, axis=0) * rng.standard_normal((count, k))
+    return np.asarray(g[:, None] * (others[a] - others[b]) + jitter)

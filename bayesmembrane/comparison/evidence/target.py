@@ -1,0 +1,184 @@
+"""What the evidence estimators ask of a problem, and the problem of this package seen that way."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.parameters import Array
+
+HOPELESS = 50_000  # draws of the prior of which none is possible
+
+
+class Target(Protocol):
+    """Z = integral of exp(log_likelihood(x)) exp(log_prior(x)) dx over R^k: anything with these four.
+
+    dimension : k
+    log_prior : ln p0(x) of x (B, k), shape (B,); normalised over R^k, and -inf where x is not allowed. A region that is
+        cut away by -inf may be left out of the normalisation if its mass is told to the estimators
+    log_likelihood : ln p(y | x) of x (B, k), shape (B,); -inf where x cannot give the data. It is asked only where the
+        prior is not zero
+    prior_transform : the x (B, k) of u (B, k) uniform in the unit cube; distributed as p0 before anything is cut away
+
+    A target whose two logarithms come out of one computation may also have ``evaluate(x)``, which returns an object
+    with ``log_prior`` and ``log_likelihood``, (B,) each.
+    """
+
+    @property
+    def dimension(self) -> int: ...
+
+    def log_prior(self, x: Array) -> Array: ...
+
+    def log_likelihood(self, x: Array) -> Array: ...
+
+    def prior_transform(self, u: Array) -> Array: ...
+
+
+@dataclass(frozen=True, eq=False)
+class PosteriorTarget:
+    """The posterior of a hypothesis as a `Target`: the prior is untruncated times the indicator of convexity.
+
+    Its evidence must be divided by the mass that convexity leaves (`JointPrior.masses`).
+    """
+
+    posterior: Posterior
+
+    @property
+    def dimension(self) -> int:
+        return self.posterior.size
+
+    def log_prior(self, x: Array) -> Array:
+        return self.posterior.log_prior(x)
+
+    def log_likelihood(self, x: Array) -> Array:
+        return self.posterior.log_likelihood(x)
+
+    def prior_transform(self, u: Array) -> Array:
+        return self.posterior.prior.transform(u)
+
+    def evaluate(self, x: Array) -> Any:
+        """Both at once, from one solution of the film."""
+        return self.posterior.evaluate(x)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """ln Z of one estimator with its standard error, and what it cost.
+
+    parts : ln Z of independent runs or halves, from whose scatter the standard error was checked
+    """
+
+    log_evidence: float
+    sd: float
+    evaluations: int
+    seconds: float
+    parts: tuple[float, ...] = ()
+
+
+def averaged(a: Estimate, b: Estimate) -> Estimate:
+    """Mean of two independent estimates with weights 1 / sd^2; its error is inflated if they scatter by more."""
+    w = np.array([a.sd, b.sd]) ** -2.0
+    z = np.array([a.log_evidence, b.log_evidence])
+    mean = float(w @ z / np.sum(w))
+    sd = float(np.sqrt(max(1.0, float(w @ (z - mean) ** 2)) / np.sum(w)))
+    return Estimate(mean, sd, a.evaluations + b.evaluations, a.seconds + b.seconds, (*a.parts, *b.parts))
+
+
+class Problem:
+    """A target with its bookkeeping: both logarithms at once, evaluations counted, answers checked."""
+
+    def __init__(self, target: Target) -> None:
+        self.target, self.evaluations = target, 0
+        self._began = time.perf_counter()
+
+    @property
+    def size(self) -> int:
+        """k"""
+        return int(self.target.dimension)
+
+    @property
+    def seconds(self) -> float:
+        """Since the problem was made."""
+        return time.perf_counter() - self._began
+
+    def terms(self, x: Array) -> tuple[Array, Array]:
+        """(log prior, log likelihood) of x (B, k), (B,) each; both -inf where either is.
+
+        Raises `SettingsError` if the target returns another shape, nan or +inf.
+        """
+        self.evaluations += len(x)
+        if hasattr(self.target, "evaluate"):
+            both = self.target.evaluate(x)
+            log_prior, log_likelihood = _checked("log_prior", both.log_prior, x), both.log_likelihood
+            log_likelihood = np.where(log_prior > -np.inf, log_likelihood, -np.inf)
+        else:
+            log_prior = _checked("log_prior", self.target.log_prior(x), x)
+            inside = log_prior > -np.inf
+            log_likelihood = np.full(len(x), -np.inf)
+            if np.any(inside):
+                log_likelihood[inside] = _checked("log_likelihood", self.target.log_likelihood(x[inside]), x[inside])
+        log_likelihood = _checked("log_likelihood", log_likelihood, x)
+        return np.where(log_likelihood > -np.inf, log_prior, -np.inf), log_likelihood
+
+    def log_posterior(self, x: Array) -> Array:
+        """The sum of the two terms, (B,)."""
+        log_prior, log_likelihood = self.terms(x)
+        return log_prior + log_likelihood
+
+    def from_cube(self, u: Array) -> tuple[Array, Array]:
+        """x (B, k) of u (B, k), and the log likelihood there (B,)."""
+        x = np.asarray(self.target.prior_transform(u), dtype=float)
+        if x.shape != u.shape:
+            raise SettingsError(f"prior_transform gives the shape {x.shape}, and {u.shape} was asked for")
+        return x, self.terms(x)[1]
+
+    def prior_draws(self, rng: np.random.Generator, count: int, most: int = 2_000_000) -> PriorDraws:
+        """At least ``count`` prior draws where neither prior nor likelihood is zero, and the part of the prior there.
+
+        Raises `SettingsError` if ``most`` draws do not hold as many.
+        """
+        found: list[tuple[Array, Array, Array]] = []
+        tried = good = 0
+        while good < count:
+            if tried >= most or (tried >= HOPELESS and good == 0):
+                raise SettingsError(
+                    f"prior and likelihood are both positive at only {good} of {tried} draws of the prior",
+                    remedy="choose a prior from which the data can be reached",
+                )
+            u = rng.random((min(count, 2048), self.size))
+            x, log_likelihood = self.from_cube(u)
+            keep = log_likelihood > -np.inf
+            found.append((u[keep], x[keep], log_likelihood[keep]))
+            tried += len(u)
+            good += int(np.sum(keep))
+        u, x, log_likelihood = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return PriorDraws(u, x, log_likelihood, good / tried, float(np.sqrt((1 - good / tried) / good)))
+
+
+@dataclass(frozen=True, eq=False)
+class PriorDraws:
+    """Draws where likelihood and prior are positive: u, x (M, k), log likelihood (M,); the prior's ``part`` there, and
+    the standard error of its logarithm.
+    """
+
+    u: Array
+    x: Array
+    log_likelihood: Array
+    part: float
+    log_part_sd: float
+
+
+def _checked(name: str, values: Array, x: Array) -> Array:
+    values = np.asarray(values, dtype=float)
+    if values.shape != (len(x),):
+        raise SettingsError(f"{name} gives the shape {values.shape}, and ({len(x)},) was asked for")
+    bad = np.isnan(values) | (values == np.inf)
+    if np.any(bad):
+        where = np.array2string(x[int(np.argmax(bad))], precision=4)
+        raise SettingsError(f"{name} is {values[int(np.argmax(bad))]} at x = {where}", remedy="-inf says impossible")
+    return values

@@ -1,0 +1,222 @@
+"""How well a hypothesis predicts: single points from all others, and the rest of the curve from its first part."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import arviz
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.comparison.leave_out.pool import Pool
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.forward import Forward, Solve
+from bayesmembrane.physics.mechanics import api
+from bayesmembrane.physics.noise.base import force_scale
+
+PARETO_K = 0.7
+
+Tell = Callable[[str], None]
+
+
+# ---- leave one out ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class LeaveOneOut:
+    """elpd = sum_i ln p(y_i | all other y).
+
+    Attributes
+    ----------
+    elpd, se : the sum, and its standard error sqrt(N var_i) over the points
+    monte_carlo_sd : what the draws add to that
+    pointwise : (N,) the terms
+    pareto_k : (N,) shape of the tail of the importance weights; above 0.7 the term comes from further draws
+    refitted : indices of those points
+    """
+
+    elpd: float
+    se: float
+    monte_carlo_sd: float
+    pointwise: Array
+    pareto_k: Array
+    refitted: tuple[int, ...]
+
+
+def leave_one_out(posterior: Posterior, data: Any, seed: int = 0, tell: Tell | None = None) -> LeaveOneOut:
+    """ln p(y_i | y_-i) = ln of the mean of p(y_i | y_-i, x) over p(x | y_-i), for every point i.
+
+    ``data`` is the InferenceData of a run of ``posterior``: its pointwise terms are ln p(y_i | y_-i, x) under the whole
+    covariance, so that p(x | y) / p(y_i | y_-i, x) is what the other points say of x, whatever the correlation. Pareto
+    smoothed importance sampling uses that; where its k exceeds 0.7, draws of densities that are led to the posterior of
+    the other points are added (`Pool`).
+
+    A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413; P.-C. Bürkner, J. Gabry, A. Vehtari, Comput. Stat. 36
+    (2021) 1243.
+    """
+    with warnings.catch_warnings():
+        # arviz warns of large k; those points get draws of their own.
+        warnings.simplefilter("ignore")
+        found = arviz.loo(data, pointwise=True, var_name="force", scale="log")  # type: ignore[no-untyped-call]
+    terms, k = found.loo_i.values.astype(float).copy(), found.pareto_k.values.astype(float)
+    draws = np.stack([data.posterior[n].values.ravel() for n in posterior.hypothesis.names], axis=1)
+    log_likelihood = data.log_likelihood["force"].values.reshape(len(draws), -1).astype(float)
+    error = np.array([_smoothed_error(log_likelihood[:, i]) for i in range(len(terms))])
+    rng = np.random.default_rng([seed, 2])
+    bad = np.flatnonzero(~(k <= PARETO_K))
+    log_posterior = data.sample_stats["lp"].values.ravel().astype(float)
+    pool = Pool(posterior, draws, log_posterior, log_likelihood, rng) if bad.size else None
+    for i in bad:
+        if tell is not None:
+            tell(f"leaving out point {i + 1} of {len(terms)}")
+        assert pool is not None
+        terms[i], error[i], _ = pool.without(int(i))
+    return LeaveOneOut(
+        elpd=float(np.sum(terms)),
+        se=float(np.sqrt(len(terms) * np.var(terms))),
+        monte_carlo_sd=float(np.sqrt(np.sum(error**2))),
+        pointwise=terms,
+        pareto_k=k,
+        refitted=tuple(int(i) for i in bad),
+    )
+
+
+def _smoothed_error(log_likelihood: Array) -> float:
+    """Monte Carlo error of one term, from the spread of the raw weights 1 / p(y_i | ...)."""
+    w = np.exp(np.min(log_likelihood) - log_likelihood)
+    return float(np.sqrt(np.var(w) / len(w)) / np.mean(w))
+
+
+# ---- leave the rest of the range out ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class LeaveRangeOut:
+    """The held-out points h, given the fitted ones f.
+
+    Attributes
+    ----------
+    elpd : ln p(y_h | y_f), the joint density of all held-out points
+    se : sqrt(M var_j) of the terms ln p(y_hj | y_f, y_h1 .. y_h(j-1)); they are few, and it is rough
+    monte_carlo_sd : what the draws add to that
+    effective : how many draws the held-out points leave; below 20 the elpd is a guess from the best draws
+    lost : part of the draws whose film has no curve at all held-out deflections
+    rmse_N, max_N : of measured minus mean prediction, N; nan if no draw has a curve
+    deflection, predicted, sd : (M,) m, N, N: mean and standard deviation of the prediction, noise included
+    """
+
+    elpd: float
+    se: float
+    monte_carlo_sd: float
+    effective: float
+    lost: float
+    rmse_N: float  # noqa: N815 - the unit
+    max_N: float  # noqa: N815
+    deflection: Array
+    predicted: Array
+    sd: Array
+
+    @property
+    def points(self) -> int:
+        """M"""
+        return int(self.deflection.size)
+
+
+def leave_range_out(posterior: Posterior, draws: Array, whole: Measurement, solve: Solve = api.solve) -> LeaveRangeOut:
+    """ln p(y_h | y_f) = ln of the mean of N(y_h; F_h + S_hf S_ff^-1 (y_f - F_f), S_hh - S_hf S_ff^-1 S_fh).
+
+    ``draws`` (B, k) are those of ``posterior``, whose measurement is ``whole`` up to some deflection; h are the other
+    points. S is the covariance of the whole measurement, its own noise and the inferred one.
+
+    Raises `SettingsError` if nothing is left out, or the noise model has coordinates other than the logarithms of a
+    standard deviation and a length.
+    """
+    fitted = whole.deflection <= np.max(posterior.measurement.deflection) * (1 + 1e-9)
+    if np.all(fitted):
+        raise SettingsError("the fit has used the whole range, and nothing is left to be predicted")
+    if np.count_nonzero(fitted) != len(posterior.measurement):
+        raise SettingsError("the run was not made from the first part of this measurement")
+    force = Forward(posterior.hypothesis, whole, whole.deflection, solve)(draws, reached=False).force
+    noise = _carried(posterior, draws, whole)
+    model = posterior.hypothesis.noise.bind(whole)
+    held = np.flatnonzero(~fitted)
+    log_p = np.full((len(draws), held.size), -np.inf)
+    mean, variance = np.full((len(draws), held.size), np.nan), np.full((len(draws), held.size), np.nan)
+    good = np.flatnonzero(np.all(np.isfinite(force), axis=1))
+    for b in good:
+        residual, covariance = whole.force - force[b], model.covariance(noise[b])
+        shift, conditional = _conditional(covariance, residual, fitted)
+        mean[b], variance[b] = force[b, held] + shift, np.diag(conditional)
+        log_p[b] = _sequential(conditional, residual[held] - shift)
+    return _summary(whole, held, good, log_p, mean, variance)
+
+
+def _summary(
+    whole: Measurement, held: NDArray[np.intp], good: NDArray[np.intp], log_p: Array, mean: Array, variance: Array
+) -> LeaveRangeOut:
+    total = np.cumsum(log_p, axis=1)
+    count = len(log_p)
+    cumulative = logsumexp(total, axis=0) - np.log(count) if good.size else np.full(held.size, -np.inf)
+    terms = np.diff(cumulative, prepend=0.0) if good.size else cumulative
+    w = np.exp(total[:, -1] - np.max(total[:, -1])) if good.size else np.zeros(1)
+    effective = float(np.sum(w) ** 2 / np.sum(w * w)) if good.size else 0.0
+    predicted = np.mean(mean[good], axis=0) if good.size else np.full(held.size, np.nan)
+    spread = np.sqrt(np.mean(variance[good], axis=0) + np.var(mean[good], axis=0)) if good.size else predicted
+    miss = whole.force[held] - predicted
+    return LeaveRangeOut(
+        elpd=float(cumulative[-1]),
+        se=float(np.sqrt(held.size * np.var(terms))) if good.size else np.nan,
+        monte_carlo_sd=float(np.std(w) / np.sqrt(count) / np.mean(w)) if good.size else np.nan,
+        effective=effective,
+        lost=1.0 - good.size / count,
+        rmse_N=float(np.sqrt(np.mean(miss**2))),
+        max_N=float(np.max(np.abs(miss))),
+        deflection=whole.deflection[held],
+        predicted=predicted,
+        sd=spread,
+    )
+
+
+def _conditional(covariance: Array, residual: Array, fitted: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """(S_hf S_ff^-1 r_f, S_hh - S_hf S_ff^-1 S_fh)."""
+    ff, hf = covariance[np.ix_(fitted, fitted)], covariance[np.ix_(~fitted, fitted)]
+    gain = np.linalg.solve(ff, hf.T).T
+    rest = covariance[np.ix_(~fitted, ~fitted)] - gain @ hf.T
+    return gain @ residual[fitted], 0.5 * (rest + rest.T)
+
+
+def _sequential(covariance: Array, residual: Array) -> Array:
+    """(M,) ln N of each residual given those before it: -z^2/2 - ln L_jj - ln(2 pi)/2, S = L L^T and z = L^-1 r."""
+    root = np.linalg.cholesky(covariance)
+    z = np.linalg.solve(root, residual)
+    return np.asarray(-0.5 * z * z - np.log(np.diag(root)) - 0.5 * np.log(2 * np.pi))
+
+
+def _carried(posterior: Posterior, draws: Array, whole: Measurement) -> Array:
+    """Noise coordinates (B, m) that mean for ``whole`` what those of the draws mean for the fitted part.
+
+    They are relative to the largest force and to the median step, and both change with the range.
+    """
+    part = posterior.measurement
+    shifts = {
+        "ln_sd": np.log(force_scale(part) / force_scale(whole)),
+        "ln_length": np.log(_median_step(part) / _median_step(whole)),
+    }
+    names = [p.name for p in posterior.hypothesis.noise.coordinates]
+    unknown = [n for n in names if n not in shifts]
+    if unknown:
+        raise SettingsError(f'the noise coordinate "{unknown[0]}" cannot be carried over to another range')
+    return np.asarray(posterior.hypothesis.noise_coordinates(draws) + np.array([shifts[n] for n in names]))
+
+
+def _median_step(measurement: Measurement) -> float:
+    place = measurement.deflection if measurement.time is None else measurement.time
+    step = np.abs(np.diff(place))
+    return float(np.median(step)) if step.size and np.median(step) > 0 else 1.0

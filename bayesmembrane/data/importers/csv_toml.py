@@ -1,0 +1,80 @@
+"""This program's own layout, written by another hand: other units, delimiters, decimal signs and header styles."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import ClassVar
+
+from bayesmembrane.data.importers.base import Imported, Importer
+from bayesmembrane.data.measurement import check_samples, curve_columns
+from bayesmembrane.data.tables import Table, decode, number, parse_table
+from bayesmembrane.ground.errors import DataError
+from bayesmembrane.ground.units import split_header
+from bayesmembrane.physics.rigs.annulus import Annulus
+
+_NAMES = {*Annulus.columns, "time", "force_sd"}
+_BRACKETS = re.compile(r"(?P<name>[^\[\](),]+?)[\s_]*(?:\[(?P<a>[^\[\]]*)\]|\((?P<b>[^()]*)\))")
+
+
+class CsvToml(Importer):
+    """A header line with deflection and force in known units, numbers below; ``;``, tab or ``,`` between them."""
+
+    name: ClassVar[str] = "csv_toml"
+    title: ClassVar[str] = (
+        "CSV with a header like deflection_mm;force_N or Deflection [mm];Force [N], "
+        "separated by semicolons, tabs or commas, decimal points or commas"
+    )
+
+    @staticmethod
+    def recognises(data: bytes) -> bool:
+        if b"\0" in data:
+            return False
+        lines = [x for x in _text(data).splitlines() if x.strip() and not x.lstrip().startswith("#")]
+        header = re.split(r"[;\t,]", lines[0]) if lines else []
+        return any(split_header(_plain(h.strip(' "')))[0].lower() in _NAMES for h in header)
+
+    @staticmethod
+    def read(data: bytes, file: str) -> Imported:
+        text = decode(_text(data).encode(), file)
+        header = next((x for x in text.split("\n") if x.strip() and not x.lstrip().startswith("#")), "")
+        delimiter = next((d for d in ";\t" if d in header), ",")
+        table = parse_table(text, file, delimiter)
+        decimal = _decimal(table)
+        table = replace(table, header=tuple(_plain(h) for h in table.header), decimal=decimal)
+        columns, notes = curve_columns(table, Annulus.columns)
+        check_samples(columns, file, table.lines)
+        return Imported(columns, f"imported from {file}", notes)
+
+
+def _text(data: bytes) -> str:
+    """Bytes -> text; what is not UTF-8 is read as Windows' western code page, where only signs like µ differ."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
+
+
+def _plain(header: str) -> str:
+    """The header in this program's own style: ``Force [mN]``, ``Force (mN)`` -> ``force_mN``."""
+    found = _BRACKETS.fullmatch(header.strip())
+    if not found:
+        return header.strip()
+    name = re.sub(r"\s+", "_", found["name"].strip()).lower()
+    unit = found["a"] if found["a"] is not None else found["b"]
+    return f"{name}_{unit.strip()}".rstrip("_")
+
+
+def _decimal(table: Table) -> str:
+    """The decimal sign of a table; raises `DataError` at the first cell that contradicts the cells before it."""
+    sign, place = "", ""
+    for line, cells in zip(table.lines, table.rows, strict=True):
+        for cell in cells:
+            found = next((d for d in ".," if d in cell and number(cell, d) is not None), "")
+            where = f"{table.file}, line {line}"
+            if found and sign and found != sign:
+                fault = f'"{cell}" has another decimal sign than the numbers before it ({place})'
+                raise DataError(fault, where, "write all numbers with one sign")
+            if found:
+                sign, place = found, place or f'"{cell}" in line {line}'
+    return sign or "."

@@ -1,0 +1,119 @@
+"""TOML files read with care: every key asked for is checked, and every key not asked for is an error."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from bayesmembrane.data.tables import read_text
+from bayesmembrane.ground.errors import DataError
+from bayesmembrane.ground.units import factor, known_units, split_header, to_si
+
+
+def load_toml(path: Path) -> Section:
+    """The root section of a TOML file; raises `DataError` if it cannot be read, with the line of a syntax error."""
+    text = read_text(path)
+    try:
+        return Section(tomllib.loads(text), str(path))
+    except (ValueError, RecursionError) as error:
+        fault = "it is nested too deeply" if isinstance(error, RecursionError) else f"{error}"
+        raise DataError(
+            f"this is not valid TOML: {fault}", str(path), "texts stand in quotes, and numbers have decimal points"
+        ) from None
+
+
+class Section:
+    """One table of a TOML file. Ask for its keys, then call `finish`, which complains about the others."""
+
+    def __init__(self, table: dict[str, Any], file: str, name: str = "") -> None:
+        self.table, self.file, self.name = table, file, name
+        self.where = f"{file}, [{name}]" if name else file
+        self._asked: set[str] = set()
+        self._seen: set[str] = set()
+
+    def section(self, name: str, required: bool = True) -> Section:
+        """The section ``[name]``; an empty one if it is missing and not required."""
+        self._note(name, name)
+        if name not in self.table and required:
+            raise DataError(f"the section [{name}] is missing", self.where, self._like(name) or "add it")
+        table = self.table.get(name, {})
+        if not isinstance(table, dict):
+            raise DataError(f'"{name}" must be a section', self.where, f"write [{name}] on a line of its own")
+        return Section(table, self.file, name)
+
+    def text(self, key: str, required: bool = False) -> str | None:
+        """The text under ``key``, None if there is none."""
+        self._note(key, key)
+        value = self.table.get(key)
+        if value is None and not required:
+            return None
+        if value is None:
+            raise DataError(f"the key {key} is missing", self.where, self._like(key) or f'add {key} = "..."')
+        if not isinstance(value, str) or not value.strip():
+            raise DataError(f"{key} must be a text in quotes, and it is {_shown(value)}", self.where)
+        return value
+
+    def measure(self, name: str, quantity: str, example: str, required: bool = True) -> float | None:
+        """The number under ``name_<unit>`` in SI, None if there is none and it is not required."""
+        keys = [k for k in self.table if split_header(k)[0] == name]
+        self._note(example, *keys)
+        if len(keys) > 1:
+            raise DataError(f"{' and '.join(keys)} both give the {name}", self.where, "remove one of them")
+        if not keys:
+            self._refuse_unit(name, quantity)
+            if required:
+                raise DataError(
+                    f"the key {example} is missing", self.where, self._like(example) or f"add {example} = ..."
+                )
+            return None
+        unit = split_header(keys[0])[1]
+        if not unit and "" not in known_units(quantity):
+            raise DataError(f"the key {keys[0]} names no unit", self.where, f"call it {example}")
+        return to_si(self._number(keys[0]), factor(unit, quantity, f"{self.where}, {keys[0]}"))
+
+    def all_text(self) -> str:
+        """Every key with its value, for sections whose content is free."""
+        self._note("", *self.table)
+        return "; ".join(f"{k}: {v}" for k, v in self.table.items())
+
+    def finish(self) -> None:
+        """Raise `DataError` for the first key that nobody asked for, with the nearest one that was."""
+        for key in self.table:
+            if key not in self._seen:
+                known = sorted(self._asked - {""})
+                nearest = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
+                guess = f'did you mean "{nearest[0]}"? ' if nearest else ""
+                raise DataError(f'the key "{key}" is unknown', self.where, f"{guess}known: {', '.join(known)}")
+
+    def _note(self, asked: str, *keys: str) -> None:
+        self._asked.add(asked)
+        self._seen.update(keys)
+
+    def _refuse_unit(self, name: str, quantity: str) -> None:
+        for key in self.table:
+            if key.startswith(f"{name}_"):
+                factor(key[len(name) + 1 :], quantity, f"{self.where}, {key}")
+
+    def _like(self, key: str) -> str:
+        nearest = difflib.get_close_matches(key, self.table, n=1, cutoff=0.6)
+        return f'rename "{nearest[0]}" if that is it' if nearest else ""
+
+    def _number(self, key: str) -> float:
+        value = self.table[key]
+        try:
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                raise TypeError
+            return float(value)
+        except (TypeError, OverflowError):
+            raise DataError(f"{key} must be a finite number, and it is {_shown(value)}", self.where) from None
+
+
+def _shown(value: object) -> str:
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= 60 else text[:57] + "..."

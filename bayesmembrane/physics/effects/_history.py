@@ -1,0 +1,70 @@
+"""What several effects remember alike: growth with the history of the deflection, and relaxation along the path."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from bayesmembrane.data.motion import Path
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
+from bayesmembrane.physics.effects.base import EffectParameter, running_max
+
+EXPONENT = EffectParameter(
+    "exponent", "-", "power of the deflection with which it grows", LogNormal(2.0, 0.5), (0.4, 12.0)
+)
+SATURATION = EffectParameter(
+    "saturation", "-", "how far it has saturated at the end of the range, 0: not at all", HalfNormal(2.0), (0.0, 100.0)
+)
+REPEATED = EffectParameter(
+    "repeated",
+    "-",
+    "part that grows with every loading, and not only beyond the previous maximum",
+    Uniform(0.0, 1.0),
+    (0.0, 1.0),
+)
+
+
+def growth(exponent: Array, repeated: Array, deflection: Array, path: Path, saturation: Array | float = 0.0) -> Array:
+    """G (B, N) = (1 - c) H + c (a + 1) sum over loading steps of (x / D)^a dx / D, never falling; with
+    H = (1 + s) (m / D)^a / (1 + s (m / D)^a).
+
+    m is the largest deflection so far, D the full range of the test, a ``exponent``, c ``repeated`` and s
+    ``saturation``, each (B, 1): a power if s = 0, a threshold or a quick rise that comes to its end if not. A first
+    loading up to D ends at G = 1 for any of them; the second part goes on growing when it is repeated.
+    """
+    x = np.maximum(deflection, 0.0) / path.full_range
+    power = running_max(x) ** exponent
+    first = (1 + saturation) * power / (1 + saturation * power)
+    if not np.any(repeated > 0):
+        return first
+    power = np.maximum(x, 0.0) ** (exponent + 1)
+    step = np.maximum(np.diff(power, axis=-1, prepend=0.0), 0.0)
+    return np.asarray((1 - repeated) * first + repeated * np.cumsum(step, axis=-1))
+
+
+def follow(values: Array, gap: Array, start: Array) -> Array:
+    """h (B, N) that relaxes to where ``values`` (B, N) moves it: h_n = e_n h_(n-1) + s_n (v_n - v_(n-1)).
+
+    Exact for values that move evenly over each gap (B, N), which is in relaxation lengths: e = exp(-gap) and
+    s = (1 - e) / gap. The values come from zero to the first one over its own gap; h starts at ``start`` (B,).
+    """
+    out = np.empty_like(values)
+    _follow(values, np.ascontiguousarray(np.broadcast_to(gap, values.shape)), start, out)
+    return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _follow(values, gap, start, out):  # type: ignore[no-untyped-def]
+    for b in range(values.shape[0]):
+        h, before = start[b], 0.0
+        for n in range(values.shape[1]):
+            g = gap[b, n]
+            if g > 1e-6:
+                e = np.exp(-g)
+                s = (1.0 - e) / g
+            else:
+                e = 1.0 - g
+                s = 1.0 - 0.5 * g
+            h = e * h + s * (values[b, n] - before)
+            before = values[b, n]
+            out[b, n] = h

@@ -1,0 +1,237 @@
+"""What an effect declares: its parameters, the stage at which it acts, and the one method of that stage.
+
+Stages compose in this order, whatever the order in which effects are named:
+
+    Geometry -> Deflection -> Slack -> Carried -> Memory -> Compliance -> Sensor
+
+A slack film carries no force: where the deflection left for the film is not positive, `Carried` and what follows start
+from zero. `Compliance` closes a loop around all stages from `Deflection` to `Memory`, for the frame yields to the force
+that the film has after them. Arrays are (B, N): B draws, N points in the order of the test; ``p`` is (B, k), the
+effect's own parameters in the order of ``coordinates``.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from bayesmembrane.data.motion import Path
+from bayesmembrane.ground.parameters import Array, Parameter, Prior
+
+ANNULUS = ("annulus",)
+STRIPS = ("uniaxial", "equibiaxial", "planar")
+RIGS = (*ANNULUS, *STRIPS)
+
+
+@dataclass(frozen=True)
+class EffectParameter(Parameter):
+    """A parameter of an effect, in SI.
+
+    null : the value at which the effect vanishes, exactly; None for a shape, which means nothing once it has vanished
+    """
+
+    null: float | None = None
+
+    @property
+    def one_sided(self) -> bool:
+        """True if physics allows one sign only: the null value is a bound."""
+        return self.null is not None and self.null in self.bounds
+
+    @property
+    def scale(self) -> float:
+        """Size that is expected before the data: the prior's root mean square distance from null, or its sd."""
+        return _scale(self.prior, self.null)
+
+    @property
+    def typical(self) -> float:
+        """Prior median of a shape; null value plus one scale of a size."""
+        return float(self.prior.quantile(0.5)) if self.null is None else self.null + self.scale
+
+
+@cache
+def _scale(prior: Prior, null: float | None) -> float:
+    d = prior.distribution()
+    return float(d.std() if null is None else np.sqrt(d.var() + (d.mean() - null) ** 2))
+
+
+@dataclass(frozen=True)
+class Effect(ABC):
+    """Something real that the plain film on an ideal rig lacks.
+
+    A subclass derives from the class of its stage and declares
+
+    name, title, reference : how users call it, how reports print it, where it comes from
+    signature : what residual it leaves, in an engineer's words
+    coordinates : its parameters; the first one is its size, and at its null value nothing changes, whatever the others
+    rigs : kinds of rig on which it can occur
+    needs_time : True if it means nothing without times
+    absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
+    law_varies : part of its evidence by which real ones may differ from this law; as a rival it is out only beyond that
+    rank : orders effects within a stage; equal ranks go by name
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    reference: ClassVar[str]
+    signature: ClassVar[str]
+    coordinates: ClassVar[tuple[EffectParameter, ...]]
+    rigs: ClassVar[tuple[str, ...]] = RIGS
+    needs_time: ClassVar[bool] = False
+    absorbed: ClassVar[str] = ""
+    law_varies: ClassVar[float] = 0.0
+    rank: ClassVar[int] = 0
+    stage: ClassVar[str]
+
+    @property
+    def null(self) -> Array:
+        """(k,) parameters at which it vanishes, shapes at their prior medians."""
+        return np.array([p.typical if p.null is None else p.null for p in self.coordinates])
+
+    @property
+    def typical(self) -> Array:
+        """(k,) parameters of an effect of the size that is expected before the data."""
+        return np.array([p.typical for p in self.coordinates])
+
+    @property
+    def size(self) -> EffectParameter:
+        """The parameter whose null value switches it off."""
+        return self.coordinates[0]
+
+    @property
+    def starts(self) -> list[dict[str, float]]:
+        """Shapes by name from which searches for it start, beside the typical ones."""
+        return []
+
+    def unavailable(self, rig: str, path: Path) -> str:
+        """Why it cannot occur on this rig and path, as a clause; "" if it can."""
+        if rig not in self.rigs:
+            return f'the effect "{self.name}" does not occur on the rig "{rig}"'
+        if self.needs_time and path.time is None:
+            return f'the effect "{self.name}" needs times, and the measurement has none'
+        return ""
+
+    def negligible(self, thickness: float) -> str:
+        """Why it is too small to be looked for in a film of this thickness (m), as a clause; "" if it is not."""
+        return ""
+
+    def within_bounds(self, p: Array) -> Array:
+        """Parameters (B, k), moved to the nearest bound where they lie outside."""
+        low, high = np.array([c.bounds for c in self.coordinates]).T
+        return np.clip(p, low, high)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The film at all points of a path, before what it remembers acts on its force.
+
+    path : the protocol
+    deflection : (B, N) m, what is left for the film; the film is slack where it is not positive
+    force : (B, N) N, of a film without memory at this deflection; 0 where it is slack
+    slope : (B, N) N/m, its derivative
+    """
+
+    path: Path
+    deflection: Array
+    force: Array
+    slope: Array
+
+    @cached_property
+    def reached(self) -> Array:
+        """(B, N) m: largest deflection so far."""
+        return running_max(self.deflection)
+
+
+def running_max(values: Array) -> Array:
+    """(B, N) max(0, largest so far) along the path."""
+    return np.asarray(np.maximum.accumulate(np.maximum(values, 0.0), axis=-1))
+
+
+class Geometry(Effect, ABC):
+    """How the film was mounted."""
+
+    stage = "geometry"
+
+    @abstractmethod
+    def prestretch(self, p: Array) -> Array:
+        """(B,) factor on the equibiaxial pre-stretch; 1 changes nothing. May not lie below 1."""
+
+
+class Deflection(Effect, ABC):
+    """How much of the measured deflection the film gets."""
+
+    stage = "deflection"
+
+    @abstractmethod
+    def deflect(self, p: Array, deflection: Array, path: Path) -> Array:
+        """(B, N) m: the deflection of the film, from that (B, N) before this effect."""
+
+
+class Slack(Effect, ABC):
+    """Free length that the film gains while it is tested."""
+
+    stage = "history-dependent geometry"
+
+    @abstractmethod
+    def excess(self, p: Array, deflection: Array, path: Path) -> Array:
+        """(B, N) gain in free length relative to the length at rest, 0 or more; contributions of effects add up."""
+
+
+class Carried(Effect, ABC):
+    """What the film carries of the force that it would carry without memory."""
+
+    stage = "material and multiplicative history"
+
+    @abstractmethod
+    def carried(self, p: Array, force: Array, state: State) -> Array:
+        """(B, N) N: the force, from that (B, N) before this effect."""
+
+
+class Memory(Effect, ABC):
+    """How the force depends on time and speed."""
+
+    stage = "time"
+
+    @abstractmethod
+    def remember(self, p: Array, force: Array, path: Path) -> Array:
+        """(B, N) N: the force, from that (B, N) of a film without memory of time.
+
+        What would push is for the effect to give up: a slack film carries no force.
+        """
+
+
+class Compliance(Effect, ABC):
+    """How far the frame yields."""
+
+    stage = "compliance"
+
+    @abstractmethod
+    def yielding(self, p: Array, force: Array) -> tuple[Array, Array]:
+        """((B, N) m, (B, N) m/N): displacement of the frame under the film's force, and its derivative."""
+
+
+class Sensor(Effect, ABC):
+    """What the load cell adds."""
+
+    stage = "sensor"
+
+    @abstractmethod
+    def read(self, p: Array, force: Array, path: Path) -> Array:
+        """(B, N) N: the reading, from the force (B, N) before this effect."""
+
+
+STAGES: tuple[type[Effect], ...] = (Geometry, Deflection, Slack, Carried, Memory, Compliance, Sensor)
+
+
+def ordered(effects: Sequence[Effect]) -> list[Effect]:
+    """Effects in the order in which they act."""
+    return sorted(effects, key=lambda e: (stage_number(e), e.rank, e.name))
+
+
+def stage_number(effect: Effect) -> int:
+    """Position of the effect's stage in `STAGES`."""
+    return next(i for i, stage in enumerate(STAGES) if isinstance(effect, stage))

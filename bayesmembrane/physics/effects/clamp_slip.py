@@ -1,0 +1,40 @@
+"""The film slides out of its clamp: its free length grows while it is pulled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from bayesmembrane.data.motion import Path
+from bayesmembrane.ground.parameters import Array, HalfNormal
+from bayesmembrane.physics.effects._history import EXPONENT, REPEATED, SATURATION, growth
+from bayesmembrane.physics.effects.base import EffectParameter, Slack
+
+
+@dataclass(frozen=True)
+class ClampSlip(Slack):
+    """Free length L (1 + slip G), with the growth G of the test (1 after a first loading to its full range).
+
+    What has slid out stays out: the film is slack until the longer film is taut.
+    On an annulus of 10 and 35 mm a length s that slides out of the outer clamp acts as slip = 0.80 s / L, to a tenth of
+    its effect (Yeoh film, 12 to 70 mm, against the exact solution: tests/reference/test_slip.py).
+    """
+
+    name: ClassVar[str] = "clamp_slip"
+    title: ClassVar[str] = "slip in the clamp"
+    reference: ClassVar[str] = "ISO 37:2017, 8 (grips and slippage); ASTM D638-14, 5.1.3"
+    signature: ClassVar[str] = (
+        "The curve starts later and later from cycle to cycle: a toe that grows with the largest deflection, unloading "
+        "below loading, reloading on the unloading curve, and no return to the first curve."
+    )
+    coordinates: ClassVar[tuple[EffectParameter, ...]] = (
+        EffectParameter(
+            "slip", "-", "length slid out on a first loading, over the free length", HalfNormal(0.02), (0.0, 0.5), 0.0
+        ),
+        EXPONENT,
+        REPEATED,
+        SATURATION,
+    )
+
+    def excess(self, p: Array, deflection: Array, path: Path) -> Array:
+        return p[:, :1] * growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4])

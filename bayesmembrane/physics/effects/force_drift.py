@@ -1,0 +1,37 @@
+"""The zero of the load cell wanders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bayesmembrane.data.motion import Path
+from bayesmembrane.ground.parameters import Array, LogNormal, Normal
+from bayesmembrane.physics.effects.base import EffectParameter, Sensor
+
+
+@dataclass(frozen=True)
+class ForceDrift(Sensor):
+    """F_read = F + rate T (t / T)^exponent, with the time t since the start and T its end.
+
+    ``rate`` is the mean over the test; a cell that warms up drifts quickly at first (exponent below 1). Without times
+    the clock is the distance travelled at 1 mm/s.
+    """
+
+    name: ClassVar[str] = "force_drift"
+    title: ClassVar[str] = "drift of the force zero"
+    reference: ClassVar[str] = "ISO 376:2011, C.3 (drift of the zero); OIML R 60-1:2021, 3.9"
+    signature: ClassVar[str] = (
+        "A force that grows (or falls) steadily with time, whatever the deflection: all cycles shift, slack parts too."
+    )
+    rank: ClassVar[int] = 1
+    coordinates: ClassVar[tuple[EffectParameter, ...]] = (
+        EffectParameter("rate", "N/s", "mean change of the zero with time", Normal(0.0, 3e-4), (-1.0, 1.0), 0.0),
+        EffectParameter("exponent", "-", "power of the time with which it goes on", LogNormal(1.0, 0.28), (0.4, 3.0)),
+    )
+
+    def read(self, p: Array, force: Array, path: Path) -> Array:
+        end = max(float(path.clock[-1]), 1e-12)
+        return np.asarray(force + p[:, :1] * end * (path.clock / end) ** p[:, 1:2])

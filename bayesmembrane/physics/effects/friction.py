@@ -1,0 +1,42 @@
+"""Friction in the guide of the disc: it adds on loading and takes away on unloading."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bayesmembrane.data.motion import Path
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal
+from bayesmembrane.physics.effects._history import follow
+from bayesmembrane.physics.effects.base import EffectParameter, Sensor
+
+
+@dataclass(frozen=True)
+class Friction(Sensor):
+    """F_read = F + level z, z relaxing to +1 on loading and -1 on unloading over the distance ``travel``.
+
+    dz/ds = (direction - z) / travel along the distance s travelled, z = 0 at the start.
+    """
+
+    name: ClassVar[str] = "friction"
+    title: ClassVar[str] = "friction in the guide"
+    reference: ClassVar[str] = "P. R. Dahl, AIAA J. 14 (1976) 1675"
+    signature: ClassVar[str] = (
+        "A constant force up on loading and down on unloading: jumps at each reversal, the same at small and large "
+        "deflections and at any speed."
+    )
+    coordinates: ClassVar[tuple[EffectParameter, ...]] = (
+        EffectParameter("level", "N", "force of sliding friction", HalfNormal(0.03), (0.0, 2.0), 0.0),
+        EffectParameter(
+            "travel", "m", "distance after a reversal over which it turns", LogNormal(3e-4, 1.0), (1e-6, 2e-2)
+        ),
+    )
+
+    def read(self, p: Array, force: Array, path: Path) -> Array:
+        gap = path.steps / p[:, 1:2]
+        # A pull of one per length travelled, and its own relaxation: z = direction (1 - exp(-s / travel)).
+        signed = np.cumsum(path.steps * path.leg) / p[:, 1:2]
+        z = follow(signed, gap, np.zeros(len(p)))
+        return np.asarray(force + p[:, :1] * z)

@@ -1,0 +1,61 @@
+"""Softening of the film below the largest deflection that it has seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.special import erf
+
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, State
+
+
+@dataclass(frozen=True)
+class Mullins(Carried):
+    """F = F0 (1 - softening erf((1 - (delta / m)^power) / w) / erf(1 / width)), w = width (D / m)^fading.
+
+    m is the largest deflection so far and D the full range of the test. (delta / m)^power stands for the stored energy
+    relative to its maximum W_m: the reference's erf((W_m - W) / (a + b W_m)) with b = 0 is fading = power, with a = 0
+    it is fading = 0. Unloading runs below loading, and reloading rejoins at m.
+    """
+
+    name: ClassVar[str] = "mullins"
+    title: ClassVar[str] = "Mullins softening"
+    reference: ClassVar[str] = "R. W. Ogden, D. G. Roxburgh, Proc. R. Soc. A 455 (1999) 2861"
+    signature: ClassVar[str] = (
+        "Unloading and reloading below the previous maximum are softer than first loading and coincide with each "
+        "other; the curve rejoins first loading where the previous maximum is passed."
+    )
+    coordinates: ClassVar[tuple[EffectParameter, ...]] = (
+        EffectParameter(
+            "softening",
+            "-",
+            "part of the force that is lost on return to zero from the full range",
+            HalfNormal(0.2),
+            (0.0, 0.95),
+            0.0,
+        ),
+        EffectParameter(
+            "width",
+            "-",
+            "drop in energy over which it is lost, relative to the maximum",
+            LogNormal(0.5, 1.0),
+            (0.01, 20.0),
+        ),
+        EffectParameter(
+            "fading", "-", "power with which this drop is larger after a smaller maximum", HalfNormal(1.5), (0.0, 8.0)
+        ),
+        EffectParameter(
+            "power", "-", "power of the deflection with which the energy grows", LogNormal(2.0, 0.4), (0.5, 8.0)
+        ),
+    )
+
+    def carried(self, p: Array, force: Array, state: State) -> Array:
+        m, full = state.reached, state.path.full_range
+        with np.errstate(all="ignore"):
+            part = np.where(m > 0, np.maximum(state.deflection, 0.0) / m, 1.0)
+            wide = p[:, 1:2] * (full / np.maximum(m, 1e-6 * full)) ** p[:, 2:3]
+        lost = erf((1.0 - part ** p[:, 3:4]) / wide) / erf(1.0 / p[:, 1:2])
+        return np.asarray(force * np.maximum(1.0 - p[:, :1] * lost, 0.0))

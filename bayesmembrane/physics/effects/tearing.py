@@ -1,0 +1,53 @@
+"""A tear grows: less and less of the film carries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.special import expit
+
+from bayesmembrane.ground.parameters import Array, HalfNormal, Uniform
+from bayesmembrane.physics.effects._history import EXPONENT, REPEATED, growth
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, State
+
+WIDTH = 0.015  # of the full range
+
+
+@dataclass(frozen=True)
+class Tearing(Carried):
+    """F = F0 exp(-loss [(1 - jump) G + jump / (1 + exp((place - m / D) / w))]), w = 0.015.
+
+    G is the growth law of the test (1 after a first loading to its full range D), m the largest deflection so far: a
+    film tears little by little, and by a jump.
+    """
+
+    name: ClassVar[str] = "tearing"
+    title: ClassVar[str] = "tearing of the film"
+    reference: ClassVar[str] = "R. S. Rivlin, A. G. Thomas, J. Polym. Sci. 10 (1953) 291"
+    signature: ClassVar[str] = (
+        "The whole curve is lower by the same part from one cycle to the next, also where first loading is passed; "
+        "nothing comes back."
+    )
+    coordinates: ClassVar[tuple[EffectParameter, ...]] = (
+        EffectParameter(
+            "loss", "-", "log of the part that still carries, after a first loading", HalfNormal(0.1), (0.0, 3.0), 0.0
+        ),
+        EXPONENT,
+        REPEATED,
+        EffectParameter("jump", "-", "part of the loss that comes at once", Uniform(0.0, 1.0), (0.0, 1.0)),
+        EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1)),
+    )
+
+    jumps: ClassVar[tuple[float, ...]] = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+
+    @property
+    def starts(self) -> list[dict[str, float]]:
+        """A jump is found from nearby only."""
+        return [{"jump": 0.6, "place": place} for place in self.jumps]
+
+    def carried(self, p: Array, force: Array, state: State) -> Array:
+        slow = growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path)
+        quick = expit((state.reached / state.path.full_range - p[:, 4:5]) / WIDTH)
+        return np.asarray(force * np.exp(-p[:, :1] * ((1 - p[:, 3:4]) * slow + p[:, 3:4] * quick)))

@@ -1,0 +1,55 @@
+"""The film relaxes: quasi-linear viscoelasticity with a Prony series."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bayesmembrane.data.motion import Path
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
+from bayesmembrane.physics.effects._history import follow
+from bayesmembrane.physics.effects.base import EffectParameter, Memory
+
+TERMS = 6
+
+
+@dataclass(frozen=True)
+class Viscoelastic(Memory):
+    """F(t) = F_e(t) - strength int (1 - sum_i exp(-(t - s) / time_i) / n) dF_e(s), n = 6.
+
+    The times are evenly spread in log time within ``decades`` decades around ``time``: one relaxation time if it is
+    zero, a broad spectrum if not. F_e is the instantaneous force. Without times the clock is the distance
+    travelled at 1 mm/s.
+
+    After a fast return F is negative, and counts ``withstood``: a thin film is slack then (0), one that is stiff or
+    sticks to the disc withstands some of it, a block all (1).
+    """
+
+    name: ClassVar[str] = "viscoelastic"
+    title: ClassVar[str] = "viscoelastic relaxation"
+    reference: ClassVar[str] = "Y. C. Fung, Biomechanics: Mechanical Properties of Living Tissues, 2nd ed. (1993), 7.6"
+    signature: ClassVar[str] = (
+        "Unloading below loading in every cycle, with a gap that depends on time and speed and closes at rest; force "
+        "falls in holds and recovers at zero."
+    )
+    coordinates: ClassVar[tuple[EffectParameter, ...]] = (
+        EffectParameter(
+            "strength", "-", "part of the instantaneous force that relaxes", HalfNormal(0.2), (0.0, 0.98), 0.0
+        ),
+        EffectParameter("time", "s", "middle relaxation time", LogNormal(30.0, 1.5), (0.05, 2e4)),
+        EffectParameter("decades", "-", "width of the spectrum of times", HalfNormal(1.0), (0.0, 6.0)),
+        EffectParameter("withstood", "-", "part of a push that does not make it slack", Uniform(0.0, 1.0), (0.0, 1.0)),
+    )
+
+    def remember(self, p: Array, force: Array, path: Path) -> Array:
+        gap = np.diff(path.clock, prepend=0.0)
+        start = np.zeros(len(p))
+        kept = np.zeros_like(force)
+        for place in (np.arange(TERMS) + 0.5) / TERMS - 0.5:
+            time = p[:, 1:2] * 10.0 ** (place * p[:, 2:3])
+            kept += follow(force, gap / time, start) / TERMS
+        relaxed = force - p[:, :1] * (force - kept)
+        least = np.minimum(force, 0.0)
+        return np.asarray(np.maximum(relaxed, least) + p[:, 3:4] * np.minimum(relaxed - least, 0.0))

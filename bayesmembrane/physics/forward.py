@@ -1,0 +1,337 @@
+"""From coordinates to the force curve of a hypothesis at the deflections of a measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.motion import Path
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.composition import Composition, differences
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.mechanics import api
+from bayesmembrane.physics.mechanics.convexity import box_margins, reached_convexity, reached_ellipticity
+from bayesmembrane.physics.mechanics.film_law import Gap, film_law
+from bayesmembrane.physics.mechanics.solution import Curves, Status
+from bayesmembrane.physics.mechanics.strip_law import StripLaw, strip_curves
+from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.base import Strip
+
+Solve = Callable[..., Curves]
+"""`mechanics.api.solve`, or a cache with its signature."""
+
+BOX = (1.0, 8.0)
+GAPS = 10
+"""Between two deflections at which convexity is asked for lies at most this fraction of the whole measured range."""
+
+LONG = 100
+"""Curves of more points than this are interpolated, to 1e-6."""
+AT_ONCE = 2_000_000
+"""Readings that are computed in one batch."""
+
+STEP = 1e-3  # of the differences in coordinates: h^4 and round-off are both 1e-13 there
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Curves of B draws at N deflections.
+
+    Attributes
+    ----------
+    deflection : (N,) m
+    force : (B, N) N; nan where there is none
+    status : (B, N) `Status` codes
+    films : (B, n) membrane parameters
+    sensitivity : (B, N, k) dF/dx in the coordinates that shape the curve, or None if not asked for
+    convexity, ellipticity : (B,) margins over all states reached up to the end of the whole measured range; -inf where
+        ellipticity was lost, or the film's energy became indefinite, on the way
+    convexity_at, ellipticity_at : (B, M) the same, deflection by deflection; nan where there is no state
+    """
+
+    deflection: Array
+    force: Array
+    status: NDArray[np.int8]
+    films: Array
+    sensitivity: Array | None
+    convexity: Array
+    ellipticity: Array
+    convexity_at: Array
+    ellipticity_at: Array
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """(B,) True where the whole curve can be used."""
+        return np.asarray(np.all(self.status == Status.OK, axis=1))
+
+    def margin(self, mode: str, hypothesis: Hypothesis) -> Array:
+        """(B,) by how much the convexity prior ``mode`` is met: inside means >= 0 (`elliptic`: > 0).
+
+        A film of which nothing is known (no state at all) is inside: its likelihood tells.
+        """
+        if mode == "none":
+            return np.full(len(self.films), np.inf)
+        if mode == "box":
+            values = box_margins(hypothesis.material, self.films, *BOX)
+        else:
+            values = self.convexity if mode == "reached" else self.ellipticity
+        return np.where(np.isnan(values), np.inf, values)
+
+
+@dataclass(frozen=True, eq=False)
+class Forward:
+    """F(delta; x) of one hypothesis on the rig of one measurement, at ``deflection`` (N,) m.
+
+    At the measurement's own deflections the film remembers how the disc was moved; other deflections are one path of
+    their own, at the speed of the measurement. Effects, homogeneous rigs and long curves go through a film law that is
+    interpolated to 1e-6. A material of one modulus alone is solved once: F(c) = (c / 1) F(1).
+    """
+
+    hypothesis: Hypothesis
+    measurement: Measurement
+    deflection: Array
+    solve: Solve = api.solve
+
+    @cached_property
+    def _all(self) -> Array:
+        """The deflections asked for, and those that show convexity up to the end of the whole measured range."""
+        return np.concatenate([self.deflection, beyond(self.deflection, self.measurement.full_range)])
+
+    @cached_property
+    def _unit(self) -> tuple[Curves, Curves]:
+        """The film of modulus one, without and with the helpers."""
+        one = np.ones((1, 1))
+        return self.curves(one, self.deflection, True), self.curves(one, self._all, True)
+
+    def __call__(
+        self,
+        coordinates: ArrayLike,
+        sensitivities: bool = False,
+        reached: bool = True,
+        solver: str = "ritz",
+        only: str = "all",
+    ) -> Prediction:
+        """Curves of x (B, k); k may leave out the noise.
+
+        ``only`` "convex" or "elliptic" saves effort on films that turn out not to be so, and leaves them unexplained.
+        ``reached`` False saves the solutions beyond ``deflection``, and the margins are those up to there.
+        """
+        x = np.atleast_2d(np.asarray(coordinates, dtype=float))
+        if self.composes:
+            return self._composed(x, sensitivities, reached, only)
+        films = self.hypothesis.films(x)
+        if self.hypothesis.material.scales == (1,) and solver == "ritz":
+            curves = _scaled(self._unit[int(reached)], films)
+        else:
+            curves = self.curves(films, self._all if reached else self.deflection, sensitivities, solver, only)
+        n, chained = self.deflection.size, None
+        if sensitivities and curves.sensitivity is not None:
+            chained = np.einsum("bni,bik->bnk", curves.sensitivity[:, :n], self.jacobian(x))
+        # A convex energy with tensions that pull makes the film's energy convex: an indefinite state refutes it.
+        lost = np.any(curves.status == Status.INDEFINITE, axis=1)
+        whole = (np.where(lost, -np.inf, m) for m in (reached_convexity(curves), reached_ellipticity(curves)))
+        margins = *whole, curves.convexity, curves.ellipticity
+        return Prediction(self.deflection, curves.force[:, :n], curves.status[:, :n], films, chained, *margins)
+
+    # ---- film and effects ------------------------------------------------------------------------------------------
+
+    @cached_property
+    def composes(self) -> bool:
+        """True where curves come from a film law and the effects around it, and not straight from the solver."""
+        return bool(self.hypothesis.effects) or self.deflection.size > LONG or isinstance(self.measurement.rig, Strip)
+
+    @cached_property
+    def path(self) -> Path:
+        """How the disc moves: as in the measurement at its own deflections, else through others at its speed."""
+        m = self.measurement
+        if self._measured:
+            return m.path
+        path = Path(self.deflection, None, m.full_range)
+        if m.path.time is None:
+            return path
+        speed = float(np.median(m.path.speed))
+        return Path(self.deflection, np.cumsum(np.maximum(path.steps, 1e-9 * m.full_range)) / speed, m.full_range)
+
+    @cached_property
+    def _measured(self) -> bool:
+        return np.array_equal(self.deflection, self.measurement.deflection)
+
+    @cached_property
+    def composition(self) -> Composition:
+        """The effects on the path; raises `SettingsError` for one that cannot occur here."""
+        for effect in self.hypothesis.effects:
+            if reason := effect.unavailable(self.measurement.rig.name, self.path):
+                raise SettingsError(reason, remedy="leave it out")
+        return Composition(self.hypothesis.effects, self.path)
+
+    @cached_property
+    def _beyond(self) -> Array:
+        return beyond(self.deflection, self.measurement.full_range)
+
+    def _composed(self, x: Array, sensitivities: bool, reached: bool, only: str) -> Prediction:
+        """As `__call__`, in batches that fit into memory."""
+        count = self.hypothesis.curve_size + 1 if sensitivities else 1
+        rows = max(1, AT_ONCE // (count * self.path.deflection.size))
+        parts = [self._batch(x[i : i + rows], sensitivities, reached, only) for i in range(0, len(x), rows)]
+        if len(parts) == 1:
+            return parts[0]
+        names = [f.name for f in fields(Prediction) if f.name != "deflection"]
+        whole = {n: [getattr(p, n) for p in parts] for n in names}
+        joined: dict[str, Any] = {n: None if v[0] is None else np.concatenate(v) for n, v in whole.items()}
+        return Prediction(self.deflection, **joined)
+
+    def _batch(self, x: Array, sensitivities: bool, reached: bool, only: str) -> Prediction:
+        films = self.hypothesis.films(x)
+        theta = x[:, self.hypothesis.material_size : self.hypothesis.curve_size]
+        law, at = self.law(films, theta, sensitivities, reached, only)
+        slopes = None
+        if sensitivities:
+            jacobian = self.jacobian(x)[:, :, : self.hypothesis.material_size]
+            force, status, slopes = differences(
+                self.composition, law, lambda moved: self.law(films, moved)[0], theta, jacobian
+            )
+        else:
+            force, status = self.composition(law, theta)
+        here = self._here
+        slopes = None if slopes is None else slopes[:, here]
+        least = (np.fmin.reduce(at[0], axis=1), np.fmin.reduce(at[1], axis=1))
+        return Prediction(self.deflection, force[:, here], status[:, here], films, slopes, *least, *at)
+
+    def law(
+        self, films: Array, theta: Array, sensitivities: bool = False, reached: bool = False, only: str = "all"
+    ) -> tuple[Any, tuple[Array, Array]]:
+        """The law of ``films`` (B, n) with effect parameters ``theta`` (B, k), and margins (B, M) of its states.
+
+        The margins are those of convexity and of ellipticity, -inf where the film's energy became indefinite.
+        """
+        extra = self._beyond if reached else np.empty(0)
+        rig, material = self.measurement.rig, self.hypothesis.material
+        if isinstance(rig, Strip):
+            strip = StripLaw(material, films, rig, self._pushes, self.path.across)
+            shown = strip_curves(*self._states(strip, extra))
+            return strip, (shown.convexity, shown.ellipticity)
+        composition = self.composition
+        end = np.maximum(composition.end(theta), 1e-3 * self.measurement.full_range)
+        options: dict[str, Any] = {"sensitivities": sensitivities, "only": only}
+        if only != "all":
+            options["exact_up_to"] = float(np.max(end))
+        law, curves = film_law(
+            material, films, self._gap, composition.prestretch(theta), end, extra, self.solve, **options
+        )
+        indefinite, bent = (curves.status == s for s in (Status.INDEFINITE, Status.NOT_ELLIPTIC))
+        convexity, ellipticity = (
+            np.where(indefinite | (bent & np.isnan(m)), -np.inf, m) for m in (curves.convexity, curves.ellipticity)
+        )
+        return law, (convexity, ellipticity)
+
+    def _states(self, strip: StripLaw, extra: Array) -> tuple[StripLaw, Array]:
+        """Law and deflections of a few states up to the end of the range, or of all of them in a biaxial test."""
+        d = self.path.deflection
+        if strip.across is not None:
+            return strip, d
+        states = np.unique(np.concatenate([d, extra]))
+        return strip, states[np.linspace(0, states.size - 1, min(states.size, 4 * GAPS)).astype(int)]
+
+    def film_force(self, films: Array) -> Array:
+        """(B, N) N: forces of films (B, n) without effects at ``deflection``; nan where there is none."""
+        if not self.composes:
+            return self.curves(films, self.deflection).force
+        plain = replace(self, hypothesis=replace(self.hypothesis, effects=()))
+        nothing = np.empty((len(films), 0))
+        return plain.composition(plain.law(films, nothing)[0], nothing)[0][:, plain._here]
+
+    @property
+    def _here(self) -> Any:
+        return self.measurement.on_path if self._measured else slice(None)
+
+    @cached_property
+    def _gap(self) -> Gap:
+        rig = annulus(self.measurement)
+        return Gap(rig.inner_radius, rig.outer_radius)
+
+    @cached_property
+    def _pushes(self) -> bool:
+        """True where the specimen was compressed, and pushed back."""
+        m = self.measurement
+        return bool(np.any((m.deflection < -0.01 * m.full_range) & (m.force < 0)))
+
+    def curves(
+        self, films: Array, deflection: Array, sensitivities: bool = False, solver: str = "ritz", only: str = "all"
+    ) -> Curves:
+        """Curves of ``films`` (B, n) without effects at ``deflection`` (N,) m on the rig of the measurement."""
+        if isinstance(self.measurement.rig, Strip):
+            strip = StripLaw(self.hypothesis.material, films, self.measurement.rig, self._pushes, self.path.across)
+            return strip_curves(strip, deflection, sensitivities)
+        rig = annulus(self.measurement)
+        # What lies beyond is solved to see whether the film stays convex there.
+        exact = float(np.max(self.deflection)) if only != "all" else np.inf
+        options: dict[str, Any] = {"inner_radius": rig.inner_radius, "outer_radius": rig.outer_radius}
+        return self.solve(
+            self.hypothesis.material,
+            films,
+            deflection,
+            sensitivities=sensitivities,
+            solver=solver,
+            only=only,
+            exact_up_to=exact,
+            **options,
+        )
+
+    def jacobian(self, x: Array) -> Array:
+        """d films / d coordinates, (B, n, k), by central differences of fourth order: exact to 1e-12 or so."""
+        k = self.hypothesis.curve_size
+        out = np.zeros((len(x), len(self.hypothesis.material.field_names()), k))
+        for j in range(self.hypothesis.material_size):
+            h = np.zeros(x.shape[1])
+            h[j] = STEP
+            f = self.hypothesis.films
+            out[:, :, j] = (8 * (f(x + h) - f(x - h)) - (f(x + 2 * h) - f(x - 2 * h))) / (12 * h[j])
+        return out
+
+
+def _scaled(unit: Curves, films: Array) -> Curves:
+    """Curves of films of one modulus (B, 1) from the one of modulus one: F(c) = c F(1), dF/dc = F(1)."""
+    shape = (len(films), unit.force.shape[1])
+    same = {f.name: getattr(unit, f.name) for f in fields(Curves)}
+    wide = {k: np.broadcast_to(v, (*shape, *v.shape[2:])) for k, v in same.items() if v is not None}
+    return Curves(**{**same, **wide, **{k: films * same[k] for k in ("force", "slope", "energy")}})
+
+
+def predict(
+    hypothesis: Hypothesis,
+    coordinates: ArrayLike,
+    measurement: Measurement,
+    deflection: ArrayLike | None = None,
+    sensitivities: bool = False,
+    solve: Solve = api.solve,
+) -> Prediction:
+    """Force curves F(delta; x) of coordinates x (B, k) at ``deflection`` (N,) m, or at those of the measurement.
+
+    Raises `SettingsError` for an effect that cannot occur on the rig or needs times that the measurement lacks.
+    """
+    at = measurement.deflection if deflection is None else np.atleast_1d(np.asarray(deflection, dtype=float))
+    return Forward(hypothesis, measurement, at, solve)(coordinates, sensitivities)
+
+
+def annulus(measurement: Measurement) -> Annulus:
+    """The rig, if it is one whose film can be solved; raises `SettingsError` otherwise."""
+    if not isinstance(measurement.rig, Annulus):
+        raise SettingsError(f'a film on the rig "{measurement.rig.name}" cannot be predicted', remedy="use an annulus")
+    return measurement.rig
+
+
+def beyond(deflection: Array, full_range: float) -> Array:
+    """Deflections that, with those given, leave no gap larger than ``full_range / GAPS`` from 0 to ``full_range``."""
+    ends = np.concatenate([[0.0], np.unique(np.abs(deflection)), [full_range]])
+    extra = []
+    for low, high in pairwise(ends):
+        parts = int(np.ceil((high - low) / (full_range / GAPS) - 1e-9))
+        extra += [low + (high - low) * i / parts for i in range(1, parts)]
+    return np.array([*extra, full_range] if full_range > ends[-2] * (1 + 1e-12) else extra)

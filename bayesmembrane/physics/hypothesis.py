@@ -1,0 +1,144 @@
+"""What a calibration claims: one material, some effects, one noise model; its coordinates as one named vector."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.errors import SettingsError, unknown_name
+from bayesmembrane.ground.parameters import Array, Parameter
+from bayesmembrane.ground.registry import component, material
+from bayesmembrane.physics.effects.base import Effect
+from bayesmembrane.physics.materials.base import Material
+from bayesmembrane.physics.noise.base import Noise, force_scale
+from bayesmembrane.physics.noise.white import White
+
+CONVEXITY = ("reached", "box", "elliptic", "none")
+"""Where the prior asks the energy to be convex: on the states that the film reaches over the whole measured range, on
+the box [1, 8]^2, nowhere but P11 > 0 and P22 > 0 on the reached states, or not at all."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """y = F(delta; material, effects) + noise, with priors on all parameters and a convexity prior on the energy.
+
+    material : class of the strain energy
+    effects : what the plain film on an ideal rig lacks; their parameters join the vector
+    noise : noise model
+    convexity : one of `CONVEXITY`
+
+    The vector x holds the material's coordinates, those of the effects, and those of the noise, in this order. Their
+    names carry the component: ``yeoh.ln_gd``, ``clamp_slip.length``, ``noise.ln_sd``. Raises `SettingsError` for an
+    unknown convexity mode and for an effect that is named twice.
+    """
+
+    material: type[Material]
+    effects: tuple[Effect, ...] = ()
+    noise: Noise = field(default_factory=White)
+    convexity: str = "reached"
+
+    def __post_init__(self) -> None:
+        if self.convexity not in CONVEXITY:
+            raise unknown_name("convexity prior", self.convexity, CONVEXITY)
+        names = [e.name for e in self.effects]
+        if repeated := sorted({n for n in names if names.count(n) > 1}):
+            raise SettingsError(f'the effect "{repeated[0]}" is named twice', remedy="name every effect once")
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The coordinates x (k,) with priors and bounds, under their full names."""
+        blocks = [(self.material.name, self.material.coordinates)]
+        blocks += [(e.name, e.coordinates) for e in self.effects]
+        blocks += [("noise", self.noise.coordinates)]
+        return tuple(replace(p, name=f"{block}.{p.name}") for block, ps in blocks for p in ps)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Full names of the k coordinates."""
+        return tuple(p.name for p in self.parameters)
+
+    @cached_property
+    def natural_names(self) -> tuple[str, ...]:
+        """Full names of what users read: membrane parameters (``yeoh.c1``), effects, noise (``noise.sd``)."""
+        material = [f"{self.material.name}.{n}" for n in self.material.field_names()]
+        effects = [f"{e.name}.{p.name}" for e in self.effects for p in e.coordinates]
+        return (*material, *effects, *(f"noise.{n}" for n in self.noise.field_names))
+
+    @cached_property
+    def natural_units(self) -> tuple[str, ...]:
+        """Units of the natural parameters."""
+        effects = [p.unit for e in self.effects for p in e.coordinates]
+        return (*self.material.units, *effects, *("N" if n == "sd" else "-" for n in self.noise.field_names))
+
+    @property
+    def material_size(self) -> int:
+        """How many coordinates the material has; they come first."""
+        return len(self.material.coordinates)
+
+    @property
+    def curve_size(self) -> int:
+        """How many coordinates shape the curve: all but those of the noise, which come last."""
+        return len(self.parameters) - len(self.noise.coordinates)
+
+    def films(self, x: ArrayLike) -> Array:
+        """Membrane parameters (B, n) of coordinates x (B, k); k may leave out what comes after the material."""
+        x = np.atleast_2d(np.asarray(x, dtype=float))
+        with np.errstate(all="ignore"):
+            return np.ascontiguousarray(self.material.from_coordinates(x[:, : self.material_size].T).T)
+
+    def noise_coordinates(self, x: Array) -> Array:
+        """The noise's part (B, m) of coordinates x (B, k)."""
+        return x[:, self.curve_size :]
+
+    def natural(self, x: ArrayLike, measurement: Measurement) -> Array:
+        """Natural parameters (B, m), in the order of `natural_names`, of coordinates x (B, k)."""
+        x = np.atleast_2d(np.asarray(x, dtype=float))
+        noise = self.noise.natural(self.noise_coordinates(x), force_scale(measurement))
+        return np.concatenate([self.films(x), x[:, self.material_size : self.curve_size], noise], axis=1)
+
+    def label(self) -> str:
+        """Material and effects in one word, for tables and folders: ``yeoh``, ``yeoh+zero_offset``."""
+        return "+".join([self.material.name, *(e.name for e in self.effects)])
+
+    def settings(self) -> dict[str, Any]:
+        """What `from_settings` reads back; plain values, as a run stores them."""
+        return {
+            "material": self.material.name,
+            "effects": [e.name for e in self.effects],
+            "noise": self.noise.name,
+            "extra_noise": getattr(self.noise, "extra", True),
+            "convexity": self.convexity,
+        }
+
+
+def hypothesis(
+    material_name: str,
+    effects: Iterable[str] = (),
+    noise: str = "white",
+    convexity: str = "reached",
+    extra_noise: bool = True,
+) -> Hypothesis:
+    """The hypothesis made of components by name; raises `SettingsError` for a name that nobody declared.
+
+    ``extra_noise`` False keeps to the noise that the measurement states; only white noise can do without.
+    """
+    model = component("noise", noise)
+    if not extra_noise and not hasattr(model, "extra"):
+        raise SettingsError(
+            f'the noise model "{noise}" always infers a part of the noise', remedy='use "white" to do without'
+        )
+    instance = model() if extra_noise else model(extra=False)
+    return Hypothesis(material(material_name), tuple(component("effects", e)() for e in effects), instance, convexity)
+
+
+def from_settings(settings: Mapping[str, Any]) -> Hypothesis:
+    """The inverse of `Hypothesis.settings`; raises `SettingsError` for a name that nobody declares (any more)."""
+    return hypothesis(
+        settings["material"], settings["effects"], settings["noise"], settings["convexity"], settings["extra_noise"]
+    )

@@ -1,0 +1,345 @@
+"""The film as a law F(delta): solved at a few deflections, known everywhere, with slope and sensitivities.
+
+    F = exp(g(u)) F_s(delta),    u = asinh(delta / (1.6 L)),    L = R2 - R1,
+
+where F_s is the force of a neo-Hookean strip on the slope that spans the gap: it starts like delta^3 without
+pre-stretch and like delta with it, as the film does, so that g is smooth and even in u. Between knots g is a quintic
+that meets value, slope (from the solver) and second derivative (from neighbours, to fourth order).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
+
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.materials.base import Material
+from bayesmembrane.physics.materials.neo_hookean import NeoHookean
+from bayesmembrane.physics.mechanics.api import solve
+from bayesmembrane.physics.mechanics.solution import Curves, Status
+
+WIDTH = 1.6  # of the gap: knots are dense below, and logarithmic above
+KNOTS = (24, 48, 96)
+ROOM = 1e-4  # beyond the last knot, relative to u: differences may look a little further
+TOLERANCE = 1e-6
+# A third of the step gains 729 where quintics are exact to sixth order; a part of that is counted on.
+GAIN = 100.0
+WORST = 1e-4
+SMALL = 1e-3  # of the largest force: smaller ones are known to that part of the tolerance
+
+
+Solver = Callable[..., Curves]
+
+
+@dataclass(frozen=True)
+class Gap:
+    """The rig as a strip sees it: radii and the free length L = R2 - R1, m."""
+
+    inner_radius: float
+    outer_radius: float
+
+    @cached_property
+    def tautness(self) -> float:
+        """What pre-stretch weighs against deflection in the film, relative to the strip.
+
+        Film: F = 2 pi T delta / ln(R2/R1) under the tension T alone and c G d delta^3 without any; strip: T delta / L
+        and 2 G d delta^3 / L^3, both times its width.
+        """
+        small = np.array([1e-2 * self.inner_radius])
+        curve = solve(NeoHookean, [0.5], small, inner_radius=self.inner_radius, outer_radius=self.outer_radius)
+        cubic = float(curve.force[0, 0] / small[0] ** 3)
+        return float(2 * np.pi / np.log(self.outer_radius / self.inner_radius) * 2 / (cubic * self.length**2))
+
+    @property
+    def length(self) -> float:
+        return self.outer_radius - self.inner_radius
+
+
+@dataclass(frozen=True)
+class FilmLaw:
+    """F(delta) of B films.
+
+    Attributes
+    ----------
+    gap : the rig
+    prestretch : (B,)
+    step : (B,) distance of knots in u; knots lie at (j + 1/2) step
+    pieces : (B, J, 6) coefficients of g between knots j - 1 and j in powers of (u - u_(j-1)) / step
+    last : (B,) number of knots that have a force, from the first
+    status : (B,) `Status` beyond these
+    tangents : (B, J, 6, n) d pieces / d (parameter i), or None
+    """
+
+    gap: Gap
+    prestretch: Array
+    step: Array
+    pieces: Array
+    last: NDArray[np.int64]
+    status: NDArray[np.int8]
+    tangents: Array | None = None
+
+    def __call__(self, deflection: Array, excess: Array | None = None) -> tuple[Array, Array]:
+        """((B, N) N, (B, N) N/m): force and dF/d(delta) at deflections (B, N) m; nan beyond the last force.
+
+        With ``excess`` e (B, N) the film is longer than its gap: it is stretched as much as at delta_e with
+        (L^2 + delta^2) / (1 + e)^2 = L^2 + delta_e^2, and by virtual work F = F(delta_e) (delta / delta_e) / (1 + e).
+        Zero where it is slack.
+        """
+        force, slope = np.empty(deflection.shape), np.empty(deflection.shape)
+        given = np.zeros((1, 1)) if excess is None else np.ascontiguousarray(excess)
+        d, gap = np.ascontiguousarray(deflection), self.gap
+        _evaluate(self.pieces, self.step, self.last, self.prestretch, gap.length, gap.tautness, d, given, force, slope)
+        return force, slope
+
+    def varied(self, change: Array) -> FilmLaw:
+        """The law, to first order, of films whose parameters differ by ``change`` (B, n)."""
+        assert self.tangents is not None
+        return replace(self, pieces=self.pieces + np.einsum("bjcn,bn->bjc", self.tangents, change), tangents=None)
+
+    @staticmethod
+    def stack(laws: Sequence[FilmLaw]) -> FilmLaw:
+        """The films of all laws, one after the other; tangents are left out."""
+        most = max(law.pieces.shape[1] for law in laws)
+        pieces = [np.pad(law.pieces, ((0, 0), (0, most - law.pieces.shape[1]), (0, 0))) for law in laws]
+        rest = {n: np.concatenate([getattr(w, n) for w in laws]) for n in ("prestretch", "step", "last", "status")}
+        return FilmLaw(laws[0].gap, pieces=np.concatenate(pieces), **rest)
+
+    def replaced(self, rows: NDArray[np.int64], other: FilmLaw) -> FilmLaw:
+        """This law with the films at ``rows`` from another one, whose knots are at least as many."""
+        room = other.pieces.shape[1] - self.pieces.shape[1]
+        wide: dict[str, Any] = {"pieces": np.pad(self.pieces, ((0, 0), (0, room), (0, 0)))}
+        if self.tangents is not None:
+            wide["tangents"] = np.pad(self.tangents, ((0, 0), (0, room), (0, 0), (0, 0)))
+        for name in ("prestretch", "step", "last", "status"):
+            wide[name] = getattr(self, name).copy()
+        for name, values in wide.items():
+            values[rows] = getattr(other, name)
+        return replace(self, **wide)
+
+
+def film_law(
+    material: type[Material],
+    parameters: Array,
+    gap: Gap,
+    prestretch: Array,
+    end: Array,
+    extra: Array,
+    solver: Solver = solve,
+    **options: Any,
+) -> tuple[FilmLaw, Curves]:
+    """The law of films (B, n) up to deflections ``end`` (B,) m, with as many knots as 1e-6 asks for.
+
+    The curves are those at the first knots and at deflections ``extra`` (E,), which show whether the films are convex.
+    ``options`` go to the solver. A film that no number of knots describes to `WORST` has no force from there on.
+    """
+    radii = {"inner_radius": gap.inner_radius, "outer_radius": gap.outer_radius}
+    rows = np.arange(len(parameters))
+    found = shown = None
+    for level, count in enumerate(KNOTS):
+        at, l0 = knots(gap, end[rows], count), prestretch[rows]
+        every = np.hstack([at, np.broadcast_to(extra, (len(at), extra.size))]) if shown is None else at
+        curves = solver(material, parameters[rows], every, prestretch=l0, **radii, **options)
+        shown = curves if shown is None else shown
+        force, slope = curves.force[:, :count], curves.slope[:, :count]
+        part = _tested(law(gap, l0, at, force, slope, curves.status[:, :count]))
+        wrong = error(part, force, slope, at)
+        known = np.where(np.isfinite(force), force, 0.0)
+        wrong /= np.where(known > 0, known, 1.0) + SMALL * np.max(known, axis=1)[:, None]
+        if level == len(KNOTS) - 1:
+            part = _cut(part, wrong > WORST)
+        if curves.sensitivity is not None:
+            part = replace(part, tangents=tangent(part, force, curves.sensitivity[:, :count]))
+        found = part if found is None else found.replaced(rows, part)
+        rows = rows[np.max(wrong, axis=1) > TOLERANCE]
+        if not rows.size:
+            break
+    assert found is not None
+    assert shown is not None
+    return found, shown
+
+
+def _tested(found: FilmLaw) -> FilmLaw:
+    """The law without the knots next to a film's end that `error` does not see: the force may soar there."""
+    count = found.pieces.shape[1]
+    return replace(found, last=np.where(found.last < count, np.maximum((found.last + 1) // 3 * 3 - 1, 0), found.last))
+
+
+def _cut(found: FilmLaw, bad: NDArray[np.bool_]) -> FilmLaw:
+    """The law up to the first knot (B, J) that is ``bad``; what follows is unresolved, unless the film ends there."""
+    count = bad.shape[1]
+    first = np.where(np.any(bad, axis=1), np.argmax(bad, axis=1), count)
+    status = np.where((first < found.last) & (found.last == count), Status.UNRESOLVED, found.status)
+    return replace(found, last=np.minimum(first, found.last), status=status.astype(np.int8))
+
+
+def knots(gap: Gap, end: Array, count: int) -> Array:
+    """(B, count) m: knots from next to zero to ``end`` (B,) m."""
+    u = np.arcsinh(end / (WIDTH * gap.length)) / (count - 0.5)
+    return np.asarray(WIDTH * gap.length * np.sinh(u[:, None] * (np.arange(count) + 0.5)))
+
+
+def law(
+    gap: Gap, prestretch: Array, deflection: Array, force: Array, slope: Array, status: NDArray[np.int8]
+) -> FilmLaw:
+    """The law through forces and slopes (B, J) at `knots`; what follows the first knot without a force is left out."""
+    bad = (status != Status.OK) | ~(force > 0)
+    last = np.where(np.any(bad, axis=1), np.argmax(bad, axis=1), force.shape[1])
+    beyond = np.take_along_axis(status, np.minimum(last, force.shape[1] - 1)[:, None], axis=1)[:, 0]
+    beyond = np.where((last < force.shape[1]) & (beyond == Status.OK), Status.INDEFINITE, beyond)
+    beyond = np.where(last == force.shape[1], Status.ITERATION_LIMIT, beyond)
+    u = np.arcsinh(deflection / (WIDTH * gap.length))
+    strip, rise = _strip(gap, prestretch[:, None], deflection)
+    with np.errstate(all="ignore"):
+        g = np.log(force / strip)
+        turn = np.sqrt(deflection**2 + (WIDTH * gap.length) ** 2)
+        dg = (slope / force - rise / strip) * turn
+    keep = np.arange(force.shape[1]) < last[:, None]
+    step = 2 * u[:, 0]
+    pieces = _quintics(np.where(keep, g, 0.0), np.where(keep, dg * step[:, None], 0.0), last)
+    return FilmLaw(gap, np.ascontiguousarray(prestretch), step, pieces, last, beyond.astype(np.int8))
+
+
+def tangent(found: FilmLaw, force: Array, change: Array) -> Array:
+    """(B, J, 6, m): d pieces for changes dF (B, J, m) of the forces at the knots.
+
+    Slopes follow from the changes themselves, by a quintic spline through dF/F, even in u.
+    """
+    keep = np.arange(force.shape[1]) < found.last[:, None]
+    with np.errstate(all="ignore"):
+        q = np.where(keep[:, :, None], change / force[:, :, None], 0.0)
+    out = np.zeros((*found.pieces.shape, q.shape[2]))
+    for last in np.unique(found.last):
+        rows = np.flatnonzero(found.last == last)
+        if last < 3:
+            continue
+        first, second = _spline_slopes(int(last))
+        part = q[rows, :last]
+        dq, ddq = (np.einsum("ij,bjm->bim", m, part) for m in (first, second))
+        for m in range(q.shape[2]):
+            out[rows, :last, :, m] = _between(part[:, :, m], dq[:, :, m], ddq[:, :, m])
+    return out
+
+
+def error(found: FilmLaw, force: Array, slope: Array, deflection: Array) -> Array:
+    """(B, J) N: error of the force to be expected near each knot, from the law through every third one.
+
+    Knots 1, 4, 7, ... lie at (j + 1/2) times three steps: they are the knots of a coarser law.
+    """
+    third = slice(1, None, 3)
+    ok = np.arange(force.shape[1]) < found.last[:, None]
+    status = np.where(ok[:, third], Status.OK, Status.UNRESOLVED).astype(np.int8)
+    coarse = law(found.gap, found.prestretch, deflection[:, third], force[:, third], slope[:, third], status)
+    guess, _ = coarse(deflection)
+    with np.errstate(invalid="ignore"):
+        return np.where(ok & np.isfinite(guess), np.abs(guess - force) / GAIN, 0.0)
+
+
+@cache
+def _spline_slopes(count: int) -> tuple[Array, Array]:
+    """Matrices (count, count) from values at j + 1/2 of an even function to its first two derivatives there."""
+    at = np.arange(count) + 0.5
+    both = np.concatenate([-at[::-1], at])
+    unit = np.eye(count)
+    spline = make_interp_spline(both, np.concatenate([unit[::-1], unit]), k=5 if count > 2 else 3)
+    return spline(at, 1), spline(at, 2)
+
+
+@cache
+def _one_sided() -> tuple[Array, Array]:
+    """Weights (3,), (3,) of values and slopes at 0, -1, -2 that give the second derivative at 0 of any quintic."""
+    x = np.array([0.0, -1.0, -2.0])
+    powers = np.arange(6)
+    rows = [x[:, None] ** powers, powers * x[:, None] ** np.maximum(powers - 1, 0)]
+    a = np.concatenate(rows)
+    w = 2.0 * np.linalg.inv(a)[2]
+    return w[:3], w[3:]
+
+
+def _quintics(g: Array, dg: Array, last: NDArray[np.int64]) -> Array:
+    """(B, J, 6) from values and slopes (per step) at the knots, even about u = 0."""
+    left, dleft = np.concatenate([g[:, :1], g[:, :-1]], 1), np.concatenate([-dg[:, :1], dg[:, :-1]], 1)
+    right, dright = np.concatenate([g[:, 1:], g[:, -1:]], 1), np.concatenate([dg[:, 1:], dg[:, -1:]], 1)
+    ddg = 2 * (left - 2 * g + right) - 0.5 * (dright - dleft)
+    row, end = np.arange(len(g)), np.maximum(last - 1, 0)
+    w, v = _one_sided()
+    three = np.maximum(end[:, None] - np.arange(3), 0)
+    edge = np.take_along_axis(g, three, 1) @ w + np.take_along_axis(dg, three, 1) @ v
+    ddg[row, end] = np.where(last >= 3, edge, 0.0)
+    return _between(g, dg, ddg)
+
+
+def _between(g: Array, dg: Array, ddg: Array) -> Array:
+    """(B, J, 6) quintics from knot j - 1 to knot j (the first from the mirror image of knot 0), in t in [0, 1]."""
+    a, da, dda = (np.concatenate([s * v[:, :1], v[:, :-1]], 1) for s, v in ((1, g), (-1, dg), (1, ddg)))
+    p, q, r = g - a - da - dda / 2, dg - da - dda, ddg - dda
+    return np.ascontiguousarray(
+        np.stack([a, da, dda / 2, 10 * p - 4 * q + r / 2, -15 * p + 7 * q - r, 6 * p - 3 * q + r / 2], axis=-1)
+    )
+
+
+def _strip(gap: Gap, l0: Array, x: Array) -> tuple[Array, Array]:
+    """(F_s, dF_s/d delta) up to a constant: P1(l, l0) sin(th) / l0 with l = l0 sqrt(1 + delta^2 / L^2).
+
+    F_s = delta (1 - l0^-6 L^4 / (L^2 + delta^2)^2) with 1 - l0^-6 weighted by the tautness of the gap.
+    """
+    reach, ratio = 1.0 + (x / gap.length) ** 2, 1.0 - gap.tautness * (1.0 - l0**-6.0)
+    kappa = ((reach - 1.0) * (reach + 1.0) + 1.0 - ratio) / reach**2
+    return kappa * x, kappa + 4.0 * ratio / reach**3 * (x / gap.length) ** 2
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _evaluate(pieces, step, last, prestretch, length, tautness, deflection, excess, force, slope):  # type: ignore[no-untyped-def]
+    rows, points = deflection.shape
+    longer = excess.size > 1
+    wide = WIDTH * length
+    for b in range(rows):
+        own = prestretch[b] ** -6.0
+        ratio = 1.0 - tautness * (1.0 - own)
+        inverse = 1.0 / step[b]
+        end = (last[b] - 0.5) * (1.0 + ROOM)
+        for n in range(points):
+            x = deflection[b, n]
+            if not x > 0.0:
+                force[b, n] = 0.0
+                slope[b, n] = 0.0
+                if not x <= 0.0:
+                    force[b, n] = np.nan
+                    slope[b, n] = np.nan
+                continue
+            extra = excess[b, n] if longer else 0.0
+            stretch = 1.0 + extra
+            area = 1.0 / (stretch * stretch)
+            q = x * x
+            if extra > 0.0:
+                q = (length * length + q) * area - length * length
+            reach = 1.0 + q / (length * length)
+            kappa = ((reach - 1.0) * (reach + 1.0) + (1.0 - ratio)) / (reach * reach)
+            if not kappa > 0.0:
+                force[b, n] = 0.0
+                slope[b, n] = 0.0
+                continue
+            rise = 2.0 * ratio / (reach * reach * reach * length * length)
+            y = np.sqrt(max(q, 0.0))
+            t = np.arcsinh(y / wide) * inverse
+            if t > end:
+                force[b, n] = np.nan
+                slope[b, n] = np.nan
+                continue
+            i = min(int(t + 0.5), last[b] - 1)
+            z = t + 0.5 - i
+            c = pieces[b, i]
+            g = c[0] + z * (c[1] + z * (c[2] + z * (c[3] + z * (c[4] + z * c[5]))))
+            dg = c[1] + z * (2.0 * c[2] + z * (3.0 * c[3] + z * (4.0 * c[4] + z * 5.0 * c[5])))
+            bend = 0.0
+            if y > 1e-9 * length:
+                bend = dg * inverse / (2.0 * y * np.sqrt(wide * wide + q))
+            k = np.exp(g) * kappa / stretch
+            force[b, n] = k * x
+            slope[b, n] = k + x * k * (rise / kappa + bend) * 2.0 * x * area

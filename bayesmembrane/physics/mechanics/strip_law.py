@@ -1,0 +1,91 @@
+"""The law of a homogeneous test, in closed form: F = width P1(l, l2(l)) with l = 1 + delta / L."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.materials.base import Material
+from bayesmembrane.physics.mechanics.convexity import least_eigenvalue
+from bayesmembrane.physics.mechanics.solution import Curves, Status
+from bayesmembrane.physics.rigs.base import Strip
+
+
+@dataclass(frozen=True)
+class StripLaw:
+    """F(delta) of B films.
+
+    material, parameters : the films (B, n)
+    rig : length, width and lateral stretch
+    pushes : True if the specimen bears compression; else it is slack there
+    across : (N,) stretch across the pull where it was measured, or None
+    """
+
+    material: type[Material]
+    parameters: Array
+    rig: Strip
+    pushes: bool = False
+    across: Array | None = None
+
+    @property
+    def status(self) -> NDArray[np.int8]:
+        """(B,) `Status` where there is no force: the chains are stretched out."""
+        return np.full(len(self.parameters), Status.LOCKED, np.int8)
+
+    def __call__(self, deflection: Array, excess: Array | None = None) -> tuple[Array, Array]:
+        """((B, N) N, (B, N) N/m): force and dF/d(delta) at deflections (B, N) m; nan where there is none.
+
+        With ``excess`` e (B, N) the strip is longer by that part: l = (1 + delta / L) / (1 + e).
+        """
+        longer = 1.0 if excess is None else 1.0 + excess
+        stretch = (1.0 + deflection / self.rig.length) / longer
+        pulled = np.maximum(stretch, 1e-3 if self.pushes else 1.0)
+        l2, dl2 = self.rig.lateral(pulled, self.across)
+        width = self.rig.width
+        with np.errstate(all="ignore"):
+            _, p1, _, p11, p12, _ = self.material.derivatives(self.parameters.T[:, :, None], pulled, l2)
+            p1 = np.where(np.isfinite(p1), p1, np.nan)  # beyond all numbers there is no force
+            slope = width * (p11 + p12 * dl2) / (self.rig.length * longer)
+        force = np.where(pulled == stretch, width * p1, 0.0 * p1)
+        slope = np.where(np.isnan(p1), p1, np.where(pulled == stretch, slope, 0.0))
+        return force, slope
+
+    def varied(self, change: Array) -> StripLaw:
+        """The law of films whose parameters differ by ``change`` (B, n)."""
+        return replace(self, parameters=self.parameters + change)
+
+    @staticmethod
+    def stack(laws: Sequence[StripLaw]) -> StripLaw:
+        """The films of all laws, one after the other."""
+        return replace(laws[0], parameters=np.concatenate([law.parameters for law in laws]))
+
+
+def strip_curves(law: StripLaw, deflection: Array, sensitivities: bool = False) -> Curves:
+    """Curves of the films of ``law`` at ``deflection`` (N,) m, which all are where ``across`` is, if that is given."""
+    d = np.broadcast_to(deflection, (len(law.parameters), deflection.size))
+    force, slope = law(d)
+    stretch = np.maximum(1.0 + d / law.rig.length, 1e-3)
+    l2, _ = law.rig.lateral(stretch, law.across)
+    p = law.parameters.T[:, :, None]
+    with np.errstate(all="ignore"):
+        w, _, _, a, b, c = law.material.derivatives(p, stretch, l2)
+        rates = np.stack([s[1] + 0.0 * stretch for s in law.material.sensitivities(p, stretch, l2)], axis=2)
+        gd = np.abs(np.asarray(law.material.shear_modulus(law.parameters.T)))[:, None]
+    zero = np.zeros(d.shape)
+    return Curves(
+        deflection=d,
+        force=force,
+        status=np.where(np.isfinite(force), Status.OK, Status.LOCKED).astype(np.int8),
+        note=np.zeros(d.shape, np.int8),
+        slope=slope,
+        sensitivity=np.where((force == 0)[:, :, None], 0.0, law.rig.width * rates) if sensitivities else None,
+        variation=zero,
+        max_stretch=np.maximum(stretch, l2),
+        ellipticity=np.asarray(np.minimum(a, c) / gd),
+        convexity=np.asarray(least_eigenvalue(a, b, c) / gd),
+        energy=w * law.rig.width * law.rig.length + zero,
+    )

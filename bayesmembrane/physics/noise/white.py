@@ -1,0 +1,83 @@
+"""White noise: every point errs on its own, by the same amount, on top of what the measurement states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.parameters import Array, Parameter
+from bayesmembrane.physics.noise.base import LN_SD, Noise, NoiseLikelihood, conditional, force_scale
+
+
+@dataclass(frozen=True)
+class White(Noise):
+    """Sigma = Sigma_given + tau^2 I, with tau = exp(ln_sd) max|y|; without ``extra``, Sigma = Sigma_given."""
+
+    extra: bool = True
+
+    name: ClassVar[str] = "white"
+    title: ClassVar[str] = "white noise"
+
+    @property
+    def coordinates(self) -> tuple[Parameter, ...]:
+        return (LN_SD,) if self.extra else ()
+
+    @property
+    def field_names(self) -> tuple[str, ...]:
+        return ("sd",) if self.extra else ()
+
+    def natural(self, x: Array, scale: float) -> Array:
+        return np.exp(x) * scale
+
+    def bind(self, measurement: Measurement) -> WhiteLikelihood:
+        if not self.extra and measurement.force_sd is None:
+            raise SettingsError(
+                "without the extra noise term there is no noise at all, since the measurement states none",
+                remedy="give force_sd_N in the specimen file, or let the noise be inferred",
+            )
+        return WhiteLikelihood(measurement, self.extra)
+
+
+class WhiteLikelihood(NoiseLikelihood):
+    """With Sigma_given = Q diag(w) Q^T, found once, a draw costs O(N^2): Sigma = Q diag(w + tau^2) Q^T.
+
+    Independent points need no Q.
+    """
+
+    def __init__(self, measurement: Measurement, extra: bool) -> None:
+        self.scale, self.extra = force_scale(measurement), extra
+        self.axes: Array | None = None
+        self.variance = np.zeros(len(measurement))
+        if measurement.covariance is not None:
+            self.variance, self.axes = np.linalg.eigh(measurement.covariance)
+        elif measurement.force_sd is not None:
+            self.variance = measurement.force_sd**2
+
+    def log_likelihood(self, residual: Array, x: Array) -> Array:
+        r = residual if self.axes is None else residual @ self.axes
+        variance = self._total(x)
+        return np.asarray(-0.5 * np.sum(r * r / variance + np.log(2 * np.pi * variance), axis=1))
+
+    def covariance(self, x: Array) -> Array:
+        variance = self._total(x[None, :])[0]
+        return np.diag(variance) if self.axes is None else (self.axes * variance) @ self.axes.T
+
+    def pointwise(self, residual: Array, x: Array) -> Array:
+        variance = self._total(x)
+        if self.axes is None:
+            return conditional(residual / variance, 1 / variance)
+        pull = (residual @ self.axes / variance) @ self.axes.T
+        return conditional(pull, 1 / variance @ (self.axes**2).T)
+
+    def draw(self, x: Array, rng: np.random.Generator) -> Array:
+        z = rng.standard_normal((len(x), self.variance.size)) * np.sqrt(self._total(x))
+        return z if self.axes is None else np.asarray(z @ self.axes.T)
+
+    def _total(self, x: Array) -> Array:
+        """Variances (B, N) along the axes; never below what a double can hold."""
+        tau = np.exp(x[:, :1]) * self.scale if self.extra else np.zeros((len(x), 1))
+        return np.maximum(self.variance + tau * tau, 1e-300)

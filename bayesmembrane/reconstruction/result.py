@@ -1,0 +1,160 @@
+"""The answer of a reconstruction, and its JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.reconstruction.rows import Correction, Suspect
+
+
+@dataclass(frozen=True)
+class RangeResult:
+    """One range of training deflections.
+
+    Attributes
+    ----------
+    name : of the range
+    n_points : probability of each number of points
+    positions : for each number of points looked at, ln evidence relative to the best, and the most probable first
+        position in m
+    first, first_sd : mean and standard deviation of the first position, m, for the most probable number
+    deflection, force, force_sd : (n,) at the most probable positions; m, N, N
+    """
+
+    name: str
+    n_points: dict[int, float]
+    positions: dict[int, tuple[float, float]]
+    first: float
+    first_sd: float
+    deflection: Array
+    force: Array
+    force_sd: Array
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Plain numbers, lengths in mm."""
+        evidence = {
+            str(n): {"log_evidence": e, "most_probable_first_mm": 1e3 * a} for n, (e, a) in self.positions.items()
+        }
+        return {
+            "n_points": {str(n): p for n, p in self.n_points.items()},
+            "first_mm": {"mean": 1e3 * self.first, "sd": 1e3 * self.first_sd},
+            "deflection_mm": (1e3 * self.deflection).tolist(),
+            "force_N": self.force.tolist(),
+            "sd_N": self.force_sd.tolist(),
+            "evidence": evidence,
+        }
+
+
+@dataclass(frozen=True)
+class LossCheck:
+    """One printed loss, beside the distance of the reconstructed curve and what the other rows predict; all in N.
+
+    ``wrong`` is the probability that the row says something wrong, judged by the other rows.
+    """
+
+    material: str
+    column: str
+    range: str
+    printed: float
+    reconstructed: float
+    predicted: float
+    predicted_sd: float
+    wrong: float
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Plain numbers, N."""
+        return {
+            "material": self.material,
+            "column": self.column,
+            "range": self.range,
+            "printed_N": self.printed,
+            "reconstructed_minus_printed_N": self.reconstructed - self.printed,
+            "others_predict_N": self.predicted,
+            "others_predict_sd_N": self.predicted_sd,
+            "probability_row_is_wrong": self.wrong,
+        }
+
+
+@dataclass(frozen=True)
+class Influence:
+    """Forces (N,) in N at the same deflections when one assumption is changed; ln evidence relative to the shipped one.
+
+    The evidence is None where the data or the measure of the first positions differ too.
+    """
+
+    changed: str
+    force: Array
+    log_evidence: float | None
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """The measured curve, how sure it is, and which printed rows contradict the others.
+
+    Attributes
+    ----------
+    ranges : one result per range
+    covariance : (N, N) N^2, of the forces of all ranges one after the other: curve, load cell, positions
+    losses : every printed loss beside the reconstructed one
+    suspects : rows that contradict the others, with the smallest corrections
+    influence : what other priors and likelihoods would give
+    scales : posterior means of roughness, rounding and solver errors
+    acceptance : of the Hamiltonian steps
+    """
+
+    ranges: tuple[RangeResult, ...]
+    covariance: Array
+    losses: tuple[LossCheck, ...]
+    suspects: tuple[Suspect, ...]
+    influence: tuple[Influence, ...]
+    scales: dict[str, float]
+    acceptance: float
+
+    @property
+    def deflection(self) -> Array:
+        """(N,) m, ranges one after the other."""
+        return np.concatenate([r.deflection for r in self.ranges])
+
+    @property
+    def force(self) -> Array:
+        """(N,) N, ranges one after the other."""
+        return np.concatenate([r.force for r in self.ranges])
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Plain numbers and texts; lengths in mm, forces in N."""
+        influence = [
+            {"changed": i.changed, "force_change_N": (i.force - self.force).tolist(), "log_evidence": i.log_evidence}
+            for i in self.influence
+        ]
+        return {
+            **{r.name: r.to_json_dict() for r in self.ranges},
+            "suspect_rows": [_suspect(s) for s in self.suspects],
+            "covariance_N2": self.covariance.tolist(),
+            "losses": [c.to_json_dict() for c in self.losses],
+            "influence": influence,
+            "scales": self.scales,
+            "acceptance": self.acceptance,
+        }
+
+
+def _suspect(found: Suspect) -> dict[str, Any]:
+    return {
+        "material": found.material,
+        "column": found.column,
+        "reason": found.reason,
+        "probability": found.probability,
+        "corrections": _entries(found.corrections),
+        "alternatives": [_entries(a) for a in found.alternatives],
+    }
+
+
+def _entries(corrections: Sequence[Correction]) -> list[dict[str, Any]]:
+    return [
+        {"entry": c.entry, "printed": c.printed, "consistent": c.consistent, "best": c.best, "sd": c.sd}
+        for c in corrections
+    ]

@@ -1,0 +1,181 @@
+"""What the valleys say, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.valleys.profile import End
+from bayesmembrane.valleys.result import Valley
+
+FEW = 2  # open ends that have a sentence each
+CLOSE = 2.0  # posterior standard deviations within which two valleys count as compatible
+
+
+def sentences_of(v: Valley) -> tuple[str, ...]:
+    """What is to be said of one valley."""
+    told = [_where(v), *_edge(v), *_open(v), *_basins(v), *_nothing_needed(v), *_modes(v), *_published(v), *_next(v)]
+    if v.unreached > 0:
+        told.append(f"{100 * v.unreached:.2g} % of the cells of the pairwise maps hold no film that reaches the data.")
+    return tuple(told)
+
+
+def _names(v: Valley) -> list[str]:
+    return [n.partition(".")[2] for n in v.chart.names]
+
+
+def titled(v: Valley) -> str:
+    """Material and effects for people: ``Gent + zero offset``."""
+    return " + ".join([v.hypothesis.material.title, *(e.name.replace("_", " ") for e in v.hypothesis.effects)])
+
+
+def _range(v: Valley) -> str:
+    return f"Up to {1e3 * v.end:.4g} mm"
+
+
+def point(v: Valley, p: Array | Sequence[float]) -> str:
+    """``c1 8.84, c2 -0.63``."""
+    return ", ".join(f"{n} {x:.4g}" for n, x in zip(_names(v), p, strict=True))
+
+
+def _where(v: Valley) -> str:
+    share = 100 * v.rise / v.best_loss
+    unit = f" {v.metric.unit}" if v.metric.unit not in ("-", "") else " in logarithms"
+    length = v.length(v.metric)
+    long = "" if length is None else f"; it is {'at least ' if v.open_end else ''}{length:.3g}{unit} long"
+    number = v.spectra[0].condition_number
+    ratio = f", condition number {number:.3g}" if np.isfinite(number) and v.best.size > 1 else ""
+    return (
+        f"{_range(v)} every {titled(v)} film between ({point(v, v.floor[0])}) and "
+        f"({point(v, v.floor[-1])}) on the valley's floor fits within {share:.3g} % of the least loss, "
+        f"{v.best_loss:.4g} N{long}{ratio}."
+    )
+
+
+def _open(v: Valley) -> list[str]:
+    """Every parameter with an end that does not close the valley; of many of them in one sentence."""
+    told: list[str] = []
+    if sum(e.open for p in v.profiles for e in p.ends) > FEW:
+        return [_open_in_many(v)]
+    for p in v.profiles:
+        for end, far in zip(p.ends, ("low", "high"), strict=True):
+            if end.open:
+                told.append(_open_end(v, p.index, end, far))
+    return told
+
+
+def _open_in_many(v: Valley) -> str:
+    names, units = _names(v), [f" {u}" if u not in ("-", "") else "" for u in v.chart.units]
+    opened, losses, closed = [], [v.best_loss], []
+    for p in v.profiles:
+        ends = [e for e in p.ends if e.open]
+        losses += [e.loss for e in ends]
+        if ends:
+            opened.append(f"{names[p.index]} (to {' and '.join(f'{e.value:.3g}' for e in ends)}{units[p.index]})")
+        if len(ends) == 1:
+            high = p.ends[0].open
+            bound = p.ends[int(high)].value
+            closed.append(f"{names[p.index]} is {'below' if high else 'above'} {bound:.3g}{units[p.index]}")
+    only = f"; what the data do say is that {', '.join(closed)}" if closed else ""
+    return (
+        f"{_range(v)} the valley is open in {', '.join(opened)}: as far as each of these is followed, with the others "
+        f"adjusted, the loss stays between {min(losses):.4g} and {max(losses):.4g} N{only}."
+    )
+
+
+def _edge(v: Valley) -> list[str]:
+    """An optimum at the bounds of its coordinates is none."""
+    if not v.at_bound:
+        return []
+    names = ", ".join(n.partition(".")[2] or n for n in v.at_bound)
+    return [
+        f"{_range(v)} the least loss lies where the search ends, in the coordinate {names}: it is a limit that films "
+        "come close to, and no optimum."
+    ]
+
+
+def _open_end(v: Valley, i: int, end: End, far: str) -> str:
+    name, unit = _names(v)[i], v.chart.units[i]
+    shown = f"{end.value:.3g}" + (f" {unit}" if unit not in ("-", "") else "")
+    if not v.chart.log[i] and i >= v.hypothesis.material_size:
+        edge = "least" if far == "low" else "largest"
+        return (
+            f"{_range(v)} the valley is open: at {name} = {shown}, the {edge} value that is allowed, the loss is "
+            f"{end.loss:.4g} N."
+        )
+    goal = "zero" if abs(end.value) < abs(float(v.best[i])) or (v.chart.log[i] and far == "low") else "infinity"
+    if v.chart.log[i] and v.chart.sign[i] < 0 and far == "high":
+        goal = "minus infinity" if goal == "infinity" else goal
+    limit = f", that of a {v.limit} film" if v.limit and i == v.along else ""
+    edge = f"the loss {'tends to' if end.tends else 'is still'} {end.loss:.4g} N{limit}"
+    low, high = v.profiles[i].ends
+    other = low if far == "high" else high
+    bound = f"; the data only say that {name} is {'above' if far == 'high' else 'below'} {other.value:.3g}"
+    told = f"{_range(v)} the valley is open: as {name} goes to {goal} (followed to {shown}) {edge}"
+    falls = f", and no value of {name} is an optimum" if end.loss <= v.best_loss * (1 + 1e-4) and end.tends else ""
+    # Negative parameters on a logarithmic axis run the other way.
+    clear = not other.open and v.chart.sign[i] >= 0
+    return told + falls + (bound if clear else "") + "."
+
+
+def _basins(v: Valley) -> list[str]:
+    """Other minima along the floor: an optimiser may stop there."""
+    return [
+        f"{_range(v)} the loss has another basin near ({point(v, natural)}) with {loss:.3g} N, "
+        f"{100 * (loss / v.best_loss - 1):.2g} % above the least, in which an optimiser may stop; it is no part of the "
+        "length."
+        for natural, loss in v.basins
+    ]
+
+
+def _nothing_needed(v: Valley) -> list[str]:
+    """Parameters that may as well be zero."""
+    told = []
+    for p in v.profiles:
+        low, high = p.ends
+        if not v.chart.log[p.index] and v.best.size > 1 and low.value < 0 < high.value:
+            told.append(
+                f"{_range(v)} {_names(v)[p.index]} = 0 lies within the valley: a simpler film fits almost as well."
+            )
+    return told
+
+
+def _modes(v: Valley) -> list[str]:
+    parts = [f"{mode} leaves {100 * v.share(mode):.3g} %" for mode in ("reached", "box", "elliptic")]
+    return [f"{_range(v)}, of the floor's length the convexity prior {parts[0]}, {parts[1]}, {parts[2]}."]
+
+
+def _published(v: Valley) -> list[str]:
+    if not v.published:
+        return []
+    on = [p.label for p in v.published if p.within]
+    off = [f"{p.label} ({'no film' if p.loss is None else f'{p.loss:.3g} N'})" for p in v.published if not p.within]
+    parts = [f"{', '.join(on)} lie inside" if on else "", f"{', '.join(off)} lie outside" if off else ""]
+    return [f"{_range(v)}, of the published parameter sets " + " and ".join(p for p in parts if p) + " the valley."]
+
+
+def _next(v: Valley) -> list[str]:
+    if not v.next_tests:
+        return []
+    first = v.next_tests[0]
+    return [
+        f"{_range(v)}, what would shorten the valley most is {first.test}: its longest axis is expected to shrink by "
+        f"{100 * first.reduction:.3g} %."
+    ]
+
+
+def sentence_between(a: Valley, b: Valley, distance: float, crossing: Sequence[float] | None) -> str:
+    """How two valleys lie to each other."""
+    both = f"The valleys up to {1e3 * a.end:.4g} and {1e3 * b.end:.4g} mm"
+    if crossing is not None:
+        return f"{both} cross at ({point(a, crossing)})."
+    if not np.isfinite(distance):
+        return f"{both} cannot be compared: a posterior has no spread."
+    if distance < CLOSE:
+        return f"{both} do not cross, but come as close as {distance:.2g} posterior standard deviations."
+    return (
+        f"{both} stay apart: at their closest approach they are {distance:.3g} posterior standard deviations from each "
+        "other, so that no one set of parameters serves both ranges."
+    )

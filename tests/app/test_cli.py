@@ -1,0 +1,193 @@
+"""The command line: answers, exit statuses and sentences."""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayesmembrane.app.cli import main
+from bayesmembrane.data.shipped import shipped
+from bayesmembrane.ground.registry import material
+from bayesmembrane.physics.mechanics import solve
+
+Run = Callable[..., tuple[int, str, str]]
+
+CURVE, SPECIMEN = shipped("elastosil_50um_op1.csv"), shipped("elastosil_50um_op1.toml")
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    def call(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["bayesmembrane", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            main()
+        out, err = capsys.readouterr()
+        return int(stop.value.code or 0), out, err
+
+    return call
+
+
+def test_force_answers_what_the_solver_answers(run: Run) -> None:
+    code, out, _ = run(
+        "force", "--material", "yeoh", "--parameters", "8.84,-0.63,0.056", "--deflection-mm", "1,10,35.1", "--json"
+    )
+    answer = json.loads(out)
+    direct = solve(material("yeoh"), [8.84, -0.63, 0.056], [1e-3, 0.01, 0.0351], inner_radius=0.01, outer_radius=0.035)
+    assert code == 0
+    assert answer["status"] == ["ok"] * 3
+    np.testing.assert_allclose(answer["force_N"], direct.force[0], rtol=1e-12)
+    np.testing.assert_allclose(answer["max_stretch"], direct.max_stretch[0], rtol=1e-12)
+
+
+def test_force_beyond_locking_is_null_with_the_reason(run: Run) -> None:
+    code, out, _ = run(
+        "force", "--material", "gent", "--parameters", "5.312,17.42", "--deflection-mm", "20,120", "--json"
+    )
+    answer = json.loads(out)
+    assert code == 0
+    assert answer["force_N"][0] > 0
+    assert answer["force_N"][1] is None
+    assert answer["status"][1].startswith("locked")
+
+
+def test_force_of_another_rig_scales(run: Run) -> None:
+    base = ["force", "--material", "neo_hookean", "--parameters", "7.5", "--json", "--deflection-mm"]
+    _, one, _ = run(*base, "20")
+    _, two, _ = run(*base, "40", "--inner-radius-mm", "20", "--outer-radius-mm", "70")
+    assert json.loads(two)["force_N"][0] == pytest.approx(2 * json.loads(one)["force_N"][0], rel=1e-9)
+
+
+def test_convexity_of_the_papers_mooney_rivlin_film(run: Run) -> None:
+    code, out, _ = run("convexity", "--material", "mooney_rivlin", "--parameters", "7,0.5", "--box", "1,8", "--json")
+    answer = json.loads(out)
+    assert code == 0
+    assert answer["convex"] is False
+    assert answer["margin"] == pytest.approx(-10 / 3, rel=1e-2)
+    assert answer["worst"] == pytest.approx({"l1": 8.0, "l2": 8.0})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["force", "--material", "gnet", "--parameters", "1", "--deflection-mm", "1"], ['"gnet"', "gent"]),
+        (["force", "--material", "gent", "--parameters", "5", "--deflection-mm", "1"], ["2 parameters", "c1, c2"]),
+        (["force", "--material", "gent", "--parameters", "5;17", "--deflection-mm", "1"], ["--parameters", "5;17"]),
+        (["force", "--material", "gent", "--parameters", "5,17", "--deflection-mm", "1,nan"], ["--deflection-mm"]),
+        (
+            ["force", "--material", "gent", "--parameters", "5,17", "--deflection-mm", "1", "--inner-radius-mm", "40"],
+            ["inner radius", "40 mm"],
+        ),
+        (["convexity", "--material", "gent", "--parameters", "5,17", "--box", "1"], ["--box"]),
+        (["fit", "no.csv", "--specimen", "no.toml", "--material", "gent"], ["no.csv"]),
+        (["fit", CURVE, "--specimen", SPECIMEN, "--material", "gent", "--convexity", "boxx"], ['"boxx"', "box"]),
+        (["fit", CURVE, "--specimen", SPECIMEN, "--material", "gent", "--loss", "huber"], ["huber"]),
+        (["fit", CURVE, "--specimen", SPECIMEN, "--material", "gent", "--effects", "mullin"], ["mullin"]),
+        (["fit", CURVE, "--specimen", SPECIMEN, "--material", "gent", "--noise", "pink"], ["pink"]),
+        (["report", "no/such/run"], ["no/such/run"]),
+    ],
+)
+def test_a_wrong_setting_is_one_sentence_and_exit_1(run: Run, arguments: list[object], words: list[str]) -> None:
+    code, out, err = run(*arguments)
+    assert code == 1
+    assert out == ""
+    assert "Traceback" not in err
+    assert len(err.strip().splitlines()) == 1
+    for word in words:
+        assert word in err
+
+
+def test_a_missing_option_is_wrong_usage(run: Run) -> None:
+    assert run("force", "--material", "gent")[0] == 2
+
+
+def test_fit_answers_the_contract(run: Run) -> None:
+    code, out, _ = run("fit", CURVE, "--specimen", SPECIMEN, "--material", "neo_hookean", "--json")
+    answer = json.loads(out)
+    assert code == 0
+    assert {"parameters", "rmse_N", "loss_N", "convex", "status"} <= answer.keys()
+    assert answer["parameters"]["c1"]["value"] == pytest.approx(7.62, abs=0.05)
+    assert answer["loss_N"] == pytest.approx(answer["rmse_N"] * 10**0.5, rel=1e-9)
+
+
+def test_sample_stores_a_run_that_report_shows(run: Run, tmp_path: Path) -> None:
+    common = [CURVE, "--specimen", SPECIMEN, "--material", "neo_hookean", "--ess", "200", "--seed", "11", "--json"]
+    code, out, _ = run("sample", *common, "--out", tmp_path / "chains")
+    answer = json.loads(out)
+    assert code == 0
+    assert {"run", "posterior", "ess_bulk", "r_hat", "acceptance", "evaluations", "seconds"} <= answer.keys()
+    assert {"mean", "sd", "hdi_94"} <= answer["posterior"]["c1"].keys()
+    assert answer["ess_bulk"] >= 200
+    again = json.loads(run("sample", *common, "--out", tmp_path / "chains")[1])
+    assert again["posterior"] == answer["posterior"]
+    code, out, _ = run("report", answer["run"], "--out", tmp_path / "page", "--json")
+    assert code == 0
+    assert Path(json.loads(out)["report"]).read_text(encoding="utf-8").lstrip().lower().startswith("<!doctype html")
+
+
+def test_an_unwritable_folder_is_one_sentence(run: Run, tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("mine")
+    arguments = ["sample", CURVE, "--specimen", SPECIMEN, "--material", "neo_hookean", "--out", blocked / "chains"]
+    code, _, err = run(*arguments)
+    assert code == 1
+    assert "Traceback" not in err
+    assert "cannot be stored" in err.strip().splitlines()[-1]
+    assert blocked.read_text() == "mine"
+
+
+def test_fit_finds_effects_in_a_curve_of_the_other_solver(run: Run, tmp_path: Path) -> None:
+    """The curve is shot, and the shift and the frame are put in by hand, point by point."""
+    film, shift, compliance = [8.0, -0.2, 0.03], 6e-4, 4e-4
+    knots = np.linspace(1e-3, 0.07, 60)
+    shot = solve(material("yeoh"), film, knots, inner_radius=0.01, outer_radius=0.035, solver="shooting").force[0]
+    deflection = knots + compliance * shot + shift
+    force = shot + 1e-3 * np.random.default_rng(4).standard_normal(knots.size)
+    rows = "".join(f"{1e3 * d!r},{f!r}\n" for d, f in zip(deflection.tolist(), force.tolist(), strict=True))
+    (tmp_path / "c.csv").write_text("deflection_mm,force_N\n" + rows)
+    (tmp_path / "c.toml").write_text(
+        '[specimen]\nthickness_um = 50\n[rig]\nkind = "annulus"\ninner_radius_mm = 10\nouter_radius_mm = 35\n'
+    )
+    base = ["fit", tmp_path / "c.csv", "--specimen", tmp_path / "c.toml", "--material", "yeoh", "--json"]
+    code, out, _ = run(*base, "--effects", "zero_offset,machine_compliance")
+    found = json.loads(out)["parameters"]
+    assert code == 0
+    for name, truth in (("zero_offset.shift", shift), ("machine_compliance.compliance", compliance), ("c1", film[0])):
+        assert abs(found[name]["value"] - truth) < 4 * found[name]["sd"]
+        assert found[name]["sd"] < 0.2 * truth
+    _, plain, _ = run(*base)
+    assert json.loads(plain)["rmse_N"] > 2 * json.loads(out)["rmse_N"]
+
+
+@pytest.mark.parametrize(
+    ("effects", "sentence"),
+    [
+        ("zero_ofset", 'no effect called "zero_ofset"; did you mean "zero_offset"'),
+        ("mullins,mullins", 'the effect "mullins" is named twice'),
+        ("rate", 'the effect "rate" needs times'),
+    ],
+)
+def test_an_effect_that_cannot_be_is_refused_in_a_sentence(run: Run, effects: str, sentence: str) -> None:
+    code, _, err = run("fit", CURVE, "--specimen", SPECIMEN, "--material", "yeoh", "--effects", effects)
+    assert code == 1
+    assert sentence in " ".join(err.split())
+    assert "Traceback" not in err
+
+
+def test_errors_of_a_strip_are_told_in_stress(run: Run, tmp_path: Path) -> None:
+    """A step of 12 kPa between the legs of a strip, whatever its width, is read off the table as kPa."""
+    stretch = np.concatenate([np.linspace(1.02, 1.6, 30), np.linspace(1.58, 1.04, 28)])
+    stress = 1e-1 * (stretch - stretch**-2) + np.where(np.arange(58) < 30, 6e-3, -6e-3)
+    rows = [f"{t},{x},{s + 1e-5 * (-1) ** t}" for t, (x, s) in enumerate(zip(stretch, stress, strict=True))]
+    (tmp_path / "c.csv").write_text("time_s,stretch,nominal_stress_MPa\n" + "\n".join(rows) + "\n")
+    rig = '[specimen]\nthickness_um = 500\n[rig]\nkind = "uniaxial"\nwidth_mm = 7\n'
+    (tmp_path / "c.toml").write_text(rig)
+    code, out, err = run("diagnose", tmp_path / "c.csv", "--specimen", tmp_path / "c.toml", "--material", "neo_hookean")
+    assert code == 0, err
+    assert "root mean square, kPa" in out
+    (line,) = (x for x in out.splitlines() if "before" in x and "heldout" not in x)
+    shown = [float(x) for x in line.replace("│", " ").split()[1:3]]
+    assert shown[0] == pytest.approx(6, rel=0.05)
+    assert 6 <= shown[1] < 9

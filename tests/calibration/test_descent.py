@@ -1,0 +1,39 @@
+import numpy as np
+import pytest
+
+from bayesmembrane.calibration.descent import descend
+
+LOW, HIGH = np.full(2, -5.0), np.full(2, 5.0)
+
+
+def rosenbrock(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    r = np.stack([1 - x[:, 0], 10 * (x[:, 1] - x[:, 0] ** 2)], axis=1)
+    j = np.zeros((len(x), 2, 2))
+    j[:, 0, 0], j[:, 1, 0], j[:, 1, 1] = -1, -20 * x[:, 0], 10
+    return r, j
+
+
+def test_a_curved_valley_is_followed_from_every_start() -> None:
+    start = np.random.default_rng(1).uniform(-4, 4, (20, 2))
+    x, size = descend(rosenbrock, start, LOW, HIGH, 200)
+    assert x == pytest.approx(np.ones((20, 2)), abs=1e-6)
+    assert size == pytest.approx(np.zeros(20), abs=1e-6)
+
+
+def test_walls_of_nan_are_not_crossed() -> None:
+    def walled(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        r, j = rosenbrock(x)
+        return np.where(x[:, :1] > 0.5, np.nan, r), j
+
+    x, size = descend(walled, np.array([[-1.0, 1.0], [2.0, 2.0]]), LOW, HIGH, 200)
+    assert x[0, 0] <= 0.5
+    assert size[0] < 0.75
+    assert size[1] == np.inf
+
+
+def test_bounds_and_held_coordinates_are_kept() -> None:
+    start = np.array([[-3.0, 2.0]])
+    x, _ = descend(rosenbrock, start, LOW, np.array([0.5, 5.0]), 200)
+    assert x[0] == pytest.approx([0.5, 0.25], abs=1e-5)
+    x, _ = descend(rosenbrock, start, LOW, HIGH, 200, held=np.array([[True, False]]))
+    assert x[0] == pytest.approx([-3.0, 5.0], abs=1e-6)

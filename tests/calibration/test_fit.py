@@ -1,0 +1,130 @@
+"""The optimum: recovery from another solver's curves, linear cases in closed form, constraints, open ends."""
+
+import numpy as np
+import pytest
+
+from bayesmembrane.calibration.fit import fit
+from bayesmembrane.data.shipped import shipped
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.registry import material
+from bayesmembrane.physics.forward import predict
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.mechanics import solve
+
+FILMS = {
+    "neo_hookean": (7.5,),
+    "mooney_rivlin": (6.6, 0.5),
+    "gent": (5.3, 30.0),
+    "yeoh": (8.0, -0.2, 0.03),
+    "ogden": (11.0, 0.2, -0.4, 1.5, 4.8, -1.2),
+}
+
+
+@pytest.mark.parametrize("name", [n for n in FILMS if n != "ogden"])
+def test_a_film_without_noise_comes_back(film, name: str) -> None:  # type: ignore[no-untyped-def]
+    """The curve is the textbook solver's, so that this also says how well the two agree."""
+    found = fit(film(name, FILMS[name]), hypothesis(name, convexity="none"), seed=11)
+    assert found.status == "converged"
+    assert found.rmse_N < 1e-6
+    assert not found.at_bound
+    for estimate, truth in zip(found.parameters.values(), FILMS[name], strict=True):
+        assert estimate.value == pytest.approx(truth, rel=2e-5)
+        assert estimate.sd is not None
+        assert estimate.sd < 1e-3 * abs(truth)
+
+
+def test_an_ogden_curve_comes_back_if_not_its_six_parameters(film) -> None:  # type: ignore[no-untyped-def]
+    curve = film("ogden", FILMS["ogden"], noise=0.002, seed=5)
+    found = fit(curve, hypothesis("ogden", convexity="none"), starts=[FILMS["ogden"]])
+    truth = np.linalg.norm(
+        predict(hypothesis("ogden"), material("ogden").to_coordinates(FILMS["ogden"]), curve).force - curve.force
+    )
+    assert found.loss_N <= truth
+    assert found.loss_N > 0.2 * truth
+
+
+def test_a_linear_fit_is_the_closed_form(film) -> None:  # type: ignore[no-untyped-def]
+    """F = c1 F(1): c1 = <F, y> / <F, F> with variance s^2 / <F, F>, weighted or not."""
+    curve = film("neo_hookean", (7.5,), noise=0.02, seed=3, stated=True)
+    unit = solve(material("neo_hookean"), [1.0], curve.deflection, inner_radius=0.01, outer_radius=0.035).force[0]
+    c1 = unit @ curve.force / (unit @ unit)
+    r = curve.force - c1 * unit
+    for loss in ("euclidean", "weighted"):
+        found = fit(curve, hypothesis("neo_hookean"), loss=loss)
+        estimate = found.parameters["neo_hookean.c1"]
+        assert estimate.value == pytest.approx(c1, rel=1e-7)
+        assert estimate.sd == pytest.approx(np.sqrt(r @ r / (len(curve) - 1) / (unit @ unit)), rel=1e-5)
+        assert found.loss_N == pytest.approx(np.linalg.norm(r))
+        assert found.rmse_N == pytest.approx(np.linalg.norm(r) / np.sqrt(len(curve)))
+        assert found.objective == pytest.approx(found.loss_N / (0.02 if loss == "weighted" else 1.0))
+
+
+def test_a_gent_film_without_a_limit_is_open(film) -> None:  # type: ignore[no-untyped-def]
+    """A softer curve than neo-Hookean drives the limit to infinity; its modulus still has an error."""
+    found = fit(film("mooney_rivlin", (7.9, -0.2), end=0.035), hypothesis("gent"))
+    assert found.at_bound == ("gent.ln_jm",)
+    assert found.parameters["gent.c2"].sd is None
+    assert found.parameters["gent.c1"].sd is not None
+
+
+def test_no_loss_lies_above_a_published_start(film) -> None:  # type: ignore[no-untyped-def]
+    curve = film("yeoh", (8.84, -0.63, 0.0563), end=0.0351, noise=0.01, seed=9)
+    for name in ("mooney_rivlin", "gent", "yeoh"):
+        rows = [r.split(",") for r in shipped("paper_parameters.csv").read_text().splitlines()]
+        films = [[float(r[3]) for r in rows if r[:2] == [name, column]] for column in ("INI", "OP1", "OP2")]
+        force = solve(material(name), films, curve.deflection, inner_radius=0.01, outer_radius=0.035).force
+        published = np.linalg.norm(force - curve.force, axis=1)
+        found = fit(curve, hypothesis(name), starts=films)
+        assert found.loss_N <= np.nanmin(published) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("mode", ["reached", "box", "elliptic"])
+def test_the_constrained_optimum_meets_its_prior(film, mode: str) -> None:  # type: ignore[no-untyped-def]
+    curve = film("mooney_rivlin", (3.0, 4.5), end=0.05, noise=0.005, seed=2)
+    found = fit(curve, hypothesis("mooney_rivlin", convexity=mode))
+    assert found.constrained is not None
+    if mode == "elliptic":
+        assert found.convex
+        assert found.constrained.loss_N == found.loss_N
+        return
+    assert not found.convex
+    assert found.constrained.convex
+    assert 0 <= found.constrained.margins[mode] < 0.02
+    assert found.constrained.loss_N > found.loss_N
+    share = [f.parameters["mooney_rivlin.c2"].value for f in (found, found.constrained)]
+    assert share[0] == pytest.approx(4.5, rel=0.05)
+    assert share[1] < share[0]
+    answer = found.summary()
+    assert answer["convex"] is False
+    assert answer["constrained"]["convex"] is True
+
+
+def test_the_constrained_optimum_is_the_best_of_a_scan(film) -> None:  # type: ignore[no-untyped-def]
+    """In two dimensions the boundary can be walked: no feasible film on a fine grid of shares fits better."""
+    curve = film("mooney_rivlin", (3.0, 4.5), end=0.05, noise=0.005, seed=2)
+    h = hypothesis("mooney_rivlin")
+    held = fit(curve, h).constrained
+    assert held is not None
+    share = np.linspace(-0.2, 0.8, 400)
+    unit = predict(h, np.column_stack([np.zeros(400), share]), curve)
+    scale = unit.force @ curve.force / np.sum(unit.force**2, axis=1)
+    loss = np.linalg.norm(scale[:, None] * unit.force - curve.force, axis=1)
+    best = np.min(loss[(unit.convexity >= 0) & unit.ok])
+    assert held.loss_N <= best * (1 + 1e-6)
+    assert held.loss_N > 0.98 * best
+
+
+def test_seeds_agree(film) -> None:  # type: ignore[no-untyped-def]
+    curve = film("yeoh", (8.0, -0.2, 0.03), noise=0.02, seed=8)
+    one, two = (fit(curve, hypothesis("yeoh"), seed=s) for s in (1, 2))
+    assert one.loss_N == pytest.approx(two.loss_N, rel=1e-6)
+
+
+def test_bad_questions_are_refused(film) -> None:  # type: ignore[no-untyped-def]
+    curve = film("neo_hookean", (7.5,))
+    with pytest.raises(SettingsError, match='no loss called "euclid"'):
+        fit(curve, hypothesis("yeoh"), loss="euclid")
+    with pytest.raises(SettingsError, match="needs the noise of the measurement"):
+        fit(curve, hypothesis("yeoh"), loss="weighted")
+    with pytest.raises(SettingsError, match="4 points cannot fix the 6 parameters"):
+        fit(film("neo_hookean", (7.5,), points=4), hypothesis("ogden"))

@@ -1,0 +1,81 @@
+"""The posterior: what it is made of, and why it is zero where it is."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from bayesmembrane.calibration.posterior import Outcome, Posterior, failure_sentence, tally
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.registry import material
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.mechanics import Status, solve
+from bayesmembrane.physics.mechanics.solution import Curves
+
+
+def at(name: str, films: list[list[float]], ln_sd: float = -4.0) -> np.ndarray:
+    x = material(name).to_coordinates(np.transpose(films)).T
+    return np.column_stack([x, np.full(len(x), ln_sd)])
+
+
+def test_it_is_prior_times_likelihood(film) -> None:  # type: ignore[no-untyped-def]
+    curve = film("yeoh", (8.0, -0.2, 0.03), noise=0.01, stated=True)
+    p, x = Posterior(hypothesis("yeoh"), curve), at("yeoh", [[8.0, -0.2, 0.03], [8.5, -0.1, 0.02]])
+    e = p.evaluate(x)
+    tau = np.exp(-4.0) * np.max(curve.force)
+    for i in range(2):
+        normal = multivariate_normal(e.force[i], np.eye(len(curve)) * (0.01**2 + tau**2))
+        assert e.log_likelihood[i] == pytest.approx(normal.logpdf(curve.force))
+    assert e.log_prior == pytest.approx(p.prior.log_density(x))
+    assert e.log_posterior == pytest.approx(e.log_prior + e.log_likelihood)
+    assert p.pointwise(x, e.force).sum(axis=1) == pytest.approx(e.log_likelihood)
+    assert p.log_prior(x) == pytest.approx(e.log_prior)
+    assert p.log_likelihood(x) == pytest.approx(e.log_likelihood)
+
+
+def test_what_cannot_be_has_a_reason(film) -> None:  # type: ignore[no-untyped-def]
+    curve = film("neo_hookean", (7.5,))
+    locked = Posterior(hypothesis("gent"), curve).evaluate(at("gent", [[7.5, 2.0], [7.5, 50.0]]))
+    assert list(locked.outcome) == [Outcome.LOCKED, Outcome.OK]
+    assert locked.log_likelihood[0] == -np.inf
+    assert np.isfinite(locked.log_posterior[1])
+    films = at("mooney_rivlin", [[3.0, 4.5], [7.0, 0.1]])
+    bent = Posterior(hypothesis("mooney_rivlin"), curve).evaluate(films)
+    assert list(bent.outcome) == [Outcome.NOT_CONVEX, Outcome.OK]
+    assert bent.log_prior[0] == -np.inf
+    free = Posterior(hypothesis("mooney_rivlin", convexity="none"), curve).evaluate(films)
+    assert np.all(np.isfinite(free.log_posterior))
+    assert tally(bent.outcome) == {"not convex": 1, "ok": 1}
+
+
+def test_a_numerical_failure_is_counted_and_not_taken_for_physics(film) -> None:  # type: ignore[no-untyped-def]
+    def failing(*args: object, **options: object) -> Curves:
+        curves = solve(*args, **options)  # type: ignore[arg-type]
+        status = curves.status.copy()
+        status[0, -1] = Status.UNRESOLVED
+        return replace(curves, status=status, force=np.where(status == Status.OK, curves.force, np.nan))
+
+    curve = film("neo_hookean", (7.5,))
+    p = Posterior(hypothesis("gent"), curve, failing)  # type: ignore[arg-type]
+    e = p.evaluate(at("gent", [[7.5, 50.0], [7.5, 60.0]]))
+    assert list(e.outcome) == [Outcome.UNRESOLVED, Outcome.OK]
+    assert e.log_likelihood[0] == -np.inf
+
+
+def test_failures_are_told_from_a_tenth_of_a_percent() -> None:
+    assert failure_sentence(Counter({"ok": 9990, "unresolved": 10})) == ""
+    assert failure_sentence(Counter({"ok": 1000, "locked": 500})) == ""
+    sentence = failure_sentence(Counter({"ok": 9970, "unresolved": 20, "iteration limit": 10}))
+    assert sentence.startswith("30 of 10000 draws (0.3 %)")
+
+
+def test_more_parameters_than_points_are_refused(film) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(SettingsError, match="4 points cannot fix the 6 parameters of ogden"):
+        Posterior(hypothesis("ogden"), film("neo_hookean", (7.5,), points=4))
+
+
+def test_noise_that_is_switched_off_must_be_stated(film) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(SettingsError, match="no noise at all"):
+        Posterior(hypothesis("yeoh", extra_noise=False), film("neo_hookean", (7.5,)))

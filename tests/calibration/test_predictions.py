@@ -1,0 +1,153 @@
+"""The digest says what the draws say."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayesmembrane.calibration.beside_paper import BreakPoint
+from bayesmembrane.calibration.predictions import FILE, Digest, digest, digest_draws, load_digest
+from bayesmembrane.calibration.run import Run, sample
+from bayesmembrane.calibration.sampling.walk import Settings
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.materials.gent import Gent
+from bayesmembrane.physics.mechanics import solve
+from bayesmembrane.physics.mechanics.api import force_curve
+from bayesmembrane.physics.rigs.annulus import Annulus
+
+AT = np.linspace(0.004, 0.030, 7)
+SD = 5e-3
+
+
+def measured(**changes: object) -> Measurement:
+    force = force_curve("gent", (7.5, 40.0), AT)[0]
+    arguments: dict[str, object] = {"force_sd": np.full(AT.size, SD), "full_range": 0.04, **changes}
+    return Measurement(AT, force, Annulus(0.010, 0.035), Specimen("film", 50e-6), **arguments)  # type: ignore[arg-type]
+
+
+def gent(limits: list[float], noise: float = -20.0) -> np.ndarray:
+    """Coordinates of Gent films of one modulus with these limits of I1 - 3."""
+    return np.array([[np.log(15.0), np.log(jm), noise] for jm in limits])
+
+
+def made(x: np.ndarray, **options: object) -> Digest:
+    return digest_draws(hypothesis("gent"), measured(), x, **options)  # type: ignore[arg-type]
+
+
+def test_bands_are_quantiles_of_the_curves_and_the_end_of_the_fit_is_on_the_grid() -> None:
+    found = made(gent([40.0] * 8), up_to=0.05)
+    assert found.deflection[-1] == pytest.approx(0.05)
+    assert np.any(np.isclose(found.deflection, 0.030, rtol=1e-12))
+    assert np.array_equal(found.beyond, found.deflection > 0.030 * (1 + 1e-9))
+    exact = force_curve("gent", (7.5, 40.0), found.deflection)[0]
+    np.testing.assert_allclose(found.curve, np.broadcast_to(exact, found.curve.shape), rtol=1e-6)
+    np.testing.assert_allclose(found.residual, 0.0, atol=1e-6)
+
+
+def test_bands_hold_the_truth_and_widen_beyond_the_fit() -> None:
+    """A film that is shot, fitted over two thirds of the range by the other solver."""
+
+    def shot(at: np.ndarray) -> np.ndarray:
+        return solve(Gent, [5.3, 14.0], at, inner_radius=0.010, outer_radius=0.035, solver="shooting").force[0]
+
+    at = np.linspace(5e-3, 0.09, 14)
+    force = shot(at) + 0.02 * np.random.default_rng(8).standard_normal(at.size)
+    part = Measurement(at, force, Annulus(0.010, 0.035), Specimen("film", 50e-6)).up_to(0.06)
+    claim = hypothesis("gent")
+    found = digest_draws(claim, part, sample(part, claim, seed=5).draws())
+    low, middle, high = found.curve
+    truth, inner = shot(found.deflection), ~found.beyond
+    sd = (high - low) / (2 * 1.645)
+    assert np.all(np.abs(truth - middle)[inner] < 3 * sd[inner])
+    assert np.all((found.repeat[0][inner] <= low[inner]) & (high[inner] <= found.repeat[2][inner]))
+    width = (high - low) / middle
+    assert width[-1] > 3 * np.max(width[inner][-5:])
+
+
+def test_a_new_measurement_carries_the_stated_noise_and_the_inferred_one() -> None:
+    bare = made(gent([40.0] * 400))
+    width = (bare.repeat[2] - bare.repeat[0]) / (2 * 1.645)
+    assert np.mean(width) == pytest.approx(SD, rel=0.1)
+    scale = float(np.max(measured().force))
+    more = made(gent([40.0] * 400, noise=float(np.log(0.02 / scale))))
+    assert np.mean((more.repeat[2] - more.repeat[0]) / (2 * 1.645)) == pytest.approx(np.hypot(SD, 0.02), rel=0.1)
+
+
+def test_draws_that_lock_are_counted_by_reason_and_bands_end_where_most_have_no_force() -> None:
+    found = made(gent([200.0] * 4 + [9.0] * 6), up_to=0.09)
+    assert found.reasons == ("locked",)
+    assert found.lost_share[0] == 0.0
+    assert found.lost_share[-1] == pytest.approx(0.6)
+    assert np.all(np.isnan(found.curve[:, -1]))
+    assert np.all(np.isfinite(found.curve[:, ~found.beyond]))
+
+
+def test_thickness_scales_the_force_at_break() -> None:
+    breaks = [BreakPoint("a", 50e-6, 0.030, 1.0), BreakPoint("b", 200e-6, 0.030, 1.0), BreakPoint("c", 50e-6, 0.2, 1.0)]
+    found = made(gent([40.0] * 3), breaks=breaks)
+    assert found.break_predicted[1, 1] == pytest.approx(4 * found.break_predicted[1, 0])
+    assert found.break_lost.tolist() == [0.0, 0.0, 1.0]
+    assert np.all(np.isnan(found.break_predicted[:, 2]))
+    assert found.specimens == ("a", "b", "c")
+
+
+def test_points_that_were_not_used_are_compared_with_predicted_measurements() -> None:
+    at = np.array([0.034, 0.040])
+    force = force_curve("gent", (7.5, 40.0), at)[0]
+    rest = Measurement(at, force, Annulus(0.010, 0.035), Specimen("film", 50e-6), None, np.full(2, SD))
+    found = made(gent([40.0] * 400), rest=rest)
+    assert np.all(found.rest_residual[0] < 0)
+    assert np.all(found.rest_residual[2] > 0)
+    np.testing.assert_allclose((found.rest_residual[2] - found.rest_residual[0]) / (2 * 1.645), SD, rtol=0.2)
+
+
+def test_states_shapes_and_map_belong_to_the_film() -> None:
+    found = made(gent([40.0] * 5))
+    assert found.film == pytest.approx([7.5, 40.0])
+    assert found.shape_at.tolist() == pytest.approx([0.01, 0.02, 0.03, 0.04])
+    assert np.all(found.map_1[0] < found.state_1) and np.all(found.state_1 < found.map_1[-1])  # noqa: PT018
+    np.testing.assert_allclose(found.shape_radius[:, :, [0, -1]], np.broadcast_to([0.010, 0.035], (4, 5, 2)))
+    np.testing.assert_allclose(found.shape_height[:, :, 0], np.repeat(found.shape_at[:, None], 5, axis=1))
+    assert found.convex == {"reached": 1.0, "box": 1.0, "elliptic": 1.0}
+    assert np.nanmin(found.eigenvalue) > 0
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    settings = Settings(ess=1.0, chunk=30, most_steps=30, walkers=16)
+    return sample(measured(), hypothesis("neo_hookean"), out=tmp_path_factory.mktemp("chains"), settings=settings)
+
+
+def test_a_stored_digest_equals_the_one_that_was_computed(run: Run) -> None:
+    assert load_digest(run) is None
+    breaks = (BreakPoint("1", 100e-6, 0.02, 1.0),)
+    fresh = digest(run, breaks=breaks, draws=10)
+    again = load_digest(run)
+    assert again is not None
+    for name, value in vars(fresh).items():
+        if isinstance(value, np.ndarray):
+            np.testing.assert_array_equal(value, getattr(again, name), err_msg=name)
+        else:
+            assert getattr(again, name) == value, name
+    assert again.beyond.dtype == bool
+
+
+def test_other_questions_are_computed_anew_and_none_reads_back(run: Run) -> None:
+    digest(run, up_to=0.06, draws=10)
+    assert digest(run).deflection[-1] == pytest.approx(0.06)
+    assert digest(run, up_to=0.05, draws=10).deflection[-1] == pytest.approx(0.05)
+    assert digest(run).deflection[-1] == pytest.approx(0.05)
+
+
+def test_a_digest_of_other_draws_does_not_count(run: Run) -> None:
+    digest(run, up_to=0.05, draws=10)
+    other = Run(run.name, run.path, run.settings, {**run.status, "evaluations": 1}, run.data)
+    assert load_digest(other) is None
+
+
+def test_a_damaged_digest_is_named(run: Run, tmp_path: Path) -> None:
+    (tmp_path / FILE).write_bytes(b"no netCDF")
+    with pytest.raises(StorageError, match=r"the digest is damaged"):
+        load_digest(Run(run.name, tmp_path, run.settings, run.status, run.data))

@@ -1,0 +1,224 @@
+"""Hypotheses side by side: rows, ranking, words, and what is stored and used again."""
+
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayesmembrane.calibration.prior import Mass
+from bayesmembrane.comparison import jobs as comparison_jobs
+from bayesmembrane.comparison.compare import claimed, compare, ranges_of
+from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, together
+from bayesmembrane.comparison.evidence.target import Estimate
+from bayesmembrane.comparison.leave_out.score import LeaveOneOut
+from bayesmembrane.comparison.prior_widths import Widened
+from bayesmembrane.comparison.result import Row, ranked
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.registry import material
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.mechanics import api
+from bayesmembrane.physics.rigs.annulus import Annulus
+
+
+def film(name: str = "gent", parameters: tuple[float, ...] = (7.0, 20.0), end: float = 0.06) -> Measurement:
+    deflection = np.linspace(end / 10, end, 10)
+    kind = material(name)
+    force = api.solve(kind, np.array([parameters]), deflection, inner_radius=0.01, outer_radius=0.035).force[0]
+    noise = 0.005 * np.max(force) * np.random.default_rng(401).standard_normal(10)
+    return Measurement(deflection, force + noise, Annulus(0.01, 0.035), Specimen("film", 5e-5))
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory):
+    out, told = tmp_path_factory.mktemp("chains"), []
+    claims = [hypothesis(n) for n in ("neo_hookean", "gent")]
+    whole = film()
+    found = compare(
+        whole.up_to(0.049),
+        claims,
+        seed=402,
+        out=out,
+        ess=300,
+        whole=whole,
+        modes=False,
+        workers=1,
+        progress=lambda *words: told.append(words),
+    )
+    return found, out, told, claims, whole
+
+
+def test_the_right_material_wins_and_every_field_is_there(compared):
+    found, _, told, _, _ = compared
+    assert found.agreed, found.reason
+    rows = {r.label: r for r in found.rows}
+    assert list(rows) == ["neo_hookean", "gent"]
+    assert [r.label for r in found.ranking] == ["gent", "neo_hookean"]
+    assert sum(r.posterior_probability for r in found.rows) == pytest.approx(1.0)
+    assert rows["gent"].posterior_probability > 0.9
+    assert rows["gent"].prior_mass.value > 0.5
+    assert rows["gent"].rest.rmse_N < rows["neo_hookean"].rest.rmse_N
+    assert found.sentence.startswith("The evidence prefers gent to neo_hookean by ")
+    assert {label for label, _ in told} == set(rows)
+    assert any("nested sampling" in text for _, text in told)
+    document = found.summary()
+    json.dumps(document, allow_nan=False)
+    row = document["table"][1]
+    assert set(row["log_evidence"]) == set(row["log_evidence_sd"]) == {NESTED, BRIDGE}
+    for name in ("elpd_loo", "loo_se", "prior_mass", "posterior_probability"):
+        assert isinstance(row[name], float)
+    assert len(row["prior_widths"]) == 3 * len(rows["gent"].hypothesis.parameters)
+
+
+def test_what_is_stored_is_used_again(compared, monkeypatch):
+    found, out, _, claims, whole = compared
+
+    def never(*_args, **_options):
+        raise AssertionError("computed again")
+
+    for name in ("nested", "bridge", "leave_one_out", "prior_widths", "leave_range_out"):
+        monkeypatch.setattr(comparison_jobs, name, never)
+    again = compare(whole.up_to(0.049), claims, seed=402, out=out, ess=300, whole=whole, modes=False, workers=1)
+    assert again.summary() == found.summary()
+    with pytest.raises(AssertionError, match="computed again"):
+        compare(whole.up_to(0.049), claims, seed=403, out=None, ess=300, modes=False, workers=1)
+
+
+def test_a_damaged_result_is_made_again(tmp_path):
+    calls = []
+    make = lambda: calls.append(1) or {"x": np.float64(np.nan), "y": np.array([1.0, np.inf])}  # noqa: E731
+    first = comparison_jobs._kept(tmp_path, "piece", "a", make)
+    assert comparison_jobs._kept(tmp_path, "piece", "a", make) == first
+    assert len(calls) == 1
+    (tmp_path / "piece.json").write_text("{")
+    assert comparison_jobs._kept(tmp_path, "piece", "a", make) == first
+    comparison_jobs._kept(tmp_path, "piece", "b", make)
+    assert len(calls) == 3
+
+
+def test_a_hypothesis_that_cannot_be_fitted_does_not_spoil_the_others(monkeypatch):
+    """One whose prior has no mass, one with more parameters than points: each has a row that says why."""
+    mass = comparison_jobs._mass
+
+    def none_for_gent(posterior, seed):
+        return Mass(0.0, 5e-4) if posterior.hypothesis.material.name == "gent" else mass(posterior, seed)
+
+    monkeypatch.setattr(comparison_jobs, "_mass", none_for_gent)
+    m = film("neo_hookean", (7.0,), 0.03).select(np.arange(4))
+    claims = [hypothesis(n) for n in ("neo_hookean", "gent", "ogden")]
+    found = compare(m, claims, seed=405, out=None, ess=200, modes=False, workers=1)
+    rows = {r.label: r for r in found.rows}
+    assert rows["neo_hookean"].fitted
+    assert rows["neo_hookean"].posterior_probability == 1.0
+    assert "leaves none of the prior draws" in rows["gent"].reason
+    assert rows["gent"].prior_mass.value == 0.0
+    assert "4 points cannot fix" in rows["ogden"].reason
+    assert all(rows[n].posterior_probability is None and not rows[n].fitted for n in ("gent", "ogden"))
+    assert found.agreed
+    assert found.sentence == "There are not two hypotheses to choose between."
+    json.dumps(found.summary(), allow_nan=False)
+
+
+def test_two_processes_say_what_one_says(compared):
+    found, out, _, claims, whole = compared
+    again = compare(whole.up_to(0.049), claims, seed=402, out=out, ess=300, whole=whole, modes=False, workers=2)
+    assert again.summary() == found.summary()
+
+
+def test_names_must_differ():
+    with pytest.raises(SettingsError, match="twice"):
+        compare(film(), [hypothesis("gent"), hypothesis("gent")])
+    with pytest.raises(SettingsError, match="no hypothesis"):
+        compare(film(), [])
+
+
+# ---- ranking and words -----------------------------------------------------------------------------------------------
+
+
+def row(label: str, z: float, elpd: float, sd: float = 0.1, off: float = 0.0) -> Row:
+    rng = np.random.default_rng(len(label))
+    points = elpd / 10 + 0.05 * rng.standard_normal(10)
+    points += elpd / 10 - points.mean()
+    loo = LeaveOneOut(elpd, 1.0, 0.01, points, np.zeros(10), ())
+    pair = {NESTED: Estimate(z + off, sd, 1, 1.0), BRIDGE: Estimate(z, 0.01, 1, 1.0)}
+    return Row(label, hypothesis("gent"), together(pair), loo)
+
+
+def test_no_ranking_without_agreement():
+    found = ranked([row("one", -10, 5), row("other", -12, 3, off=2.0)])
+    assert not found.agreed
+    assert found.ranking == ()
+    assert "other: Nested sampling and bridge sampling differ by 2.00" in found.reason
+    assert all(r.posterior_probability is None for r in found.rows)
+    assert found.sentence.startswith("The evidence gives no ranking; leave-one-out prefers one to other by 2.0")
+
+
+def test_words_for_agreement_and_disagreement_of_evidence_and_prediction():
+    same = ranked([row("one", -10, 5), row("other", -15, 3)])
+    assert "leave-one-out prefers it too, to other by 2.0" in same.sentence
+    apart = ranked([row("one", -10, 3), row("other", -15, 5)])
+    assert "evidence and prediction disagree" in apart.sentence
+    close = ranked([row("one", -10, 5.0), row("other", -15, 5.02)])
+    assert "prediction does not contradict the evidence" in close.sentence
+    little = ranked([row("one", -10, 5), row("other", -10.5, 3)])
+    assert "which decides little" in little.sentence
+
+
+def test_probabilities_follow_the_evidence():
+    rows = ranked([row("one", -10, 5), row("other", -11, 3)]).rows
+    assert rows[0].posterior_probability == pytest.approx(1 / (1 + np.exp(-1)), abs=0.01)
+    unknown = replace(row("third", -9, 1), evidence=None, reason="it cannot be fitted")
+    with_unknown = ranked([*rows, unknown])
+    assert with_unknown.agreed
+    assert with_unknown.rows[2].posterior_probability is None
+    assert with_unknown.rows[0].posterior_probability == pytest.approx(rows[0].posterior_probability)
+
+
+def test_another_look_is_taken_where_chance_may_have_parted_the_estimators(compared, monkeypatch, tmp_path):
+    """Nested sampling that is off by three of its errors is repeated, and both are averaged."""
+    _, out, _, claims, whole = compared
+    shutil.copytree(out, tmp_path / "chains")
+    for name in ("nested", "bridge"):
+        for stored in (tmp_path / "chains").glob(f"*/{name}.json"):
+            stored.unlink()
+    looks = [Estimate(-10.3, 0.1, 5, 1.0, (-10.3,)), Estimate(-10.0, 0.1, 7, 1.0, (-10.0,))]
+    monkeypatch.setattr(comparison_jobs, "_nested", lambda *_: looks.pop(0))
+    monkeypatch.setattr(comparison_jobs, "_bridged", lambda *_: Estimate(-10.0, 0.01, 1, 1.0))
+    monkeypatch.setattr(comparison_jobs, "_mass", lambda *_: Mass(1.0, 0.0))
+    part = whole.up_to(0.049)
+    (row_,) = compare(part, claims[1:], 402, out=tmp_path / "chains", ess=300, modes=False, workers=1).rows
+    assert row_.evidence.log_evidence[NESTED] == pytest.approx(-10.15)
+    assert row_.evidence.log_evidence_sd[NESTED] == pytest.approx(0.15, abs=0.001)
+    assert row_.evidence.evaluations[NESTED] == 12
+    assert row_.evidence.agreed
+    assert looks == []
+
+
+def test_the_ranking_is_said_to_survive_other_priors_or_not():
+    widths = (Widened("gent.ln_jm", 2.0, -1.0, 0.1, 500.0, ""),)
+    one, other = replace(row("one", -10, 5), widths=widths), row("other", -15, 3)
+    assert "stays first" in ranked([one, other]).survival
+    assert "falls to 4.0 at worst, with the prior of gent.ln_jm 2 times as wide" in ranked([one, other]).survival
+    rising = replace(other, widths=(replace(widths[0], change=6.0),))
+    assert "is lost by 1.0" in ranked([one, rising]).survival
+
+
+def test_hypotheses_are_named_with_their_effects():
+    plain, both = claimed("yeoh, gent+prestretch", "", "white", "reached")
+    assert plain.label() == "yeoh"
+    assert both.label() == "gent+prestretch"
+    assert [h.label() for h in claimed("yeoh,gent+prestretch", "prestretch", "white", "reached")] == [
+        "yeoh+prestretch",
+        "gent+prestretch",
+    ]
+
+
+def test_ranges_are_parts_of_the_whole():
+    whole = film()
+    found = ranges_of(whole, [0.03, 0.06])
+    assert list(found) == ["up to 30 mm", "up to 60 mm"]
+    assert found["up to 30 mm"].whole is whole
+    assert found["up to 60 mm"].whole is None
+    assert len(found["up to 30 mm"].measurement) == 5

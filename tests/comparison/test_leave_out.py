@@ -1,0 +1,143 @@
+"""Leave-one-out and leave-range-out against sums over a grid, for a material of one modulus and correlated noise."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+
+from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.run import sample
+from bayesmembrane.comparison.leave_out import score as pc
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.registry import material
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.mechanics import api
+from bayesmembrane.physics.rigs.annulus import Annulus
+
+SEED = 301
+
+
+@cache
+def measured(noise: str = "correlated") -> Measurement:
+    """A neo-Hookean film with a softening that its model does not know, and one outlier."""
+    rng = np.random.default_rng(SEED)
+    deflection = np.linspace(4e-3, 48e-3, 12)
+    kind = material("yeoh")
+    force = api.solve(kind, np.array([[8.0, -0.3, 0.02]]), deflection, inner_radius=0.01, outer_radius=0.035).force[0]
+    place = np.arange(12)
+    covariance = 0.02**2 * (0.8 ** np.abs(place[:, None] - place) + 0.3 * np.eye(12))
+    if noise == "none":
+        covariance = None
+        force = force + 0.02 * rng.standard_normal(12)
+    else:
+        force = force + np.linalg.cholesky(covariance) @ rng.standard_normal(12)
+    force[4] += 0.3
+    return Measurement(deflection, force, Annulus(0.01, 0.035), Specimen("film", 5e-5), covariance=covariance)
+
+
+@cache
+def posterior(noise: str = "correlated") -> Posterior:
+    return Posterior(hypothesis("neo_hookean"), measured(noise))
+
+
+@cache
+def run(noise: str = "correlated"):
+    return sample(measured(noise), hypothesis("neo_hookean"), seed=SEED, ess=1500)
+
+
+@cache
+def grid(noise: str = "correlated"):
+    """Points (B, 2) and ln of their posterior weights (B,)."""
+    draws = run(noise).draws()
+    centre, sd = draws.mean(axis=0), draws.std(axis=0)
+    # Without its outlier the film is found with much less noise than with it.
+    film = np.linspace(centre[0] - 9 * sd[0], centre[0] + 9 * sd[0], 601)
+    spread = np.linspace(-13.0, centre[1] + 9 * sd[1], 241)
+    x = np.stack([a.ravel() for a in np.meshgrid(film, spread, indexing="ij")], axis=1)
+    value = posterior(noise).evaluate(x)
+    return x, value.log_posterior - logsumexp(value.log_posterior), value.force
+
+
+@pytest.mark.parametrize("noise", ["correlated", "none"])
+def test_every_point_left_out_agrees_with_the_grid(noise):
+    x, weight, force = grid(noise)
+    terms = posterior(noise).pointwise(x, force)
+    exact = -logsumexp(weight[:, None] - terms, axis=0)
+    found = pc.leave_one_out(posterior(noise), run(noise).data, seed=1)
+    # The outlier, fifteen orders of e away, is known within a tenth of its logarithm, all others within 0.1.
+    assert np.all(np.abs(found.pointwise - exact) < 0.1 + 0.1 * np.maximum(-exact, 0.0))
+    assert abs(found.elpd - np.sum(exact)) < 1.5
+    assert found.se == pytest.approx(np.sqrt(12 * np.var(exact)), rel=0.1)
+    assert found.pareto_k.shape == (12,)
+
+
+def test_leaving_out_a_point_is_fitting_the_others():
+    """The weights 1 / p(y_i | y_-i, x) leave the posterior of the other points under their own covariance."""
+    x, _, force = grid()
+    m, p, i = measured(), posterior(), 4
+    others = np.arange(12) != i
+    part = m.select(others)
+    log_likelihood = np.empty(len(x))
+    noise = p.hypothesis.noise.bind(m)
+    for b in range(0, len(x), 997):
+        covariance = noise.covariance(p.hypothesis.noise_coordinates(x[b : b + 1])[0])[np.ix_(others, others)]
+        r = part.force - force[b, others]
+        log_likelihood[b] = (
+            -0.5 * r @ np.linalg.solve(covariance, r) - 0.5 * np.linalg.slogdet(2 * np.pi * covariance)[1]
+        )
+    rows = np.arange(0, len(x), 997)
+    whole = p.log_likelihood(x[rows])
+    assert log_likelihood[rows] == pytest.approx(whole - p.pointwise(x[rows], force[rows])[:, i], rel=1e-6)
+
+
+def test_exact_refits_agree_with_the_grid(monkeypatch):
+    monkeypatch.setattr(pc, "PARETO_K", -np.inf)
+    x, weight, force = grid()
+    exact = -logsumexp(weight[:, None] - posterior().pointwise(x, force), axis=0)
+    found = pc.leave_one_out(posterior(), run().data, seed=2)
+    assert found.refitted == tuple(range(12))
+    # The outlier, fifteen orders of e away, is known within a tenth of its logarithm, all others within 0.1.
+    assert np.all(np.abs(found.pointwise - exact) < 0.1 + 0.1 * np.maximum(-exact, 0.0))
+    assert abs(found.elpd - np.sum(exact)) < 1.5
+
+
+@pytest.mark.parametrize("noise", ["correlated", "none"])
+def test_the_rest_of_the_range_agrees_with_the_grid(noise):
+    whole = measured(noise)
+    part = whole.up_to(0.030)
+    claim = hypothesis("neo_hookean")
+    p = Posterior(claim, part)
+    draws = sample(part, claim, seed=SEED, ess=1500).draws()
+    found = pc.leave_range_out(p, draws, whole)
+    centre, sd = draws.mean(axis=0), draws.std(axis=0)
+    axes = [np.linspace(c - 8 * s, c + 8 * s, 161) for c, s in zip(centre, sd, strict=True)]
+    x = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")], axis=1)
+    # p(y_h | y_f) = integral of p0 p(y_f, y_h | x) / integral of p0 p(y_f | x), with the same noise in N.
+    same_noise = x.copy()
+    same_noise[:, 1] += np.log(np.max(np.abs(part.force)) / np.max(np.abs(whole.force)))
+    both = p.log_prior(x) + Posterior(claim, whole).log_likelihood(same_noise)
+    first = p.log_prior(x) + p.log_likelihood(x)
+    exact = logsumexp(both) - logsumexp(first)
+    assert found.elpd == pytest.approx(exact, abs=4 * found.monte_carlo_sd + 0.05)
+    assert found.points == len(whole) - len(part)
+    assert found.lost == 0.0
+    assert found.rmse_N <= found.max_N
+    assert found.effective > 1
+
+
+def test_there_must_be_a_rest():
+    with pytest.raises(SettingsError, match="whole range"):
+        pc.leave_range_out(posterior(), run().draws(), measured())
+
+
+def test_draws_without_a_curve_predict_nothing():
+    """A Gent film that locks before the held-out deflections has probability zero there, and says so."""
+    whole = measured("none")
+    p = Posterior(hypothesis("gent"), whole.up_to(0.030))
+    x = np.tile([np.log(16.0), np.log(0.9), -4.0], (50, 1))
+    found = pc.leave_range_out(p, x, whole)
+    assert found.lost == 1.0
+    assert found.elpd < -1e3 or found.elpd == -np.inf
+    assert np.isnan(found.rmse_N)

@@ -1,0 +1,45 @@
+"""Synthetic films, from the slow textbook solver and not from the one that calibrates."""
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.ground.registry import material
+from bayesmembrane.physics.mechanics.reference import force_curve
+from bayesmembrane.physics.rigs.annulus import Annulus
+
+INNER, OUTER = 0.010, 0.035
+
+
+@cache
+def _force(name: str, parameters: tuple[float, ...], end: float, points: int) -> tuple[np.ndarray, np.ndarray]:
+    deflection = np.linspace(end / points, end, points)
+    return deflection, force_curve(material(name)(*parameters), deflection, INNER, OUTER, rtol=1e-9)
+
+
+Film = Callable[..., Measurement]
+
+
+@pytest.fixture
+def film() -> Film:
+    """film(material, parameters, end in m, points, noise in N, seed, stated=False): a measured curve."""
+
+    def make(
+        name: str,
+        parameters: tuple[float, ...],
+        *,
+        end: float = 0.05,
+        points: int = 12,
+        noise: float = 0.0,
+        seed: int = 0,
+        stated: bool = False,
+    ) -> Measurement:
+        deflection, force = _force(name, parameters, end, points)
+        error = noise * np.random.default_rng(seed).standard_normal(points)
+        sd = np.full(points, noise) if stated else None
+        return Measurement(deflection, force + error, Annulus(INNER, OUTER), Specimen("synthetic", 5e-5), force_sd=sd)
+
+    return make

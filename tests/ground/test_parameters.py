@@ -1,0 +1,25 @@
+"""Priors: normalised densities that agree with their distributions."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from bayesmembrane.ground.parameters import HalfNormal, LogNormal, Normal, Prior, Uniform
+
+PRIORS = [Normal(1.0, 2.0), Uniform(-1.0, 3.0), HalfNormal(0.3), HalfNormal(0.02, 1.0), LogNormal(2.0, 0.7)]
+
+
+@pytest.mark.parametrize("prior", PRIORS, ids=str)
+def test_density_is_that_of_the_distribution(prior: Prior) -> None:
+    d = prior.distribution()
+    x = prior.draw(np.random.default_rng(1), 200)
+    assert prior.log_density(x) == pytest.approx(d.logpdf(x), abs=1e-10)
+    low, high = d.ppf([0.0, 1.0])
+    below = low - 1.0 if np.isfinite(low) else -np.inf
+    assert prior.log_density(below) == -np.inf
+    near = prior.quantile([1e-6, 1 - 1e-6])
+    mass, _ = quad(lambda v: float(np.exp(prior.log_density(v))), *near, limit=200)
+    assert mass == pytest.approx(1.0, abs=1e-4)
+    assert prior.quantile(0.5) == pytest.approx(d.median())
+    above = high + 1.0 if np.isfinite(high) else np.inf
+    assert prior.log_density(above) == -np.inf

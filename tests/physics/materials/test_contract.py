@@ -1,0 +1,217 @@
+"""What every material must keep, run over all that the registry finds, third parties' included.
+
+Derivatives and sensitivities are checked against a symbolic derivation from an energy that is written here once more,
+from the literature, without looking at the closed forms.
+"""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+from functools import cache
+
+import mpmath
+import numba
+import numpy as np
+import pytest
+import sympy
+
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.registry import materials
+
+L1, L2 = sympy.symbols("l1 l2", positive=True)
+J = L1 * L2
+I1 = L1**2 + L2**2 + J**-2
+I2 = J**2 + L1**-2 + L2**-2
+C = sympy.symbols("c1:4")
+A = sympy.symbols("a1:4")
+
+ENERGIES = {
+    "neo_hookean": ((C[0],), C[0] * (I1 - 3)),
+    "mooney_rivlin": ((C[0], C[1]), C[0] * (I1 - 3) + C[1] * (I2 - 3)),
+    "gent": ((C[0], C[1]), -C[0] * C[1] * sympy.log(1 - (I1 - 3) / C[1])),
+    "yeoh": (C, sum(c * (I1 - 3) ** (i + 1) for i, c in enumerate(C))),
+    "ogden": (C + A, sum(c / a * (L1**a + L2**a + J**-a - 3) for c, a in zip(C, A, strict=True))),
+}
+
+pytestmark = pytest.mark.parametrize("material", materials().values(), ids=materials().keys())
+
+
+@cache
+def symbolic(name):
+    """Functions of (p..., l1, l2) in arbitrary precision: the six derivatives, and three sensitivities per field."""
+    assert name in ENERGIES, f"write the energy of {name} into ENERGIES"
+    fields, w = ENERGIES[name]
+    first = [w, w.diff(L1), w.diff(L2)]
+    six = [*first, first[1].diff(L1), first[1].diff(L2), first[2].diff(L2)]
+    sens = [[f.diff(p) for f in first] for p in fields]
+    arguments = (*fields, L1, L2)
+    return sympy.lambdify(arguments, six, "mpmath", cse=True), sympy.lambdify(arguments, sens, "mpmath", cse=True)
+
+
+def exact(function, p, l1, l2):
+    with mpmath.workdps(50):
+        rows = function(*(mpmath.mpf(float(v)) for v in (*p, l1, l2)))
+        return np.array([[float(v) for v in r] if isinstance(r, list) else float(r) for r in rows])
+
+
+def draws(material, n, seed=1):
+    """Parameters (n, n_fields) from the prior."""
+    rng = np.random.default_rng(seed)
+    x = np.stack([c.prior.draw(rng, n) for c in material.coordinates])
+    return material.from_coordinates(x).T
+
+
+def films(material, n, seed=1, spread=(0.85, 1.9)):
+    """Parameters (n, n_fields) and stretches (n,), (n,) that exist for them."""
+    rng = np.random.default_rng(seed)
+    p = draws(material, 8 * n, seed)
+    l1, l2 = rng.uniform(*spread, (2, 8 * n))
+    k = l1**2 + l2**2 + (l1 * l2) ** -2.0 - 3
+    keep = np.flatnonzero(k < 0.9 * np.broadcast_to(material.extensibility(p.T), k.shape))[:n]
+    assert len(keep) == n
+    return p[keep], l1[keep], l2[keep]
+
+
+def test_derivatives_are_those_of_the_energy(material):
+    for p, l1, l2 in zip(*films(material, 40), strict=True):
+        expected = exact(symbolic(material.name)[0], p, l1, l2)
+        scale = np.abs(expected) + 1e-3 * np.abs(material.shear_modulus(p))
+        np.testing.assert_array_less(np.abs(material.derivatives(p, l1, l2) - expected) / scale, 1e-11)
+
+
+def test_sensitivities_are_those_of_the_energy(material):
+    for p, l1, l2 in zip(*films(material, 40), strict=True):
+        expected = exact(symbolic(material.name)[1], p, l1, l2)
+        error = np.abs(np.array(material.sensitivities(p, l1, l2)) - expected)
+        np.testing.assert_allclose(error / (np.abs(expected) + 1e-4 * np.abs(expected).max(0)), 0, atol=1e-10)
+
+
+def test_tensions_keep_their_digits_at_small_strain(material):
+    for p, e1, e2 in zip(*films(material, 20, spread=(1.0, 1.001)), strict=True):
+        l1, l2 = 1 + 1e-3 * (e1 - 1) + 1e-6, 1 + 1e-3 * (e2 - 1) + 1e-6
+        expected = exact(symbolic(material.name)[0], p, l1, l2)
+        got = material.derivatives(p, l1, l2)
+        np.testing.assert_allclose(got[1:], expected[1:], rtol=1e-9)
+        np.testing.assert_allclose(got[0], expected[0], rtol=1e-9)
+
+
+def test_compiled_equals_plain(material):
+    # No fused operations here: the same text must give the same numbers to the last bits.
+    six, sens = numba.njit(material.derivatives), numba.njit(material.sensitivities)
+    for p, l1, l2 in zip(*films(material, 20), strict=True):
+        np.testing.assert_allclose(six(p, l1, l2), material.derivatives(p, l1, l2), rtol=1e-12, atol=1e-14 * p[0])
+        np.testing.assert_allclose(sens(p, l1, l2), material.sensitivities(p, l1, l2), rtol=1e-11, atol=1e-13)
+
+
+def test_broadcasts_over_films_and_points(material):
+    p, l1, l2 = films(material, 5)
+    grid = material.derivatives(p.T[:, :, None], l1[:, None], l2[:, None] * np.ones(3))
+    for row in grid:
+        assert np.shape(row) in ((5, 3), (5, 1))
+    for i in range(5):
+        one = [np.asarray(v)[i, 0] for v in grid]
+        np.testing.assert_allclose(one, material.derivatives(p[i], l1[i], l2[i]), rtol=1e-13)
+
+
+def test_isotropy(material):
+    for p, l1, l2 in zip(*films(material, 20), strict=True):
+        w, w1, w2, w11, w12, w22 = material.derivatives(p, l1, l2)
+        mirror = material.derivatives(p, l2, l1)
+        np.testing.assert_allclose((w, w2, w1, w22, w12, w11), mirror, rtol=1e-11)
+
+
+def test_rest_is_free_of_energy_and_stress(material):
+    for p in draws(material, 20):
+        w, w1, w2, *_ = material.derivatives(p, 1.0, 1.0)
+        assert (w, w1, w2) == (0.0, 0.0, 0.0)
+
+
+def test_initial_stiffness_is_the_shear_modulus(material):
+    for p in draws(material, 20):
+        *_, w11, w12, w22 = material.derivatives(p, 1.0, 1.0)
+        np.testing.assert_allclose((w11, 2 * w12, w22), 4 * material.shear_modulus(p), rtol=1e-12)
+
+
+def test_scales_say_what_is_proportional_to_the_modulus(material):
+    for p, l1, l2 in zip(*films(material, 10), strict=True):
+        scaled = p * np.where(np.array(material.scales) == 1, 3.7, 1.0)
+        expected = 3.7 * np.array(material.derivatives(p, l1, l2))
+        np.testing.assert_allclose(material.derivatives(scaled, l1, l2), expected, rtol=1e-12)
+        assert material.extensibility(scaled) == material.extensibility(p)
+
+
+def test_does_not_exist_beyond_its_limit(material):
+    p = draws(material, 20)
+    limit = np.broadcast_to(material.extensibility(p.T), 20)
+    compiled = numba.njit(material.derivatives)
+    for q, k in zip(p[np.isfinite(limit)], limit[np.isfinite(limit)], strict=True):
+        beyond = np.sqrt(k + 3.0)
+        with np.errstate(invalid="ignore"):
+            assert np.isnan(material.derivatives(q, beyond, beyond)).all()
+            assert np.isnan(material.sensitivities(q, beyond, beyond)).all()
+        assert np.isnan(compiled(q, beyond, beyond)).all()
+
+
+def test_coordinates_round_trip(material):
+    rng = np.random.default_rng(3)
+    x = np.stack([c.prior.draw(rng, (7, 30)) for c in material.coordinates])
+    p = material.from_coordinates(x)
+    assert p.shape == (len(material.field_names()), 7, 30)
+    np.testing.assert_allclose(material.to_coordinates(p), x, rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(material.shear_modulus(p), np.exp(x[0]), rtol=1e-12)
+
+
+def test_coordinates_are_declared(material):
+    first, *_ = material.coordinates
+    assert first.name == "ln_gd"
+    assert len({c.name for c in material.coordinates}) == len(material.coordinates) == len(material.field_names())
+    for c in material.coordinates:
+        assert c.unit
+        assert len(c.meaning) > 5
+        low, high = c.prior.quantile([0.001, 0.999])
+        assert c.bounds[0] < low < high < c.bounds[1], "an optimiser must be free to search where the prior lives"
+        x = np.linspace(low, high, 20001)
+        np.testing.assert_allclose(np.trapezoid(np.exp(c.prior.log_density(x)), x), 0.998, rtol=1e-4)
+
+
+def test_no_modulus_no_coordinates(material):
+    p = draws(material, 3).T
+    p[np.array(material.scales) == 1] *= -1.0
+    assert np.isnan(material.to_coordinates(p)[0]).all()
+
+
+def test_3d_constants_round_trip(material):
+    for p in draws(material, 5):
+        film = material.from_vector(p)
+        back = material.from_3d(film.to_3d(50e-6), 50e-6)
+        np.testing.assert_allclose(back.vector, film.vector, rtol=1e-14)
+        twice = material.from_3d(film.to_3d(50e-6), 100e-6)
+        np.testing.assert_allclose(twice.shear_modulus(twice.vector), 2 * film.shear_modulus(film.vector), rtol=1e-14)
+
+
+def test_pickles_and_compares(material):
+    film = material.from_vector(draws(material, 1)[0])
+    again = pickle.loads(pickle.dumps(film))
+    assert again == film
+    assert hash(again) == hash(film)
+    np.testing.assert_array_equal(again.hessian(1.2, 1.1), film.hessian(1.2, 1.1))
+
+
+def test_documents_itself(material):
+    assert not inspect.isabstract(material)
+    assert "W =" in inspect.getdoc(material)
+    assert "G d" in inspect.getdoc(material)
+    assert material.title
+    assert any(c.isdigit() for c in material.reference), "a reference has a year"
+    assert len(material.units) == len(material.scales) == len(material.field_names())
+    assert set(material.scales) <= {0, 1}
+    for unit, scale in zip(material.units, material.scales, strict=True):
+        assert unit == ("N/m" if scale else "-")
+
+
+@pytest.mark.parametrize("bad", [[], [1.0] * 9, ["nan"]])
+def test_wrong_parameters_are_refused_in_a_sentence(material, bad):
+    values = [float("nan")] * len(material.field_names()) if bad == ["nan"] else bad
+    with pytest.raises(SettingsError, match=r"parameters"):
+        material.from_vector(values)

@@ -1,0 +1,118 @@
+"""The compiled shooting solver against SciPy alone, its own residuals, and the branches it must not land on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesmembrane.physics.materials.gent import Gent
+from bayesmembrane.physics.materials.mooney_rivlin import MooneyRivlin
+from bayesmembrane.physics.materials.neo_hookean import NeoHookean
+from bayesmembrane.physics.materials.ogden import Ogden
+from bayesmembrane.physics.materials.yeoh import Yeoh
+from bayesmembrane.physics.mechanics import Status, solve
+from bayesmembrane.physics.mechanics.reference import force_curve
+from bayesmembrane.physics.mechanics.ritz import solver as ritz
+from bayesmembrane.physics.mechanics.shooting import solver as shooting
+from tests.physics.mechanics.films import (
+    FIFTEEN,
+    INNER,
+    MM,
+    OUTER,
+    RADII,
+    WIDE,
+    asked,
+    every_material,
+    prior_draws,
+    silicone,
+)
+
+
+@every_material
+def test_shooting_equals_solve_ivp_and_root(material):
+    few = FIFTEEN[[0, 4, 9, 14]]
+    slow = force_curve(material.from_vector(silicone(material)), few, INNER, OUTER, rtol=1e-9)
+    assert shooting.solve(asked(material, silicone(material), few)).force[0] == pytest.approx(slow, rel=1e-7)
+
+
+@every_material
+@pytest.mark.parametrize("prestretch", [1.0, 1.001, 1.3])
+def test_first_integral_is_constant_and_boundary_values_are_met(material, prestretch):
+    p = silicone(material)
+    question = asked(material, p, WIDE[1:-2], prestretch)
+    assert np.all(shooting.solve(question).variation < 1e-7)
+    found, lines = np.empty((WIDE.size - 3, 3)), np.empty((WIDE.size - 2, 12))
+    span = np.log(question.ratio)
+    shooting.compiled(material).shoot(question.scaled[0], 2.0, prestretch, span, p, 1e-9, found, lines)
+    k = shooting.kernels
+    assert np.all(lines[:-1, [k.MISS_1, k.MISS_2]] < 1e-6)
+    assert np.all(np.isnan(lines[-1])), "a path that does not end has no last state"
+
+
+@every_material
+def test_tolerance_does_not_matter(material):
+    question = asked(material, prior_draws(material, 10, seed=201), FIFTEEN)
+    normal, tight = shooting.solve(question), shooting.solve(question, rtol=1e-12)
+    both = normal.ok & tight.ok
+    assert np.any(both)
+    assert normal.force[both] == pytest.approx(tight.force[both], rel=1e-7)
+    assert normal.slope[both] == pytest.approx(tight.slope[both], rel=1e-5)
+
+
+@every_material
+def test_slope_is_the_derivative_of_the_force(material):
+    d, h = np.array([5.0, 20.0, 60.0, 85.0]) * MM, 1e-4
+
+    def at(factor):
+        return shooting.solve(asked(material, silicone(material), d * factor), rtol=1e-11)
+
+    f = [at(1 + k * h).force for k in (-2, -1, 1, 2)]
+    assert at(1.0).slope == pytest.approx((8 * (f[2] - f[1]) - (f[3] - f[0])) / (12 * h * d), rel=1e-7)
+
+
+@pytest.mark.parametrize("material", [NeoHookean, Ogden])
+def test_sensitivities_agree_with_those_of_the_ritz_solver(material):
+    question = asked(material, silicone(material), FIFTEEN[::5], 1.02)
+    one, other = shooting.solve(question, sensitivities=True), ritz.solve(question, sensitivities=True)
+    scale = np.abs(other.sensitivity).max(axis=1, keepdims=True)
+    np.testing.assert_allclose(one.sensitivity / scale, other.sensitivity / scale, atol=1e-5)
+
+
+@every_material
+def test_forces_are_positive_and_rise_so_no_mirror_image_was_met(material):
+    for p in prior_draws(material, 20, seed=202):
+        curves = shooting.solve(asked(material, p, WIDE))
+        force = curves.force[curves.ok]
+        assert np.all(force > 0)
+        if material in (NeoHookean, Gent):
+            assert np.all(np.diff(force) > 0)
+
+
+def test_shooting_stops_at_the_fold_instead_of_jumping_to_a_state_stretched_tenfold():
+    curves = shooting.solve(asked(MooneyRivlin, [10.44, -2.94], WIDE))
+    assert curves.status[0].tolist() == [Status.OK] * 7 + [Status.INDEFINITE] * 3
+    assert np.nanmax(curves.max_stretch) < 4
+
+
+def test_loss_of_ellipticity_is_named():
+    curves = shooting.solve(asked(Yeoh, [8.0, 0.0, -0.05], WIDE))
+    assert curves.status[0].tolist() == [Status.OK] * 6 + [Status.NOT_ELLIPTIC] * 4
+
+
+def test_locked_deflections_are_named_and_the_others_solved():
+    curves = shooting.solve(asked(Gent, [5.0, 2.0], WIDE))
+    assert curves.status[0].tolist() == [Status.OK] * 7 + [Status.LOCKED] * 3
+
+
+def test_zero_deflection_has_a_stiffness_and_no_force():
+    curves = solve(NeoHookean, [7.5], [0.0, 10 * MM], prestretch=1.1, solver="shooting", **RADII)
+    other = solve(NeoHookean, [7.5], [0.0, 10 * MM], prestretch=1.1, **RADII)
+    assert curves.force[0, 0] == 0
+    assert curves.slope == pytest.approx(other.slope, rel=1e-6)
+
+
+def test_order_signs_and_repeats_do_not_matter():
+    mixed = np.array([20.0, -5.0, 20.0, 60.0, 5.0]) * MM
+    curves = solve(NeoHookean, [7.5], mixed, solver="shooting", **RADII)
+    single = [solve(NeoHookean, [7.5], d, solver="shooting", **RADII).force[0, 0] for d in mixed]
+    assert curves.force[0] == pytest.approx(single, rel=1e-8)

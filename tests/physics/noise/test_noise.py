@@ -1,0 +1,148 @@
+"""Noise models: every likelihood against SciPy's multivariate normal with the covariance written out."""
+
+import pickle
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.noise.ar1 import AR1
+from bayesmembrane.physics.noise.base import Noise
+from bayesmembrane.physics.noise.white import White
+from bayesmembrane.physics.rigs.annulus import Annulus
+
+N = 7
+SEED = 20240611
+
+
+def measurement(given: str, time: bool = False) -> Measurement:
+    rng = np.random.default_rng(SEED)
+    deflection = np.cumsum(rng.uniform(1e-3, 6e-3, N))
+    noise: dict[str, object] = {}
+    if given == "sd":
+        noise["force_sd"] = rng.uniform(0.01, 0.05, N)
+    if given == "covariance":
+        a = rng.standard_normal((N, N))
+        noise["covariance"] = 1e-3 * (a @ a.T + np.eye(N))
+    if time:
+        noise["time"] = np.cumsum(rng.uniform(0.5, 4.0, N))
+    return Measurement(
+        deflection,
+        100 * deflection,
+        Annulus(0.01, 0.035),
+        Specimen("film", 5e-5),
+        **noise,  # type: ignore[arg-type]
+    )
+
+
+def draws(noise: Noise, count: int = 5) -> np.ndarray:
+    rng = np.random.default_rng(SEED + 1)
+    return np.stack([rng.normal(p.prior.mean, 1.0, count) for p in noise.coordinates], axis=1)  # type: ignore[attr-defined]
+
+
+MODELS = [components("noise")[name]() for name in components("noise")]
+GIVEN = ["none", "sd", "covariance"]
+
+
+@pytest.mark.parametrize("noise", MODELS, ids=lambda n: n.name)
+@pytest.mark.parametrize("given", GIVEN)
+@pytest.mark.parametrize("time", [False, True], ids=["no time", "time"])
+def test_likelihood_is_that_of_its_covariance(noise: Noise, given: str, time: bool) -> None:
+    m = measurement(given, time)
+    bound, x = noise.bind(m), draws(noise)
+    residual = 0.05 * np.random.default_rng(SEED + 2).standard_normal((len(x), N))
+    expected = [
+        multivariate_normal(np.zeros(N), bound.covariance(a)).logpdf(r) for a, r in zip(x, residual, strict=True)
+    ]
+    assert bound.log_likelihood(residual, x) == pytest.approx(np.array(expected), rel=1e-9)
+
+
+@pytest.mark.parametrize("noise", MODELS, ids=lambda n: n.name)
+@pytest.mark.parametrize("given", GIVEN)
+def test_pointwise_is_the_density_given_all_other_points(noise: Noise, given: str) -> None:
+    bound, x = noise.bind(measurement(given)), draws(noise, 2)
+    residual = 0.05 * np.random.default_rng(SEED + 3).standard_normal((2, N))
+    got = bound.pointwise(residual, x)
+    for b in range(2):
+        sigma = bound.covariance(x[b])
+        whole = multivariate_normal(np.zeros(N), sigma).logpdf(residual[b])
+        for i in range(N):
+            rest = np.delete(np.arange(N), i)
+            others = multivariate_normal(np.zeros(N - 1), sigma[np.ix_(rest, rest)]).logpdf(residual[b, rest])
+            assert got[b, i] == pytest.approx(whole - others, rel=1e-7)
+
+
+@pytest.mark.parametrize("noise", MODELS, ids=lambda n: n.name)
+@pytest.mark.parametrize("given", GIVEN)
+def test_draws_have_the_covariance(noise: Noise, given: str) -> None:
+    bound = noise.bind(measurement(given))
+    x = np.repeat(draws(noise, 1), 20000, axis=0)
+    sigma = bound.covariance(x[0])
+    z = bound.draw(x, np.random.default_rng(SEED + 4))
+    root = np.sqrt(np.diag(sigma))
+    assert np.max(np.abs(np.cov(z.T) - sigma) / np.outer(root, root)) < 0.04
+
+
+@pytest.mark.parametrize("noise", MODELS, ids=lambda n: n.name)
+def test_given_noise_is_a_floor(noise: Noise) -> None:
+    m = measurement("covariance")
+    assert m.covariance is not None
+    added = noise.bind(m).covariance(draws(noise, 1)[0]) - m.covariance
+    assert np.min(np.linalg.eigvalsh(added)) > 0
+
+
+@pytest.mark.parametrize("noise", MODELS, ids=lambda n: n.name)
+def test_component_is_complete(noise: Noise) -> None:
+    assert pickle.loads(pickle.dumps(noise)) == noise
+    x = draws(noise, 4)
+    natural = noise.natural(x, 2.0)
+    assert natural.shape == (4, len(noise.field_names))
+    assert noise.field_names[0] == "sd"
+    assert natural[:, 0] == pytest.approx(2.0 * np.exp(x[:, 0]))
+    for p in noise.coordinates:
+        assert np.isfinite(p.prior.log_density(p.prior.quantile(0.5)))
+        assert p.bounds[0] < p.prior.quantile(0.001) < p.prior.quantile(0.999) < p.bounds[1]
+    assert type(noise).__doc__
+
+
+def test_short_memory_is_white_noise() -> None:
+    m = measurement("sd")
+    residual = 0.03 * np.random.default_rng(SEED).standard_normal((3, N))
+    x = np.full((3, 1), -3.0)
+    white = White().bind(m).log_likelihood(residual, x)
+    assert AR1().bind(m).log_likelihood(residual, np.hstack([x, np.full((3, 1), -8.0)])) == pytest.approx(white)
+
+
+def test_evenly_spaced_points_have_the_correlation_rho() -> None:
+    d = np.linspace(0.01, 0.05, 5)
+    m = Measurement(d, d, Annulus(0.01, 0.035), Specimen("film", 5e-5))
+    x = np.array([[0.0, 0.7]])
+    rho = AR1().natural(x, 1.0)[0, 1]
+    sigma = AR1().bind(m).covariance(x[0])
+    assert sigma[0, 2] / sigma[0, 0] == pytest.approx(rho**2)
+
+
+def test_stated_noise_alone_must_be_stated() -> None:
+    assert White(extra=False).bind(measurement("sd")).log_likelihood(np.zeros((1, N)), np.empty((1, 0))).shape == (1,)
+    with pytest.raises(SettingsError, match="no noise at all"):
+        White(extra=False).bind(measurement("none"))
+
+
+def test_a_filter_of_readings_is_found_where_the_speed_changes() -> None:
+    """Every reading remembers half of the one before, on a slow leg and on one ten times as fast alike."""
+    rng = np.random.default_rng(SEED + 9)
+    r = rng.standard_normal(400)
+    for i in range(1, r.size):
+        r[i] = 0.5 * r[i - 1] + np.sqrt(0.75) * r[i]
+    time = np.cumsum(np.where(np.arange(400) < 200, 1.0, 0.1))
+    d = np.linspace(1e-3, 0.04, 400)
+    m = Measurement(d, 100 * d, Annulus(0.01, 0.035), Specimen("film", 5e-5), time=time)
+    by_reading, by_time = (components("noise")[n]().bind(m) for n in ("ar1_readings", "ar1"))
+    lengths = np.linspace(-2.0, 3.0, 101)
+    x = np.column_stack([np.full(101, np.log(1 / by_reading.scale)), lengths])
+    values, others = (b.log_likelihood(np.tile(r, (101, 1)), x) for b in (by_reading, by_time))
+    assert np.exp(-np.exp(-lengths[np.argmax(values)])) == pytest.approx(0.5, abs=0.1)
+    assert values.max() > others.max() + 5

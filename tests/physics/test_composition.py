@@ -1,0 +1,262 @@
+"""Film and effects together: order, slack, memory, frame, and what no effect leaves."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.registry import materials
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.mechanics import Status, solve
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from tests.physics.effects.protocols import FILMS, RIG, force, measured, path, staircase, timeless, two_speeds, vector
+
+RADII = {"inner_radius": RIG.inner_radius, "outer_radius": RIG.outer_radius}
+
+
+def direct(material: str, d: np.ndarray, **options: float) -> np.ndarray:
+    return solve(materials()[material], FILMS[material], d, **RADII, **options).force[0]
+
+
+@pytest.mark.parametrize("material", FILMS)
+def test_without_effects_it_is_the_solver(material: str) -> None:
+    m = measured(np.concatenate([staircase(), [0.0]]))
+    h = hypothesis(material)
+    f = Forward(h, m, m.deflection)
+    assert f.composes
+    p = f(vector(h), sensitivities=True)
+    curves = solve(materials()[material], FILMS[material], m.deflection, sensitivities=True, **RADII)
+    assert p.force == pytest.approx(curves.force, rel=1e-6)
+    chained = np.einsum("bni,bik->bnk", curves.sensitivity, f.jacobian(vector(h)[None]))
+    assert np.max(np.abs(p.sensitivity - chained) / np.max(np.abs(chained), axis=1, keepdims=True)) < 2e-4
+    short = m.select(np.arange(40))
+    assert not Forward(h, short, short.deflection).composes
+    whole, few = (Forward(h, s, s.deflection)(vector(h)) for s in (m, short))
+    assert few.convexity[0] == pytest.approx(whole.convexity[0], abs=0.02)
+
+
+def test_the_order_of_naming_does_not_matter() -> None:
+    names = ("mullins", "machine_compliance", "friction", "permanent_set", "zero_offset")
+    m, forces = measured(), []
+    for order in itertools.islice(itertools.permutations(names), 0, 120, 31):
+        forces.append(force(m, *order))
+    assert all(np.array_equal(f, forces[0]) for f in forces)
+
+
+def test_prestretch_is_that_of_the_solver() -> None:
+    m = measured()
+    for stretch in (1.002, 1.03, 1.2):
+        f = direct("yeoh", m.deflection, prestretch=stretch)
+        assert np.max(np.abs(force(m, "prestretch", x=np.array([stretch])) - f)) < 1e-5 * np.max(f)
+
+
+def test_a_shifted_zero_shifts_the_curve_and_a_slack_film_carries_nothing() -> None:
+    m = measured()
+    f = force(m, "zero_offset", x=np.array([2e-3]))
+    assert np.all(f[m.deflection < 2e-3] == 0)
+    taut = m.deflection > 2e-3
+    assert f[taut] == pytest.approx(direct("yeoh", m.deflection[taut] - 2e-3), rel=1e-6, abs=1e-9)
+
+
+def test_the_frame_takes_its_part() -> None:
+    """delta_film + C F = delta, with a film force that is itself solved at delta_film; with memory too."""
+    m, c = measured(), 8e-4
+    f = force(m, "machine_compliance", x=np.array([c]))
+    assert f == pytest.approx(direct("yeoh", m.deflection - c * f), rel=1e-6, abs=1e-9)
+    names = ("machine_compliance", "mullins", "viscoelastic", "clamp_slip")
+    h = hypothesis("yeoh", names)
+    forward, x = Forward(h, m, m.deflection), vector(h)
+    theta = x[None, 3:]
+    law, _ = forward.law(h.films(x), theta)
+    delta, total = forward.composition.closed(law, theta)
+    assert np.max(np.abs(delta + h.effects[0].typical[0] * total - m.deflection)) < 1e-9 * m.full_range
+    again, _ = forward.composition.film(law, theta, delta)
+    assert again == pytest.approx(total, rel=1e-12)
+
+
+def test_relaxation_is_the_convolution() -> None:
+    """Against direct quadrature of int G(t - s) dF(s), with the force linear between points."""
+    d = staircase((0.03, 0.05), 15)
+    rng = np.random.default_rng(3)
+    time = np.cumsum(rng.uniform(0.2, 8.0, d.size))
+    m = measured(d, time)
+    g, tau, decades = 0.4, 12.0, 1.5
+    f, pushed = (force(m, "viscoelastic", x=np.array([g, tau, decades, withstood])) for withstood in (0.0, 1.0))
+    clock = m.path.clock
+    knots, values = np.concatenate([[0.0], clock]), np.concatenate([[0.0], direct("yeoh", d)])
+    times = tau * 10 ** (decades * np.linspace(-5 / 12, 5 / 12, 6))
+    fine = np.unique(np.concatenate([np.linspace(a, b, 400) for a, b in itertools.pairwise(knots)]))
+    rate = np.diff(np.interp(fine, knots, values))
+    middle = 0.5 * (fine[1:] + fine[:-1])
+    for n in (0, 5, 20, d.size - 1):
+        past = middle < clock[n]
+        kernel = 1 - g * (1 - np.mean(np.exp(-(clock[n] - middle[past][:, None]) / times), axis=1))
+        assert pushed[n] == pytest.approx(kernel @ rate[past], rel=1e-4, abs=1e-6)
+        assert f[n] == pytest.approx(max(kernel @ rate[past], 0.0), rel=1e-4, abs=1e-6)
+
+
+def test_a_softened_film_unloads_below_and_rejoins() -> None:
+    m = measured(staircase((0.03, 0.03, 0.05)))
+    f, plain = force(m, "mullins"), force(m)
+    first, again, third = (m.cycle == i for i in (1, 2, 3))
+    up, down = m.leg > 0, m.leg < 0
+    assert f[first & up] == pytest.approx(plain[first & up], rel=1e-12)
+    inside = first & down & (m.deflection < 0.028) & (m.deflection > 2e-3)
+    assert np.all(f[inside] < 0.99 * plain[inside])
+    back = np.interp(m.deflection[again & up], m.deflection[first & down][::-1], f[first & down][::-1])
+    middle = (m.deflection[again & up] > 5e-3) & (m.deflection[again & up] < 0.027)
+    assert f[again & up][middle] == pytest.approx(back[middle], rel=0.02)
+    beyond = third & up & (m.deflection >= 0.03)
+    assert f[beyond] == pytest.approx(plain[beyond], rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["clamp_slip", "permanent_set", "tearing"])
+def test_what_grows_never_shrinks(name: str) -> None:
+    """At the same deflection on loading the force falls from cycle to cycle, or stays."""
+    m = measured(staircase((0.02, 0.02, 0.04, 0.04, 0.06), 400))
+    f = force(m, name)
+    d = 0.015
+    loading = [np.interp(d, m.deflection[c], f[c]) for c in ((m.cycle == i) & (m.leg > 0) for i in range(1, 6))]
+    assert np.all(np.diff(loading) < 1e-5 * max(loading))
+    assert loading[-1] < 0.99 * loading[0]
+
+
+def test_slip_of_a_longer_film_is_a_film_of_that_length() -> None:
+    """A film with excess length and one without have the same stretch at deflections that belong together."""
+    h = hypothesis("yeoh", ["clamp_slip"])
+    m = measured()
+    f = Forward(h, m, m.deflection)
+    law, _ = f.law(h.films(vector(h)), vector(h)[None, 3:])
+    d, e = np.linspace(0.001, 0.05, 60)[None, :], np.full((1, 60), 0.03)
+    force_e, slope_e = law(d, e)
+    length = RIG.outer_radius - RIG.inner_radius
+    q = (length**2 + d**2) / 1.03**2 - length**2
+    taut = q > 0
+    root = np.sqrt(np.where(taut, q, 1.0))
+    expected = np.where(taut, law(root)[0] * d / root / 1.03, 0.0)
+    assert force_e == pytest.approx(expected, rel=1e-9, abs=1e-15)
+    assert np.gradient(force_e[0], d[0])[20:-1] == pytest.approx(slope_e[0, 20:-1], rel=0.02)
+
+
+def test_friction_changes_sign_at_each_turn() -> None:
+    m = measured()
+    extra = force(m, "friction", x=np.array([0.02, 1e-4])) - force(m)
+    settled = np.abs(np.gradient(m.leg)) == 0
+    assert extra[settled & (m.leg > 0)][3:] == pytest.approx(0.02, rel=0.01)
+    assert extra[settled & (m.leg < 0)] == pytest.approx(-0.02, rel=0.01)
+
+
+def test_speed_counts_as_a_power() -> None:
+    m = measured()
+    ratio = force(m, "rate", x=np.array([0.1])) / force(m)
+    fast = m.path.clock > m.path.clock[m.deflection.size // 2 + 8]
+    slow = m.path.clock < m.path.clock[m.deflection.size // 2 - 8]
+    assert np.median(ratio[fast]) / np.median(ratio[slow]) == pytest.approx(5**0.1, rel=1e-3)
+
+
+def test_without_times_travel_is_the_clock() -> None:
+    m = timeless(measured())
+    assert m.path.clock == pytest.approx(np.cumsum(np.abs(np.diff(m.deflection, prepend=0.0))) / 1e-3)
+    at_1mm_s = measured(m.deflection, np.cumsum(np.abs(np.diff(m.deflection, prepend=0.0))) / 1e-3)
+    for name in ("viscoelastic", "force_drift"):
+        assert force(m, name) == pytest.approx(force(at_1mm_s, name), rel=1e-9)
+    with pytest.raises(SettingsError, match="needs times"):
+        force(m, "rate")
+
+
+def test_odd_protocols_are_fine() -> None:
+    """Legs of one point, deflections that repeat, a single point, holds, uneven times."""
+    names = ("mullins", "viscoelastic", "rate", "friction", "clamp_slip", "permanent_set", "machine_compliance")
+    d = np.array([0.01, 0.03, 0.02, 0.03, 0.03, 0.03, 0.001, 0.04, 0.04])
+    time = np.array([1.0, 2.0, 2.1, 30.0, 31.0, 90.0, 91.0, 91.5, 400.0])
+    assert np.isfinite(force(measured(d, time), *names)).all()
+    held = force(measured(d, time), "viscoelastic")
+    assert held[5] < held[4] < held[3]
+    one = Measurement(np.array([0.02]), np.array([1.0]), RIG, Specimen("film", 5e-5), time=np.array([3.0]))
+    assert np.isfinite(force(one, *names)).all()
+
+
+def test_a_film_that_locks_says_so_and_the_others_are_used() -> None:
+    m = measured()
+    h = hypothesis("gent", ["mullins", "zero_offset"])
+    x = np.tile(vector(h), (3, 1))
+    x[1, :2] = materials()["gent"].to_coordinates([5.3, 2.0])
+    p = Forward(h, m, m.deflection)(x, sensitivities=True)
+    assert p.ok.tolist() == [True, False, True]
+    assert np.isnan(p.force[1, np.argmax(m.deflection)])
+    assert Status(int(p.status[1, np.argmax(m.deflection)])).physical
+    assert p.force[0] == pytest.approx(p.force[2], rel=1e-12)
+    assert np.all(np.isfinite(p.sensitivity[0]))
+
+
+def test_a_frame_that_yields_keeps_a_film_from_locking() -> None:
+    m = measured(staircase((0.02, 0.04)))
+    h = hypothesis("gent", ["machine_compliance"])
+    limits = np.linspace(0.5, 4.0, 101)
+    every = solve(materials()["gent"], np.stack([np.full(101, 5.3), limits], 1), [0.04], **RADII)
+    limit = limits[np.argmax(every.ok[:, 0]) - 1]
+    film = materials()["gent"].to_coordinates([5.3, limit])
+    stiff, soft = (Forward(h, m, m.deflection)(np.append(film, c)) for c in (0.0, 2e-4))
+    assert not stiff.ok[0]
+    assert soft.ok[0]
+    delta = m.deflection - 2e-4 * soft.force[0]
+    alone = solve(materials()["gent"], [5.3, limit], delta, **RADII).force[0]
+    assert soft.force[0] == pytest.approx(alone, rel=1e-5)
+
+
+def test_many_draws_are_worked_off_in_batches(monkeypatch: pytest.MonkeyPatch) -> None:
+    m, h = measured(), hypothesis("mooney_rivlin", ["zero_offset", "mullins"])
+    x = vector(h) + np.zeros((7, 1))
+    x[:, 0] += np.linspace(0, 1, 7)
+    f = Forward(h, m, m.deflection)
+    whole = f(x, sensitivities=True)
+    monkeypatch.setattr("bayesmembrane.physics.forward.AT_ONCE", 20 * len(m))
+    parts = f(x, sensitivities=True)
+    assert parts.force == pytest.approx(whole.force, rel=1e-12)
+    assert parts.sensitivity == pytest.approx(whole.sensitivity, rel=1e-9, abs=1e-12)
+    assert parts.convexity == pytest.approx(whole.convexity)
+
+
+def test_other_deflections_are_a_path_of_their_own() -> None:
+    """A grid up to the end is a first loading at the speed of the measurement."""
+    m, h = measured(), hypothesis("yeoh", ["mullins", "viscoelastic"])
+    grid = np.linspace(0.0, 0.06, 31)
+    found = Forward(h, m, grid)(vector(h)).force[0]
+    speed = float(np.median(m.path.speed))
+    loading = measured(grid[1:], grid[1:] / speed)
+    assert found[1:] == pytest.approx(force(loading, "mullins", "viscoelastic"), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["zero_offset", "mullins", "viscoelastic", "clamp_slip", "machine_compliance"])
+def test_effects_occur_on_strips(name: str) -> None:
+    rig = Uniaxial()
+    d = staircase((0.05, 0.1, 0.1), 20)
+    m = Measurement(d, d, rig, Specimen("strip", 1e-3), time=two_speeds(d))
+    f = Forward(hypothesis("yeoh", [name]), m, d)
+    p = f(vector(f.hypothesis), sensitivities=True)
+    plain = Forward(hypothesis("yeoh"), m, d)(vector(hypothesis("yeoh")))
+    assert np.all(p.ok)
+    assert np.max(np.abs(p.force - plain.force)) > 1e-3 * np.max(plain.force)
+    null = f(vector(f.hypothesis, "null"))
+    assert np.array_equal(null.force, plain.force)
+
+
+def test_an_effect_of_another_rig_is_refused() -> None:
+    m = Measurement(np.array([0.01, 0.02]), np.array([1.0, 2.0]), Uniaxial(), Specimen("strip", 1e-3))
+    with pytest.raises(SettingsError, match='"prestretch" does not occur on the rig "uniaxial"'):
+        Forward(hypothesis("yeoh", ["prestretch"]), m, m.deflection)(vector(hypothesis("yeoh", ["prestretch"])))
+
+
+def test_growth_is_the_same_function_of_path_for_any_sampling() -> None:
+    from bayesmembrane.physics.effects._history import growth
+
+    coarse, fine = staircase((0.03, 0.03, 0.06), 11), staircase((0.03, 0.03, 0.06), 201)
+    a, c = np.array([[0.5], [2.0], [4.0]]), np.array([[0.0], [0.3], [1.0]])
+    ends = [growth(a, c, np.tile(d, (3, 1)), path(d))[:, -1] for d in (coarse, fine)]
+    assert ends[0] == pytest.approx(ends[1], rel=2e-3)
+    once = np.linspace(0, 0.06, 50)
+    assert growth(a, c, np.tile(once, (3, 1)), path(once))[:, -1] == pytest.approx(1.0)
+    assert np.all(np.diff(growth(a, c, np.tile(fine, (3, 1)), path(fine)), axis=1) >= 0)

@@ -1,0 +1,86 @@
+"""What a report says of a comparison, beside the ranking of somebody else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, together
+from bayesmembrane.comparison.evidence.target import Estimate
+from bayesmembrane.comparison.leave_out.score import LeaveOneOut
+from bayesmembrane.comparison.prior_widths import Widened
+from bayesmembrane.comparison.result import Comparison, Row, ranked
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.report.sections.comparison.figures import comparison_picture
+from bayesmembrane.report.sections.comparison.section import (
+    alternative_text,
+    comparison_sentences,
+    evidence_table,
+    modes_table,
+    ranking_table,
+    widths_table,
+)
+
+
+def row(material: str, z: float, elpd: float, off: float = 0.0) -> Row:
+    points = elpd / 10 + 0.02 * np.sin(np.arange(10) + len(material))
+    loo = LeaveOneOut(float(points.sum()), 1.0, 0.01, points, np.zeros(10), (3,))
+    pair = {NESTED: Estimate(z + off, 0.1, 1, 1.0), BRIDGE: Estimate(z, 0.02, 1, 1.0)}
+    widths = (
+        Widened(f"{material}.ln_gd", 0.5, 0.6, 0.05, 900.0, ""),
+        Widened(f"{material}.ln_gd", 2.0, float("nan"), float("nan"), 3.0, "too few"),
+    )
+    return Row(material, hypothesis(material), together(pair), loo, None, None, None, widths, (), None, 1, 1.0, (), "")
+
+
+def compared(off: float = 0.0) -> dict[str, Comparison]:
+    lost = replace(row("ogden", 0, 0), evidence=None, loo=None, reason="it cannot be fitted")
+    return {"OP1": ranked([row("neo_hookean", 4, 20), row("gent", 2.9, 19), row("yeoh", 10, 30, off), lost])}
+
+
+PAPER = {"OP1": {"yeoh": 0.1, "gent": 0.2, "neo_hookean": 0.23, "ogden": 0.12}}
+
+
+def test_every_hypothesis_has_a_row_and_the_unfitted_one_its_reason():
+    cells = evidence_table(compared()).cells()
+    assert [c[1] for c in cells] == ["neo-Hookean", "Gent", "Yeoh", "Ogden"]
+    assert cells[3][2] == "-"
+    assert cells[3][-1] == "it cannot be fitted"
+    assert cells[2][2] == "10.00"
+
+
+def test_every_difference_to_the_other_ranking_has_its_sentence():
+    told = [s for s in comparison_sentences(compared(), PAPER) if "the paper has them" in s]
+    assert len(told) == 1
+    assert "neo-Hookean before Gent by 1.1" in told[0]
+    assert "losses of 0.23 and 0.2 N" in told[0]
+    assert "1 more parameters of Gent" in told[0]
+    same = comparison_sentences(compared(), {"OP1": {"yeoh": 0.1, "neo_hookean": 0.2, "gent": 0.3}})
+    assert any("same order as the paper" in s for s in same)
+
+
+def test_rankings_stand_side_by_side():
+    shown = ranking_table(compared(), PAPER)
+    assert [r["ours"] for r in shown.records()] == ["Yeoh", "neo-Hookean", "Gent", "-"]
+    assert next(r["paper"] for r in shown.records()) == "Yeoh (0.1 N)"
+    assert ranking_table(compared(), {}) is None
+
+
+def test_without_agreement_there_is_no_ranking():
+    found = compared(off=2.0)
+    assert [r["ours"] for r in ranking_table(found, PAPER).records()][:3] == ["no ranking"] * 3
+    assert any("There is no ranking" in s for s in comparison_sentences(found, PAPER))
+
+
+def test_changes_that_cannot_be_told_are_dashes():
+    cells = widths_table(compared()).cells()
+    assert cells[0][3:] == ["+0.60", "0.05", "-", "-"]
+    assert modes_table(compared()) is None
+
+
+@pytest.mark.parametrize("off", [0.0, 2.0])
+def test_the_picture_is_drawn_with_and_without_a_ranking(off):
+    picture = comparison_picture(compared(off))
+    assert picture.data.startswith(b"<?xml")
+    assert "Yeoh" in alternative_text(compared())
+    assert picture.data == comparison_picture(compared(off)).data

@@ -1,0 +1,315 @@
+"""What a report says of a closed loop, whatever its answer."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayesmembrane.calibration.run import sample
+from bayesmembrane.calibration.sampling.walk import Settings
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
+from bayesmembrane.diagnosis.discrepancy import discrepancy
+from bayesmembrane.diagnosis.loop import Loop, Round, Stage
+from bayesmembrane.diagnosis.separation import Experiment
+from bayesmembrane.diagnosis.wording import size_in_words
+from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
+from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.report.page import PAGE, TWIN, write_shown
+from bayesmembrane.report.sections.loop.figures import Place, Residual, discrepancy_picture, residual_picture
+from bayesmembrane.report.sections.loop.reading import Change, changes, models
+from bayesmembrane.report.sections.loop.section import (
+    answer,
+    bound_sentences,
+    loop_answers,
+    loop_sections,
+    modulus_sentence,
+    moved_sentences,
+    place_of,
+    residual_rows,
+    rival_sentences,
+    validation_sentences,
+)
+from bayesmembrane.report.sections.loop.tables import (
+    candidate_title,
+    confounded_table,
+    errors_table,
+    moved_table,
+    power_table,
+    ranking_table,
+    scores_table,
+)
+from bayesmembrane.report.view import Shown
+from tests.generator.datasets import THICKNESS, generate
+from tests.generator.protocols import Protocol
+
+SHORT = Protocol("short", (0.015, 0.030, 0.030), (1e-3,) * 3, 120)
+
+
+def stage(measurement: Measurement, claim: Hypothesis, log_evidence: float) -> Stage:
+    """A posterior of a few steps; its scores are not what is tested."""
+    run = sample(measurement, claim, settings=Settings(ess=1.0, chunk=40, most_steps=40, walkers=16))
+    return Stage(run, log_evidence, 0.03, 0.9 * log_evidence, 4.0, 0.91)
+
+
+@pytest.fixture(scope="module")
+def named() -> Loop:
+    """A curve with friction in it, diagnosed in earnest; then the same with friction in the model."""
+    d = generate("friction", "neo_hookean", SHORT, "white", strength=1.5, seed=11)
+    measurement = Measurement(
+        1e-3 * d.deflection_mm, d.force_N, Annulus(0.010, 0.035), Specimen("synthetic <film>", THICKNESS), d.time_s
+    )
+    claim = hypothesis("neo_hookean")
+    first = diagnose(measurement, claim)
+    assert (first.verdict, first.effects) == ("named", ("friction",))
+    before, after = stage(measurement, claim, 500.0), stage(measurement, first.hypothesis, 600.0)
+    second = diagnose(measurement, first.hypothesis)
+    assert second.verdict == "adequate"
+    return Loop((Round(first, before, after), Round(second, after, after)), None)
+
+
+@pytest.fixture(scope="module")
+def unknown(named: Loop) -> Loop:
+    """The same curve, had nothing explained it."""
+    r = named.rounds[0]
+    d = replace(r.diagnosis, verdict="unknown", effects=(), members=(), best=r.diagnosis.null, sentence="no name.")
+    left = discrepancy(r.before.run.measurement, d.null.residual, d.noise)
+    return Loop((Round(d, r.before, r.before),), left)
+
+
+@pytest.fixture(scope="module")
+def ambiguous(named: Loop) -> Loop:
+    """The same curve, had a second candidate explained it."""
+    r = named.rounds[0]
+    nexts = (Experiment("a blank run", math.inf), Experiment("unloading", 0.7))
+    members = tuple(j for j in r.diagnosis.ranking if j.candidate.names)[:2]
+    d = replace(r.diagnosis, verdict="ambiguous", members=members, experiments=nexts, sentence="either.")
+    return Loop((Round(d, r.before, r.before),), None)
+
+
+@pytest.fixture(scope="module")
+def sampled(ambiguous: Loop, named: Loop) -> Loop:
+    """The same, both candidates sampled."""
+    r = ambiguous.rounds[0]
+    second = stage(r.before.run.measurement, r.diagnosis.members[1].candidate.hypothesis, 550.0)
+    return Loop((replace(r, leaders=(named.rounds[0].after, second)),), None)
+
+
+def only(loop: Loop, verdict: str) -> Diagnosis:
+    return next(r.diagnosis for r in loop.rounds if r.diagnosis.verdict == verdict)
+
+
+# ---- tables ----------------------------------------------------------------------------------------------------------
+
+
+def test_errors_fall_from_the_model_as_given_to_the_one_with_its_effect(named: Loop) -> None:
+    d = only(named, "named")
+    before, after = errors_table(models(named), "cycle 3", "errors").records()
+    assert (before["model"], after["model"]) == ("neo-Hookean", "neo-Hookean with friction in the guide")
+    assert before["rmse_mN"] == pytest.approx(1e3 * np.sqrt(np.mean(d.null.residual**2)))
+    assert after["rmse_mN"] == pytest.approx(1e3 * np.sqrt(np.mean(d.best.residual**2)))
+    assert all(after[k] < before[k] for k in ("rmse_mN", "reduced_chi2", "heldout_rmse_mN", "heldout_reduced_chi2"))
+
+
+def test_scores_are_those_of_the_sampled_models(named: Loop, ambiguous: Loop) -> None:
+    assert [r["log_evidence"] for r in scores_table(models(named), "s").records()] == [500.0, 600.0]
+    assert len(scores_table(models(ambiguous), "s").rows) == 1
+
+
+def test_sampled_rivals_stand_side_by_side_and_are_not_added(sampled: Loop) -> None:
+    rows = scores_table(models(sampled), "s").records()
+    assert [r["log_evidence"] for r in rows] == [500.0, 600.0, 550.0]
+    assert ["not added" in r["model"] for r in rows] == [False, True, True]
+    errors = errors_table(models(sampled), "cycle 3", "errors").records()
+    assert [r["heldout_coverage_90"] is None for r in errors] == [False, False, True]
+    (sentence,) = rival_sentences(sampled)
+    assert sentence.count("MPa") == 3
+    assert sampled.rounds[0].summary()["leaders"][1]["log_evidence"] == 550.0
+
+
+def test_candidates_are_ranked_against_the_model_as_it_was(named: Loop) -> None:
+    d = only(named, "named")
+    rows = ranking_table(d, "ranking").records()
+    null = next(r for r in rows if r["candidate"].startswith("nothing"))
+    factors = [r["log_bayes_factor"] for r in rows]
+    assert null["log_bayes_factor"] == pytest.approx(0, abs=1e-9)
+    assert factors == sorted(factors, reverse=True)
+    assert [r["candidate"] for r in rows if r["in_answer"]] == ["friction in the guide"]
+    size = 1e3 * d.best.parameters["friction.level"]
+    assert rows[0]["size"] == f"level {size:.3g} mN"
+
+
+def test_an_effect_with_another_energy_keeps_its_name(named: Loop) -> None:
+    d = named.rounds[0].diagnosis
+    best = d.ranking[0].candidate
+    other = replace(best, hypothesis=replace(best.hypothesis, material=hypothesis("gent").material))
+    effect = best.hypothesis.effects[0].title
+    assert candidate_title(other, d.null) == f"{effect} and the energy Gent"
+
+
+def test_sizes_are_told_in_the_units_that_people_read() -> None:
+    told = [size_in_words(*v) for v in ((1.66e-4, "m"), (1.0026, "-"), (0.00348, "-"), (8.8e-4, "m/N"), (-2e-5, "N/s"))]
+    assert told == ["0.166 mm", "1.0026", "0.00348", "0.88 mm/N", "-0.02 mN/s"]
+
+
+def test_sizes_that_show_are_listed_the_easiest_first(named: Loop) -> None:
+    d = named.rounds[-1].diagnosis
+    rows = power_table(d, "power").records()
+    ratios = [r["ratio"] for r in rows]
+    assert ratios == sorted(ratios)
+    assert len(rows) == sum(math.isfinite(v) for v in d.power.values()) > 3
+
+
+def test_confounded_effects_carry_their_angle(named: Loop) -> None:
+    d = replace(only(named, "named"), confounded=(("clamp_slip", "permanent_set", 12.34),))
+    assert confounded_table(d, "c").cells() == [["slip in the clamp", "permanent set", "12.3"]]
+
+
+def test_moved_parameters_are_in_the_posteriors(named: Loop) -> None:
+    before, after = named.rounds[0].before.run, named.rounds[0].after.run
+    found = {c.name: c for c in changes(before, after)}
+    c1 = after.data.posterior["neo_hookean.c1"].values
+    assert found["neo_hookean.c1"].after == pytest.approx((c1.mean(), c1.std()))
+    assert found["shear modulus"].after[0] == pytest.approx(2e-6 * c1.mean() / THICKNESS)
+    assert found["shear modulus"].share == pytest.approx(found["neo_hookean.c1"].share)
+    assert math.isnan(found["friction.level"].before[0])
+    cells = {c[0]: c for c in moved_table(list(found.values()), "m").cells()}
+    assert cells["friction in the guide: level"][2] == "-"
+    sentence = moved_sentences(named)[0]
+    assert f"{found['shear modulus'].after[0]:.4g}" in sentence
+
+
+# ---- sentences -------------------------------------------------------------------------------------------------------
+
+
+def test_a_modulus_that_moves_by_many_standard_deviations_was_bent() -> None:
+    far = modulus_sentence(Change("shear modulus", "MPa", (0.30, 0.001), (0.33, 0.002), True), "Yeoh")
+    near = modulus_sentence(Change("shear modulus", "MPa", (0.30, 0.001), (0.3005, 0.002), True), "Yeoh")
+    assert "+10 %, 30.0 of the standard deviations" in far
+    assert "bent the material" in far
+    assert "could be used" in near
+
+
+def test_the_answer_tells_every_round(named: Loop) -> None:
+    first, second = answer(named)
+    assert "misses something (p < 0.0001): friction in the guide" in first
+    assert second.startswith("With that: neo-Hookean with friction in the guide describes the curve")
+
+
+def test_what_was_changed_is_said_before_how_it_ended(named: Loop, unknown: Loop) -> None:
+    assert named.sentence == f"Changed: friction in the guide. {named.rounds[-1].diagnosis.sentence}"
+    assert unknown.sentence == "no name."
+    r = named.rounds[0]
+    gent = replace(r.after, run=replace(r.after.run, settings={"hypothesis": hypothesis("gent").settings()}))
+    assert Loop((replace(r, after=gent),), None).sentence.startswith("Changed: Gent instead of neo-Hookean. ")
+
+
+def test_a_loop_that_stops_early_says_so(named: Loop) -> None:
+    told = answer(Loop(named.rounds[:1], None))
+    assert "after 1 round: whether neo-Hookean with friction in the guide is adequate" in told[-1]
+
+
+def test_the_choice_without_the_held_out_points_is_said(named: Loop) -> None:
+    d = only(named, "named")
+    assert d.validation is not None
+    assert any("choose the same model" in s and d.validation.where in s for s in validation_sentences(named))
+    other = replace(d.validation, chosen="neo_hookean")
+    r = replace(named.rounds[0], diagnosis=replace(d, validation=other))
+    assert "choose neo-Hookean instead" in validation_sentences(Loop((r,), None))[0]
+    none = replace(named.rounds[0], diagnosis=replace(d, validation=None))
+    assert "too few" in validation_sentences(Loop((none,), None))[0]
+
+
+def test_an_estimate_at_a_bound_is_a_limit(named: Loop) -> None:
+    assert bound_sentences(named) == []
+    d = only(named, "named")
+    best = replace(d.members[0].candidate, at_bound=("friction.level",))
+    changed = replace(d, members=(replace(d.members[0], candidate=best),))
+    told = bound_sentences(Loop((replace(named.rounds[0], diagnosis=changed),), None))
+    assert len(told) == 1
+    assert "level lies at its bound" in told[0]
+
+
+# ---- the page --------------------------------------------------------------------------------------------------------
+
+
+def test_the_page_answers_with_the_loop_first(tmp_path: Path, named: Loop, yeoh: Shown) -> None:
+    page = write_shown([yeoh], tmp_path, loops=[named]).read_text()
+    twin = json.loads((tmp_path / TWIN).read_text())
+    assert (tmp_path / PAGE).exists()
+    assert twin["answer"][:2] == answer(named)
+    assert page.index('id="loop"') < page.index('id="data"')
+    assert "synthetic &lt;film&gt;" in page
+    assert {"loop errors", "loop scores", "loop parameters", "loop candidates", "loop power"} <= set(twin["tables"])
+
+
+def test_two_loops_keep_apart(named: Loop, unknown: Loop) -> None:
+    sections = loop_sections([named, unknown])
+    names = [b.table.name for s in sections for b in s.blocks if b.table]
+    assert [s.key for s in sections] == ["loop1", "loop2"]
+    assert len(set(names)) == len(names)
+    assert [s.startswith("synthetic <film>, neo-Hookean up to") for s in loop_answers([named, unknown])] == [True, True]
+
+
+def test_without_a_name_the_rest_is_drawn_and_nothing_is_added(unknown: Loop) -> None:
+    (section,) = loop_sections([unknown])
+    assert unknown.left is not None
+    captions = [b.caption for b in section.blocks if b.kind == "figure"]
+    assert len(captions) == 2
+    assert unknown.left.sentence in captions[1]
+    assert [r.title.partition(":")[0] for r in residual_rows(models(unknown))] == ["As given"]
+    assert not any(r["in_answer"] for r in ranking_table(unknown.rounds[0].diagnosis, "r").records())
+
+
+def test_rivals_are_listed_with_what_would_part_them(ambiguous: Loop) -> None:
+    (section,) = loop_sections([ambiguous])
+    lines = [line for b in section.blocks for line in b.lines]
+    assert any(line.endswith("the most probable.") for line in lines)
+    assert "To tell them apart: a blank run: shows one of them directly." in lines
+    assert "What would not settle it: unloading (0.7 standard deviations)." in lines
+    assert any(
+        row["model"].endswith("(not added)") for b in section.blocks if b.table for row in b.table.records()[1:2]
+    )
+    assert residual_rows(models(ambiguous))[1].title.startswith("The first rival, not added")
+
+
+def test_an_adequate_model_needs_no_candidates(named: Loop) -> None:
+    (section,) = loop_sections([Loop(named.rounds[1:], None)])
+    names = [b.table.name for b in section.blocks if b.table]
+    assert names[:2] == ["loop errors", "loop scores"]
+    assert "loop candidates" not in names
+    assert "loop power" in names
+
+
+# ---- pictures --------------------------------------------------------------------------------------------------------
+
+
+def height(png: bytes) -> int:
+    assert png.startswith(b"\x89PNG")
+    return int.from_bytes(png[20:24], "big")
+
+
+def test_held_out_points_are_the_last_cycle(named: Loop) -> None:
+    place = place_of(named)
+    assert np.array_equal(place.held_out, place.cycle == place.cycle.max())
+    assert place.sd == pytest.approx(np.full(place.sd.size, named.rounds[-1].diagnosis.noise.sd))
+
+
+def test_every_model_has_its_row(named: Loop) -> None:
+    place, rows = place_of(named), residual_rows(models(named))
+    both, one = (residual_picture(place, r).data for r in (rows, rows[:1]))
+    assert height(both) > 1.5 * height(one)
+    assert residual_picture(place, rows).data == both
+
+
+def test_a_single_loading_without_times_is_drawn() -> None:
+    n = 7
+    ones = np.ones(n)
+    place = Place(np.linspace(0.001, 0.02, n), None, ones.astype(np.int8), ones.astype(int), ones > 1, 0.004 * ones)
+    big, small = Residual("Before", 0.5 * np.sin(np.arange(n))), Residual("After", 0.004 * np.cos(np.arange(n)))
+    assert place.along[1] == "point (-)"
+    assert height(residual_picture(place, [big, small]).data) > 0
+    assert height(discrepancy_picture(place, big.residual, 0.4 * ones, 0.1 * ones).data) > 0
