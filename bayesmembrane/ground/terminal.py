@@ -14,6 +14,7 @@ from rich.progress import Progress, SpinnerColumn, TaskID, TextColumn, TimeElaps
 from rich.table import Table
 
 from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.plain import plain
 
 log = Console(stderr=True, highlight=False, soft_wrap=True)
 out = Console(highlight=False, soft_wrap=True)
@@ -43,19 +44,6 @@ def answer(document: dict[str, Any], as_json: bool, show: Callable[[], None]) ->
         sys.stdout.write(json.dumps(plain(document), allow_nan=False) + "\n")
     else:
         show()
-
-
-def plain(value: Any) -> Any:
-    """Mappings, sequences, arrays and NumPy scalars as what JSON knows; nan and infinity as None."""
-    if isinstance(value, dict):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(v) for v in value]
-    if hasattr(value, "tolist"):
-        return plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value if isinstance(value, str | int | float | bool | None) else str(value)
 
 
 def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -53,8 +53,9 @@ def test_names_tell_materials_constants_and_borrowed_texts_apart(monkeypatch, tm
     names = [name(NeoHookean), name(Gent), name(NeoHookean, FACTOR=2.0)]
     assert len(set(names)) == 3
     assert name(NeoHookean) == names[0]
+    (tmp_path / "ritz").mkdir()
     shutil.copy(Path(compiled.__file__).with_name("ritz") / "simd.py", tmp_path / "ritz" / "simd.py")
-    with (tmp_path / "simd.py").open("a") as file:
+    with (tmp_path / "ritz" / "simd.py").open("a") as file:
         file.write("# another text\n")
     monkeypatch.setattr(compiled, "__file__", str(tmp_path / "compiled.py"))
     assert name(NeoHookean) != names[0]

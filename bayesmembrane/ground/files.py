@@ -1,0 +1,66 @@
+"""The one way to write a file: whole, synced and renamed, so that nobody ever reads half of it."""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bayesmembrane.ground.errors import StorageError
+
+
+def write_whole(path: Path, writer: Callable[[Path], Any], what: str = "the file") -> Path:
+    """Let ``writer`` fill a temporary file beside ``path``; sync it, rename it over ``path``, sync the folder.
+
+    A reader sees the old file or the new one, also after a power cut; a ``writer`` that raises leaves the old one.
+    Missing folders are made. Returns ``path``.
+
+    Raises `StorageError` that says ``what`` cannot be written, where and why; whatever else ``writer`` raises passes.
+    """
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        os.close(handle)
+        part = Path(name)
+        try:
+            writer(part)
+            part.chmod(0o644)
+            _sync(part)
+            part.replace(path)
+            _sync(path.parent)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise StorageError(
+            f"{what} cannot be written ({error.strerror or error})",
+            where=str(path),
+            remedy="free some space, make the folder writable, or name another one",
+        ) from None
+    return path
+
+
+def write_text(path: Path, text: str, what: str = "the file") -> Path:
+    """`write_whole` of a text in UTF-8."""
+    return write_whole(path, lambda part: part.write_text(text, encoding="utf-8"), what)
+
+
+def _sync(path: Path) -> None:
+    """Wait until a file, or the entries of a folder, are on the disk; file systems that cannot promise that pass."""
+    try:
+        handle = os.open(path, os.O_RDONLY)
+    except OSError:
+        return
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno in _FULL:
+            raise
+    finally:
+        os.close(handle)
+
+
+_FULL = {errno.EIO, errno.ENOSPC, errno.EDQUOT}  # then what was written is not there

@@ -1,0 +1,55 @@
+"""A file is written whole or not at all, and synced before it is seen."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from bayesmembrane.ground import files
+from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.files import write_text, write_whole
+
+
+def test_what_was_written_is_read(tmp_path):
+    path = write_text(tmp_path / "a" / "b.txt", "5 µm")
+    assert path.read_text(encoding="utf-8") == "5 µm"
+    assert [p.name for p in path.parent.iterdir()] == ["b.txt"]
+
+
+def test_a_writer_that_fails_leaves_the_old_file_alone(tmp_path):
+    path = write_text(tmp_path / "b.txt", "old")
+
+    def half(part: Path) -> None:
+        part.write_text("ne")
+        raise KeyError("in the middle")
+
+    with pytest.raises(KeyError):
+        write_whole(path, half)
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["b.txt"]
+
+
+def test_file_then_rename_then_folder(tmp_path, monkeypatch):
+    """The order that a power cut asks for."""
+    seen = []
+    fsync, replace = os.fsync, Path.replace
+    monkeypatch.setattr(
+        files.os, "fsync", lambda handle: (seen.append(os.readlink(f"/proc/self/fd/{handle}")), fsync(handle))
+    )
+    monkeypatch.setattr(Path, "replace", lambda part, path: (seen.append("rename"), replace(part, path)))
+    write_text(tmp_path / "b.txt", "new")
+    assert Path(seen[0]).name.startswith(".b.txt.")
+    assert seen[1:] == ["rename", str(tmp_path)]
+
+
+def test_a_full_disk_is_a_sentence(tmp_path, monkeypatch):
+    path = write_text(tmp_path / "b.txt", "old")
+
+    def full(handle: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(files.os, "fsync", full)
+    with pytest.raises(StorageError, match=r"the answer cannot be written \(No space left"):
+        write_text(path, "new", "the answer")
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["b.txt"]
