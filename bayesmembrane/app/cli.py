@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from bayesmembrane.app.terminal import answer, lines, log, numbers, out, table
 from bayesmembrane.ground.errors import BayesmembraneError, SettingsError
-from bayesmembrane.ground.terminal import answer, lines, log, numbers, out, table
 
 if TYPE_CHECKING:
     from bayesmembrane.calibration.sampling.walk import Progress

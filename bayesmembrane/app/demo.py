@@ -18,6 +18,7 @@ import numpy as np
 from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bars
 
+from bayesmembrane.app.terminal import lines, log
 from bayesmembrane.calibration.beside_paper import Compared, compare_with_paper, paper_break_points
 from bayesmembrane.calibration.fit import fit
 from bayesmembrane.calibration.predictions import digest
@@ -31,7 +32,6 @@ from bayesmembrane.data.published import read_published_table
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.diagnosis.loop import Loop, loop
 from bayesmembrane.ground.registry import materials
-from bayesmembrane.ground.terminal import lines, log
 from bayesmembrane.physics.cache import CachedSolver, Tally
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.reconstruction.reconstruct import reconstruct

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bayesmembrane.ground.errors import StorageError
-from bayesmembrane.ground.terminal import plain
+from bayesmembrane.ground.plain import plain
 from bayesmembrane.physics.hypothesis import CONVEXITY
 from bayesmembrane.report.canvas import Picture
 from bayesmembrane.report.sections.valleys.beside import beside_picture
