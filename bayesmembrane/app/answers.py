@@ -1,0 +1,95 @@
+"""An answer of a verb: the result, its JSON document, and the folder in which both are stored."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.plain import json_text
+from bayesmembrane.ground.stored import store
+from bayesmembrane.physics.hypothesis import Hypothesis
+
+Result = TypeVar("Result")
+
+LONGEST = 60  # characters of specimen and of hypothesis in the name of a folder
+
+
+@dataclass(frozen=True, eq=False)
+class Answer(Generic[Result]):
+    """What a verb found.
+
+    result : the frozen values
+    document : the JSON answer; ``stored`` is its folder, None if it was not stored
+    """
+
+    result: Result
+    document: dict[str, Any]
+
+    @property
+    def folder(self) -> Path | None:
+        """Where it is stored."""
+        stored = self.document["stored"]
+        return None if stored is None else Path(stored)
+
+    def also(self, **fields: Any) -> Answer[Result]:
+        """The same with more fields in its document."""
+        return replace(self, document={**self.document, **fields})
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What an answer depends on, and what its folder is called after.
+
+    verb : that was asked
+    specimen, model, end : film, hypothesis, and largest deflection in m, for the name; "" and nan where there is none
+    settings : plain values that tell this answer from others
+    """
+
+    verb: str
+    specimen: str
+    model: str
+    end: float
+    settings: Mapping[str, Any]
+
+    @property
+    def name(self) -> str:
+        """``film-1_yeoh_35.1mm_fit_3f2a9c41``: specimen, hypothesis, range, verb, fingerprint."""
+        text = json.dumps([self.verb, json_text(dict(self.settings))], sort_keys=True)
+        fingerprint = hashlib.sha256(text.encode()).hexdigest()[:8]
+        reach = f"{1e3 * self.end:.4g}mm" if np.isfinite(self.end) else ""
+        specimen = re.sub(r"[^a-z0-9]+", "-", self.specimen.lower()).strip("-")
+        parts = (specimen[:LONGEST], self.model[:LONGEST], reach, self.verb, fingerprint)
+        return "_".join(part for part in parts if part)
+
+
+def asked(verb: str, measurement: Measurement, hypotheses: Sequence[Hypothesis], seed: int, **options: Any) -> Asked:
+    """A verb asked about hypotheses on one measurement."""
+    settings = {
+        "data": measurement.data_hash,
+        "hypotheses": [h.settings() for h in hypotheses],
+        "seed": seed,
+        **options,
+    }
+    model = "-".join(h.label() for h in hypotheses)
+    return Asked(verb, measurement.specimen.name, model, float(np.max(measurement.deflection)), settings)
+
+
+def kept(kind: str, result: Result, document: Mapping[str, Any], what: Asked, out: str | Path | None) -> Answer[Result]:
+    """The answer, stored in its own folder inside ``out`` unless that is None.
+
+    Raises `StorageError` if it cannot be written.
+    """
+    if out is None:
+        return Answer(result, {**document, "stored": None})
+    folder = Path(out) / what.name
+    whole = {**document, "stored": str(folder)}
+    store(folder, kind, result, whole)
+    return Answer(result, whole)
