@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from inspect import Signature
 
     from bayesmembrane.app.door import (
+        as_dict,
         compare,
         diagnose,
         fit,
@@ -38,6 +39,7 @@ __all__ = [
     "DataError",
     "SettingsError",
     "StorageError",
+    "as_dict",
     "compare",
     "diagnose",
     "fit",

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from bayesmembrane.app.answers import Answer, Asked, asked, kept
+from bayesmembrane.app.documents import document
 from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.calibration.fit import fit as run_fit
@@ -45,7 +45,7 @@ def reconstruct(seed: int = 0, out: str | Path | None = None) -> Answer[Reconstr
     """The measured curve behind the published losses of the paper."""
     found = run_reconstruct(read_published_table(), seed=seed)
     what = Asked("reconstruct", "published losses", "", float("nan"), {"seed": seed})
-    return kept("reconstruction", found, found.to_json_dict(), what, out)
+    return kept("reconstruction", found, document(found), what, out)
 
 
 def fit(
@@ -60,7 +60,7 @@ def fit(
     """The least-squares optimum; ``starts`` are membrane parameters to search from as well."""
     found = run_fit(measurement, claim, loss=loss, seed=seed, starts=starts)
     what = asked("fit", measurement, [claim], seed, loss=loss, starts=[list(s) for s in starts])
-    return kept("fit", found, found.summary(), what, out)
+    return kept("fit", found, document(found), what, out)
 
 
 def sample(
@@ -85,7 +85,7 @@ def sample(
     run = run_sample(measurement, claim, seed=seed, out=out, name=name, ess=ess, progress=progress, solve=solve)
     if not run.interrupted:
         digest(run, rest=_rest(measurement, whole), breaks=breaks, solve=solve)
-    return Answer(run, {**run.summary(), "stored": None if run.path is None else str(run.path)})
+    return Answer(run, {**document(run), "stored": None if run.path is None else str(run.path)})
 
 
 def _rest(measurement: Measurement, whole: Measurement | None) -> Measurement | None:
@@ -110,9 +110,7 @@ def compare(
     last = max((r.measurement for r in ranges.values()), key=lambda m: float(m.deflection.max()))
     hashes = {n: [r.measurement.data_hash, r.whole and r.whole.data_hash] for n, r in ranges.items()}
     what = asked("compare", last, claims, seed, ess=ess, ranges=hashes)
-    answers = {name: c.summary() for name, c in found.items()}
-    document = {**list(answers.values())[-1], "ranges": [{"range": n, **a} for n, a in answers.items()]}
-    return kept("comparison", found, document, what, out)
+    return kept("comparison", found, document(found), what, out)
 
 
 def valleys(
@@ -128,7 +126,7 @@ def valleys(
     how = valleys_beside if claim.effects else run_valleys
     found: Valleys | Beside = how(measurement, claim, ends, rise=rise, seed=seed)
     what = asked("valleys", measurement, [claim], seed, ends=list(ends), rise=rise)
-    return kept("valleys", found, found.summary(), what, out)
+    return kept("valleys", found, document(found), what, out)
 
 
 def valleys_with_draws(
@@ -143,7 +141,7 @@ def valleys_with_draws(
     found = valleys_of(measurements, claim, seed=seed, draws=draws)
     last = max(measurements, key=lambda m: float(m.deflection.max()))
     what = asked("valleys", last, [claim], seed, ranges=[m.data_hash for m in measurements], draws=True)
-    return kept("valleys", found, found.summary(), what, out)
+    return kept("valleys", found, document(found), what, out)
 
 
 def diagnose(
@@ -156,7 +154,7 @@ def diagnose(
 ) -> Answer[Diagnosis]:
     """Whether the hypothesis misses something, and what."""
     found = run_diagnose(measurement, claim, seed=seed, tell=tell)
-    return kept("diagnosis", found, found.summary(), asked("diagnose", measurement, [claim], seed), out)
+    return kept("diagnosis", found, document(found), asked("diagnose", measurement, [claim], seed), out)
 
 
 def loop(
@@ -176,16 +174,7 @@ def loop(
     for run in loop_runs(found):
         digest(run)
     what = asked("loop", measurement, [claim], seed, ess=ess, adapt_noise=adapt_noise)
-    return kept("loop", found, loop_document(found), what, out)
-
-
-def loop_document(found: Loop) -> dict[str, Any]:
-    """The JSON answer of ``loop``, without the page."""
-    return {
-        "rounds": [r.summary() for r in found.rounds],
-        "sentence": found.sentence,
-        "left": None if found.left is None else found.left.sentence,
-    }
+    return kept("loop", found, document(found), what, out)
 
 
 def loop_runs(found: Loop) -> list[Run]:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from bayesmembrane.app import analyses
+from bayesmembrane.app import analyses, documents
 from bayesmembrane.app.pages import gathered, write
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.calibration.run import Run
@@ -156,3 +156,8 @@ def load(folder: Folder) -> Any:
     """
     found = gathered([Path(folder)])
     return found[0].result if len(found) == 1 else {(f.folder.name, f.kind): f.result for f in found}
+
+
+def as_dict(result: Any) -> dict[str, Any]:
+    """A result as plain values, the ones that ``--json`` prints: for JSON, pandas or a notebook of one's own."""
+    return documents.document(result)
