@@ -37,6 +37,7 @@ LONG = 100
 AT_ONCE = 2_000_000
 """Readings that are computed in one batch."""
 
+PUSHED = 0.01  # of the largest force: a negative one beyond it is no noise about the zero of a slack film
 STEP = 1e-3  # of the differences in coordinates: h^4 and round-off are both 1e-13 there
 
 
@@ -258,8 +259,10 @@ class Forward:
 
     @cached_property
     def _pushes(self) -> bool:
-        """True where the specimen was compressed, and pushed back."""
+        """True where the specimen was compressed, and pushed back: it was a block, not a film."""
         m = self.measurement
+        if m.across is not None:  # held across, a film may be taut below rest: only the stress tells
+            return bool(np.any(m.force < -PUSHED * np.max(np.abs(m.force))))
         return bool(np.any((m.deflection < -0.01 * m.full_range) & (m.force < 0)))
 
     def curves(

@@ -10,6 +10,7 @@ from bayesmembrane.forward import Forward
 from bayesmembrane.hypothesis import hypothesis
 from bayesmembrane.inference.optimum import fit
 from bayesmembrane.measurement import Measurement, Specimen, read_measurement, write_measurement
+from bayesmembrane.mechanics.solution import Note
 from bayesmembrane.mechanics.strip_law import StripLaw
 from bayesmembrane.registry import components, materials
 from bayesmembrane.rigs.base import Strip
@@ -169,3 +170,93 @@ def test_beyond_all_numbers_there_is_no_force_and_no_warning(kind: str) -> None:
     assert np.isfinite(force).tolist() == [[True, True, False]]
     assert np.isfinite(slope).tolist() == [[True, True, False]]
     assert np.isnan(force[0, 2])
+
+
+# ---- films held across -----------------------------------------------------------------------------------------------
+
+
+def biaxial(l1: np.ndarray, l2: np.ndarray, p1: np.ndarray, p2: np.ndarray) -> Measurement:
+    """Both stretches, and both nominal stresses in Pa of a film 1 mm thick."""
+    rig = Biaxial()
+    found = rig.from_columns(dict(zip(rig.columns, (l1, l2, p1, p2), strict=True)), 1e-3)
+    return Measurement(found["deflection"], found["force"], rig, Specimen("rubber", 1e-3), across=found["across"])
+
+
+def stresses(m: Measurement, material: str) -> np.ndarray:
+    """(2, n) nominal stress in Pa along both directions."""
+    force = Forward(hypothesis(material), m, m.deflection).film_force(np.array([FILMS[material]]))[0]
+    return force.reshape(2, -1) / (m.rig.lengths["width"] * 1e-3)
+
+
+@pytest.mark.parametrize("material", FILMS)
+def test_a_film_held_across_is_taut_below_rest(material: str) -> None:
+    """Down to l2 = l1^-1/2 both stresses are the slopes of the energy, though l2 is below 1."""
+    l1 = np.array([1.3, 1.3, 2.0, 2.0, 3.0])
+    l2 = np.array([0.99, 0.89, 0.95, 0.72, 0.6])
+    film = materials()[material](*FILMS[material])
+    tension = np.array(film.tension(l1, l2))
+    assert np.all(tension > 0)
+    found = stresses(biaxial(l1, l2, 1e6 + 0 * l1, 1e5 + 0 * l1), material)
+    assert found == pytest.approx(tension / 1e-3, rel=1e-12)
+    swapped = stresses(biaxial(l2, l1, 1e5 + 0 * l1, 1e6 + 0 * l1), material)
+    assert swapped[::-1] == pytest.approx(found, rel=1e-12)
+
+
+@pytest.mark.parametrize("material", FILMS)
+def test_a_film_narrower_than_a_free_strip_wrinkles(material: str) -> None:
+    """Across nothing, along the stress of a strip with free sides; below rest both ways nothing at all."""
+    l1 = np.array([1.3, 2.0, 2.0, 0.99, 0.8])
+    l2 = np.array([0.8, 0.6, 0.2, 0.99, 0.95])
+    m = biaxial(l1, l2, 1e6 + 0 * l1, 0 * l1)
+    found = stresses(m, material)
+    film = materials()[material](*FILMS[material])
+    free = np.asarray(film.tension(l1[:3], l1[:3] ** -0.5))[0] / 1e-3
+    assert found[0, :3] == pytest.approx(free, rel=1e-12)
+    assert np.all(found[0, 3:] == 0)
+    assert np.all(found[1] == 0)
+    curves = Forward(hypothesis(material), m, m.deflection).curves(np.array([FILMS[material]]), m.deflection, True)
+    assert curves.note[0].tolist() == 2 * [*(3 * [Note.WRINKLED]), Note.SLACK, Note.SLACK]
+    assert np.all(curves.sensitivity[0, 5:] == 0)
+    assert np.all(curves.ok)
+
+
+@pytest.mark.parametrize("material", FILMS)
+def test_stress_is_continuous_and_its_slope_right_where_a_film_becomes_taut(material: str) -> None:
+    stretch = np.linspace(0.5, 1.5, 401)
+    for across in (0.7, 1.0, 1.5):
+        law = StripLaw(materials()[material], np.array([FILMS[material]]), Biaxial(), across=np.full(401, across))
+        force, slope = law(law.rig.length * (stretch - 1)[None])
+        assert np.all(force >= 0)
+        assert np.max(np.abs(np.diff(force))) < 0.05 * np.max(force)
+        numeric = np.gradient(force[0], law.rig.length * stretch)
+        smooth = np.abs(stretch - max(across, 1.0) ** -0.5) > 0.01
+        smooth &= np.abs(stretch - across**-2.0) > 0.01
+        assert slope[0][smooth] == pytest.approx(numeric[smooth], rel=2e-2, abs=2e-3 * np.max(slope))
+
+
+def test_a_block_pushes_back_in_a_biaxial_test_too_and_noise_about_zero_is_no_push() -> None:
+    l1, l2 = np.array([2.0, 1.5]), np.array([0.6, 0.7])
+    film = materials()["neo_hookean"](*FILMS["neo_hookean"])
+    p1, p2 = np.asarray(film.tension(l1, l2)) / 1e-3
+    assert np.all(p2 < 0)
+    assert stresses(biaxial(l1, l2, p1, p2), "neo_hookean") == pytest.approx(np.array([p1, p2]), rel=1e-12)
+    assert np.all(stresses(biaxial(l1, l2, p1, -1e-3 * p1), "neo_hookean")[1] == 0)
+
+
+@needs_data
+def test_every_taut_reading_of_kawabata_is_computed() -> None:
+    """All his readings lie on the taut side, up to the rounding of the stretches; Ogden fits them to 10 kPa."""
+    l1, l2, p1, p2 = np.genfromtxt(DATA / "Kawabata_1981_biaxial_full.csv", delimiter=",", skip_header=1).T
+    m = biaxial(l1, l2, 1e6 * p1, 1e6 * p2)
+    for material in FILMS:
+        found = stresses(m, material)
+        assert np.all(found[0] > 0)
+        pulled = p2 > 0
+        assert np.all(found[1][pulled] > 0)
+        assert np.count_nonzero(pulled & (l2 < 1)) == 22
+        film = materials()[material](*FILMS[material])
+        direct = np.asarray(film.tension(l1, l2)) / 1e-3
+        taut = l2 > l1**-0.5
+        assert found[:, taut] == pytest.approx(direct[:, taut], rel=1e-12)
+    ogden = fit(m, hypothesis("ogden", convexity="none"))
+    assert ogden.rmse_N / (m.rig.lengths["width"] * 1e-3) < 1e4
