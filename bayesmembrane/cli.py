@@ -147,6 +147,8 @@ def import_(
     from bayesmembrane.importers.base import import_export
 
     written = import_export(export, out_file)
+    for note in written.notes:
+        log.print(f"{export}: {note}.", markup=False)
     document = {
         "curve": str(written.curve),
         "specimen": str(written.specimen),
@@ -255,6 +257,7 @@ def sample(
     from bayesmembrane.cache import CachedSolver
     from bayesmembrane.inference.digest import digest
     from bayesmembrane.inference.run import sample as run
+    from bayesmembrane.measurement import read_measurement
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
     cache = CachedSolver(out_folder / "curves")
@@ -265,7 +268,7 @@ def sample(
         raise typer.Exit(130)
     rest = None
     if max_deflection_mm is not None and measurement.full_range > measurement.deflection.max():
-        whole = _measurement(curve, specimen)
+        whole = read_measurement(curve, specimen)
         rest = whole.select(whole.deflection > measurement.deflection.max())
     digest(done, rest=rest, solve=cache)
 
@@ -548,7 +551,10 @@ def demo(
 def _measurement(curve: Path, specimen: Path) -> Measurement:
     from bayesmembrane.measurement import read_measurement
 
-    return read_measurement(curve, specimen)
+    measurement = read_measurement(curve, specimen)
+    for note in measurement.provenance.notes:
+        log.print(f"{curve}: {note}.", markup=False)
+    return measurement
 
 
 def _asked(

@@ -270,7 +270,10 @@ class Forward:
     ) -> Curves:
         """Curves of ``films`` (B, n) without effects at ``deflection`` (N,) m on the rig of the measurement."""
         if isinstance(self.measurement.rig, Strip):
-            strip = StripLaw(self.hypothesis.material, films, self.measurement.rig, self._pushes, self.path.across)
+            across = self.path.across
+            if across is not None and deflection.size == len(self.measurement):  # the path may hold more points
+                across = self.measurement.across
+            strip = StripLaw(self.hypothesis.material, films, self.measurement.rig, self._pushes, across)
             return strip_curves(strip, deflection, sensitivities)
         rig = annulus(self.measurement)
         # What lies beyond is solved to see whether the film stays convex there.

@@ -1,9 +1,9 @@
 """The law of a homogeneous test, in closed form: F = width P1(l, l2(l)) with l = 1 + delta / L.
 
 A thin film bears no compression. Where both stretches are measured, that is a matter of stress, not of stretch: held
-across at l2, a film is taut along down to l = l2^(-1/2), where P1(l, l2) falls to zero, though l is below 1 there. Below,
-it wrinkles. This is tension-field theory (A. C. Pipkin, IMA J. Appl. Math. 36 (1986) 85) of an incompressible film whose
-energy obeys the Baker-Ericksen inequality: P1 > 0 where l > l3 = 1 / (l l2), whatever the energy.
+across at l2, a film is taut along down to l = l2^(-1/2), where P1(l, l2) falls to zero, though l is below 1 there.
+Below, it wrinkles. This is tension-field theory (A. C. Pipkin, IMA J. Appl. Math. 36 (1986) 85) of an incompressible
+film whose energy obeys the Baker-Ericksen inequality: P1 > 0 where l > l3 = 1 / (l l2), whatever the energy.
 """
 
 from __future__ import annotations

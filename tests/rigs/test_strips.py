@@ -260,3 +260,142 @@ def test_every_taut_reading_of_kawabata_is_computed() -> None:
         assert found[:, taut] == pytest.approx(direct[:, taut], rel=1e-12)
     ogden = fit(m, hypothesis("ogden", convexity="none"))
     assert ogden.rmse_N / (m.rig.lengths["width"] * 1e-3) < 1e4
+
+
+# ---- noise and signs in files ----------------------------------------------------------------------------------------
+
+
+class Files:
+    """A curve and a specimen file of a strip 5 mm wide and 0.2 mm thick: 1 MPa is 1 N."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def read(self, curve: str, kind: str = "uniaxial", noise: str = "") -> Measurement:
+        (self.folder / "c.csv").write_text(curve)
+        rig = f'[specimen]\nthickness_um = 200\n[rig]\nkind = "{kind}"\nwidth_mm = 5\n'
+        (self.folder / "c.toml").write_text(rig + (f"[measurement]\n{noise}\n" if noise else ""))
+        return read_measurement(self.folder / "c.csv", self.folder / "c.toml")
+
+    def fault(self, *arguments: str) -> str:
+        with pytest.raises(DataError) as caught:
+            self.read(*arguments)
+        return str(caught.value).replace(f"{self.folder}/", "")
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Files:
+    return Files(tmp_path)
+
+
+PULLED = "stretch,nominal_stress_MPa\n1.1,0.2\n1.2,0.3\n1.4,0.5\n"
+BOTH = "stretch_1,stretch_2,nominal_stress_1_MPa,nominal_stress_2_MPa"
+
+
+def with_column(name: str, values: tuple[float, ...] = (1, 2, 3)) -> str:
+    head, *rows = PULLED.splitlines()
+    return "\n".join([f"{head},{name}", *(f"{r},{v}" for r, v in zip(rows, values, strict=True))]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "scale"),
+    [("nominal_stress_sd_MPa", 1.0), ("nominal_stress_sd_kPa", 1e-3), ("nominal_stress_sd_psi", 6894.757e-6)],
+)
+@pytest.mark.parametrize("kind", STRIPS)
+def test_noise_may_be_stated_in_stress(files: Files, kind: str, name: str, scale: float) -> None:
+    column = files.read(with_column(name), kind)
+    assert column.force_sd == pytest.approx(scale * np.array([1, 2, 3]), rel=1e-6)
+    assert column.provenance.notes == ()
+    single = files.read(PULLED, kind, f"{name} = 4")
+    assert single.force_sd == pytest.approx(4 * scale * np.ones(3), rel=1e-6)
+    newton = files.read(with_column("force_sd_mN"), kind)
+    assert newton.force_sd == pytest.approx([1e-3, 2e-3, 3e-3], rel=1e-9)
+
+
+def test_noise_of_a_biaxial_test_is_stated_for_both_directions_or_for_each(files: Files) -> None:
+    rows = ("1.1,1,0.2,0.1", "1.3,1.1,0.3,0.2")
+    each = f"{BOTH},nominal_stress_1_sd_MPa,nominal_stress_2_sd_kPa\n{rows[0]},0.01,20\n{rows[1]},0.03,40\n"
+    m = files.read(each, "biaxial")
+    assert m.force_sd == pytest.approx([0.01, 0.03, 0.02, 0.04])
+    write_measurement(m, files.folder / "d.csv", files.folder / "d.toml")
+    assert read_measurement(files.folder / "d.csv", files.folder / "d.toml").force_sd == pytest.approx(m.force_sd)
+    one = files.read(f"{BOTH},nominal_stress_sd_MPa\n{rows[0]},0.01\n{rows[1]},0.03\n", "biaxial")
+    assert one.force_sd == pytest.approx([0.01, 0.03, 0.01, 0.03])
+    single = files.read(f"{BOTH}\n{rows[0]}\n{rows[1]}\n", "biaxial", "nominal_stress_sd_kPa = 5")
+    assert single.force_sd == pytest.approx(4 * [0.005])
+    half = f"{BOTH},nominal_stress_2_sd_kPa\n{rows[0]},20\n{rows[1]},40\n"
+    assert "nominal_stress_2_sd states the noise of one direction alone" in files.fault(half, "biaxial")
+    three = each.replace("sd_kPa\n", "sd_kPa,force_sd_N\n").replace(",20\n", ",20,1\n").replace(",40\n", ",40,1\n")
+    assert "both give the noise" in files.fault(three, "biaxial")
+
+
+@pytest.mark.parametrize(
+    ("curve", "noise", "said"),
+    [
+        (with_column("nominal_stress_sd_N"), "", '"N" is a unit of force, not of stress'),
+        (with_column("nominal_stress_sd"), "", 'the column "nominal_stress_sd" names no unit'),
+        (with_column("nominal_stress_sd_MPa", (1, 0, 1)), "", "line 3: the standard deviation of the force must be"),
+        (with_column("nominal_stress_sd_MPa"), "nominal_stress_sd_MPa = 1", "both give the noise"),
+        (with_column("nominal_stress_sd_MPa,force_sd_N").replace(",1\n", ",1,1\n").replace(",2\n", ",2,2\n")
+         .replace(",3\n", ",3,3\n"), "", "both give the noise"),
+        (PULLED, "nominal_stress_sd_MPa = 1\nforce_sd_N = 1", "both give the noise"),
+        (PULLED, "nominal_stress_sd_MPa = 0", "must be positive"),
+        (PULLED, "nominal_stress_sd_N = 1", '"N" is a unit of force, not of stress'),
+    ],
+)  # fmt: skip
+def test_a_fault_of_the_stated_noise_is_one_sentence(files: Files, curve: str, noise: str, said: str) -> None:
+    assert said in files.fault(curve, "uniaxial", noise)
+
+
+def test_a_column_that_nobody_reads_is_noted(files: Files) -> None:
+    m = files.read(with_column("nominal_stress_std_MPa"))
+    assert m.force_sd is None
+    assert m.provenance.notes == ("ignored columns: nominal_stress_std_MPa",)
+
+
+def compressed(stretch: np.ndarray, sign: float = 1.0) -> str:
+    stress = sign * 0.4 * (stretch - stretch**-2.0)
+    rows = "".join(f"{x:.6g},{s:.6g}\n" for x, s in zip(stretch, stress, strict=True))
+    return "stretch,nominal_stress_MPa\n" + rows
+
+
+def test_compression_alone_is_refused_and_no_sign_is_to_be_changed(files: Files) -> None:
+    said = files.fault(compressed(np.linspace(0.5, 0.98, 9)))
+    assert "a test in compression alone cannot be calibrated" in said
+    assert "change the sign" not in said
+    assert "keep the signs as they are" in said
+
+
+@pytest.mark.parametrize(
+    ("kind", "low", "high"), [("uniaxial", 0.5, 1.2), ("uniaxial", 0.7, 2.0), ("planar", 0.6, 1.1)]
+)
+def test_a_block_that_was_pushed_and_pulled_is_fitted_as_it_is(
+    files: Files, kind: str, low: float, high: float
+) -> None:
+    """Though most readings push: the modulus comes from both sides."""
+    m = files.read(compressed(np.linspace(low, high, 21)), kind)
+    found = fit(m, hypothesis("neo_hookean"))
+    if kind == "uniaxial":
+        assert found.parameters["neo_hookean.c1"].value == pytest.approx(0.2e6 * 200e-6, rel=1e-5)
+        assert found.rmse_N < 1e-5 * np.max(m.force)
+    assert np.all(Forward(found.hypothesis, m, m.deflection)(found.coordinates).force[0][:5] < 0)
+
+
+def test_signs_that_contradict_each_other_are_refused(files: Files) -> None:
+    for stretch in (np.linspace(1.05, 2, 9), np.linspace(0.5, 0.95, 9), np.linspace(0.5, 1.3, 9)):
+        said = files.fault(compressed(stretch, -1.0))
+        assert "the stress is negative above a stretch of 1 or positive below it" in said
+    rows = "1.2,1.1,-0.2,-0.1\n1.3,1.1,-0.3,-0.2\n"
+    assert "the stress is negative above a stretch of 1" in files.fault(f"{BOTH}\n{rows}", "biaxial")
+
+
+@needs_data
+def test_a_published_test_in_both_directions_is_read(files: Files) -> None:
+    stress, stretch = np.loadtxt(DATA / "Meunier_2008_UT.txt").T
+    rows = "".join(f"{x},{s}\n" for x, s in zip(stretch, stress, strict=True))
+    m = files.read("stretch,nominal_stress_MPa\n" + rows)
+    found = fit(m, hypothesis("yeoh", convexity="none"))
+    assert found.rmse_N < 0.1 * np.max(m.force)
+    part = m.select(m.deflection < 0)
+    force = Forward(found.hypothesis, part, part.deflection)(found.coordinates).force[0]
+    assert np.corrcoef(force, part.force)[0, 1] > 0.99
