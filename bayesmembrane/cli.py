@@ -417,6 +417,7 @@ def diagnose(
     from bayesmembrane.diagnosis.diagnose import diagnose as run
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
+    _say_thinning(measurement)
     with log.status(f"Diagnosing {claim.label()}") as status:
         found = run(measurement, claim, seed=seed, tell=status.update)
     document = found.summary()
@@ -449,6 +450,7 @@ def loop(
     measurement, claim = _asked(
         curve, specimen, material, effects, max_deflection_mm, convexity, "white" if adapt else noise
     )
+    _say_thinning(measurement)
     try:
         with lines() as tell:
             found = run(
@@ -555,6 +557,14 @@ def _measurement(curve: Path, specimen: Path) -> Measurement:
     for note in measurement.provenance.notes:
         log.print(f"{curve}: {note}.", markup=False)
     return measurement
+
+
+def _say_thinning(measurement: Measurement) -> None:
+    """On stderr, before the work: that not all readings will be used."""
+    from bayesmembrane.thinning import thinned, thinning_sentence
+
+    if sentence := thinning_sentence(measurement, thinned(measurement)):
+        log.print(sentence.replace("were diagnosed", "are diagnosed"), markup=False)
 
 
 def _asked(
