@@ -265,7 +265,11 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     for section in (options, root):
         section.finish()
     provenance = Provenance(
-        curve_csv.name, specimen_toml.name, covariance_file, "; ".join(o for o in origin if o), notes
+        curve_csv.name,
+        specimen_toml.name,
+        covariance_file,
+        "; ".join(o for o in origin if o),
+        (*notes, *rig.remarks(found)),
     )
     if sd is not None and np.min(sd) < LEAST_SD:
         fault = f"a standard deviation of {np.min(sd):g} N looks like a wrong unit"
@@ -416,9 +420,7 @@ def _check_strip(columns: dict[str, Array], table: Table) -> None:
         raise DataError(fault, places[k], remedy)
     if not np.any(deflection > 0):
         fault = "no stretch is above 1, and a test in compression alone cannot be calibrated"
-        raise DataError(
-            fault, table.file, "leave the signs as they are, and add the readings in tension of this rubber"
-        )
+        raise DataError(fault, table.file, "keep the signs as they are, and add the readings in tension of this rubber")
     _check_sd(columns, places)
 
 

@@ -218,3 +218,18 @@ def test_a_biaxial_measurement_is_sampled_compared_and_diagnosed(run: Run, tmp_p
     code, out, err = run("compare", *common, "--materials", "neo_hookean", *chains)
     assert code == 0, err
     assert len(json.loads(out)["table"]) == 1
+
+
+def test_a_long_measurement_is_thinned_and_it_is_said(run: Run, tmp_path: Path) -> None:
+    stretch = np.concatenate([np.linspace(1.01, 2.0, 1000), np.linspace(1.999, 1.02, 900)])
+    stress = 0.3 * (stretch - stretch**-2.0) + 2e-3 * np.random.default_rng(9).standard_normal(1900)
+    rows = "".join(f"{t},{x},{s}\n" for t, (x, s) in enumerate(zip(stretch, stress, strict=True)))
+    (tmp_path / "c.csv").write_text("time_s,stretch,nominal_stress_MPa\n" + rows)
+    (tmp_path / "c.toml").write_text('[specimen]\nthickness_um = 500\n[rig]\nkind = "uniaxial"\n')
+    common = [tmp_path / "c.csv", "--specimen", tmp_path / "c.toml", "--material", "neo_hookean", "--json"]
+    code, out, err = run("diagnose", *common)
+    assert code == 0, err
+    answer = json.loads(out)
+    assert "of the 1900 readings were diagnosed" in answer["thinning"]
+    assert answer["sentence"].endswith(answer["thinning"])
+    assert "of the 1900 readings are diagnosed" in " ".join(err.split())

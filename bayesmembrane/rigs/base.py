@@ -47,6 +47,10 @@ class Rig(ABC):
         """``deflection`` (m), ``force`` (N), their ``force_sd`` and others, from the columns of a curve in SI."""
         return dict(found)
 
+    def remarks(self, found: Mapping[str, Array]) -> tuple[str, ...]:
+        """What must be said of readings, as `from_columns` gives them, that a film on this rig cannot bear."""
+        return ()
+
     def newton(self, quantity: str, thickness: float) -> float:
         """N of one SI unit of a quantity in which this rig's noise is stated."""
         return 1.0

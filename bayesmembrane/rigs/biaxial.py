@@ -13,6 +13,9 @@ from bayesmembrane.parameters import Array
 from bayesmembrane.rigs.base import Strip
 from bayesmembrane.units import FORCE, RATIO, STRESS
 
+ROUNDED = 2e-3
+"""Part of a stretch by which files round it."""
+
 
 @dataclass(frozen=True)
 class Biaxial(Strip):
@@ -64,6 +67,13 @@ class Biaxial(Strip):
         if each:
             return {"force_sd": np.concatenate([found[k] for k in each]) * self.newton(STRESS, thickness)}
         return {k: np.tile(v, 2) for k, v in both.items()}
+
+    def remarks(self, found: Mapping[str, Array]) -> tuple[str, ...]:
+        stretch = 1.0 + found["deflection"] / self.length
+        loose = int(np.sum(stretch < (1 - ROUNDED) / np.sqrt(np.maximum(found["across"], 1.0))))
+        if loose == 0:
+            return ()
+        return (f"{loose} of {stretch.size} readings lie where a film is slack or wrinkled, and carries nothing",)
 
     def to_columns(self, arrays: Mapping[str, Array], thickness: float) -> dict[str, Array]:
         n = arrays["deflection"].size // 2

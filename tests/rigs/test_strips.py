@@ -347,6 +347,14 @@ def test_a_fault_of_the_stated_noise_is_one_sentence(files: Files, curve: str, n
     assert said in files.fault(curve, "uniaxial", noise)
 
 
+def test_readings_of_a_wrinkled_film_are_noted(files: Files) -> None:
+    """Those below l2 = l1^-1/2, and no others: neither taut ones below 1 nor what rounding puts on the border."""
+    rows = "1.5,0.9,0.2,0.1\n1.5,0.816,0.2,0\n1.5,0.7,0.2,0\n0.99,0.98,0,0\n"
+    m = files.read(f"{BOTH}\n{rows}", "biaxial")
+    assert m.provenance.notes == ("3 of 8 readings lie where a film is slack or wrinkled, and carries nothing",)
+    assert files.read(f"{BOTH}\n1.5,0.9,0.2,0.1\n1.2,1.2,0.2,0.1\n", "biaxial").provenance.notes == ()
+
+
 def test_a_column_that_nobody_reads_is_noted(files: Files) -> None:
     m = files.read(with_column("nominal_stress_std_MPa"))
     assert m.force_sd is None
