@@ -245,8 +245,12 @@ class Forward:
         if not self.composes:
             return self.curves(films, self.deflection).force
         plain = replace(self, hypothesis=replace(self.hypothesis, effects=()))
-        nothing = np.empty((len(films), 0))
-        return plain.composition(plain.law(films, nothing)[0], nothing)[0][:, plain._here]
+        rows = max(1, AT_ONCE // plain.path.deflection.size)
+        found = []
+        for part in [films[i : i + rows] for i in range(0, len(films), rows)] or [films]:
+            nothing = np.empty((len(part), 0))
+            found.append(plain.composition(plain.law(part, nothing)[0], nothing)[0][:, plain._here])
+        return np.concatenate(found)
 
     @property
     def _here(self) -> Any:
