@@ -147,6 +147,8 @@ def import_(
     from bayesmembrane.data.importers.base import import_export
 
     written = import_export(export, out_file)
+    for note in written.notes:
+        log.print(f"{export}: {note}.", markup=False)
     document = {
         "curve": str(written.curve),
         "specimen": str(written.specimen),
@@ -254,6 +256,7 @@ def sample(
     """The posterior, stored as a run; the same command continues a run that was interrupted."""
     from bayesmembrane.calibration.predictions import digest
     from bayesmembrane.calibration.run import sample as run
+    from bayesmembrane.data.measurement import read_measurement
     from bayesmembrane.physics.cache import CachedSolver
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
@@ -265,7 +268,7 @@ def sample(
         raise typer.Exit(130)
     rest = None
     if max_deflection_mm is not None and measurement.full_range > measurement.deflection.max():
-        whole = _measurement(curve, specimen)
+        whole = read_measurement(curve, specimen)
         rest = whole.select(whole.deflection > measurement.deflection.max())
     digest(done, rest=rest, solve=cache)
 
@@ -414,6 +417,7 @@ def diagnose(
     from bayesmembrane.diagnosis.diagnose import diagnose as run
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
+    _say_thinning(measurement)
     with log.status(f"Diagnosing {claim.label()}") as status:
         found = run(measurement, claim, seed=seed, tell=status.update)
     document = found.summary()
@@ -446,6 +450,7 @@ def loop(
     measurement, claim = _asked(
         curve, specimen, material, effects, max_deflection_mm, convexity, "white" if adapt else noise
     )
+    _say_thinning(measurement)
     try:
         with lines() as tell:
             found = run(
@@ -548,7 +553,18 @@ def demo(
 def _measurement(curve: Path, specimen: Path) -> Measurement:
     from bayesmembrane.data.measurement import read_measurement
 
-    return read_measurement(curve, specimen)
+    measurement = read_measurement(curve, specimen)
+    for note in measurement.provenance.notes:
+        log.print(f"{curve}: {note}.", markup=False)
+    return measurement
+
+
+def _say_thinning(measurement: Measurement) -> None:
+    """On stderr, before the work: that not all readings will be used."""
+    from bayesmembrane.data.thinning import thinned, thinning_sentence
+
+    if sentence := thinning_sentence(measurement, thinned(measurement)):
+        log.print(sentence.replace("were diagnosed", "are diagnosed"), markup=False)
 
 
 def _asked(

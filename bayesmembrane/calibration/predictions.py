@@ -220,7 +220,11 @@ def digest_draws(
     states = _profiles(film, shape_at, measurement)
     own_sd = measurement.force_sd
     unused = _Points.of(rest)
-    rest_force = force(unused.at)[0] if unused.at.size else np.empty((len(x), 0))
+    rest_force = np.empty((len(x), 0))
+    if rest is not None and rest.across is not None:  # each reading has its own state
+        rest_force = Forward(hypothesis, rest, rest.deflection, solve)(x, reached=False).force
+    elif unused.at.size:
+        rest_force = force(unused.at)[0]
     rest_force = rest_force + _total_sd(hypothesis, measurement, x, np.nan_to_num(unused.sd)) * rng.standard_normal(
         rest_force.shape
     )

@@ -37,6 +37,7 @@ LONG = 100
 AT_ONCE = 2_000_000
 """Readings that are computed in one batch."""
 
+PUSHED = 0.01  # of the largest force: a negative one beyond it is no noise about the zero of a slack film
 STEP = 1e-3  # of the differences in coordinates: h^4 and round-off are both 1e-13 there
 
 
@@ -244,8 +245,12 @@ class Forward:
         if not self.composes:
             return self.curves(films, self.deflection).force
         plain = replace(self, hypothesis=replace(self.hypothesis, effects=()))
-        nothing = np.empty((len(films), 0))
-        return plain.composition(plain.law(films, nothing)[0], nothing)[0][:, plain._here]
+        rows = max(1, AT_ONCE // plain.path.deflection.size)
+        found = []
+        for part in [films[i : i + rows] for i in range(0, len(films), rows)] or [films]:
+            nothing = np.empty((len(part), 0))
+            found.append(plain.composition(plain.law(part, nothing)[0], nothing)[0][:, plain._here])
+        return np.concatenate(found)
 
     @property
     def _here(self) -> Any:
@@ -258,8 +263,10 @@ class Forward:
 
     @cached_property
     def _pushes(self) -> bool:
-        """True where the specimen was compressed, and pushed back."""
+        """True where the specimen was compressed, and pushed back: it was a block, not a film."""
         m = self.measurement
+        if m.across is not None:  # held across, a film may be taut below rest: only the stress tells
+            return bool(np.any(m.force < -PUSHED * np.max(np.abs(m.force))))
         return bool(np.any((m.deflection < -0.01 * m.full_range) & (m.force < 0)))
 
     def curves(
@@ -267,7 +274,10 @@ class Forward:
     ) -> Curves:
         """Curves of ``films`` (B, n) without effects at ``deflection`` (N,) m on the rig of the measurement."""
         if isinstance(self.measurement.rig, Strip):
-            strip = StripLaw(self.hypothesis.material, films, self.measurement.rig, self._pushes, self.path.across)
+            across = self.path.across
+            if across is not None and deflection.size == len(self.measurement):  # the path may hold more points
+                across = self.measurement.across
+            strip = StripLaw(self.hypothesis.material, films, self.measurement.rig, self._pushes, across)
             return strip_curves(strip, deflection, sensitivities)
         rig = annulus(self.measurement)
         # What lies beyond is solved to see whether the film stays convex there.

@@ -10,6 +10,7 @@ from bayesmembrane.physics.forward import GAPS, Forward, beyond, predict
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import solve
 from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 
 RIG = Annulus(0.012, 0.030)
 CURVE = Measurement(np.linspace(2e-3, 40e-3, 8), np.linspace(0.1, 2, 8), RIG, Specimen("film", 5e-5))
@@ -108,3 +109,21 @@ def test_another_rig_is_refused() -> None:
     object.__setattr__(m, "rig", type("Strip", (), {"name": "uniaxial"})())
     with pytest.raises(SettingsError, match='"uniaxial"'):
         predict(hypothesis("yeoh"), coordinates("yeoh"), m)
+
+
+def test_films_without_effects_are_computed_in_batches_that_fit_into_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same forces, whatever the size of a batch."""
+    d = np.linspace(0.001, 0.05, 300)
+    m = Measurement(d, d, Uniaxial(), Specimen("strip", 1e-3))
+    films = np.linspace(1.0, 2.0, 7)[:, None] * np.array([[150.0, 20.0]])
+    whole = Forward(hypothesis("mooney_rivlin"), m, d).film_force(films)
+    sizes, law = [], Forward.law
+
+    def counted(self: Forward, part: np.ndarray, *rest: object) -> object:
+        sizes.append(len(part))
+        return law(self, part, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("bayesmembrane.physics.forward.AT_ONCE", 700)
+    monkeypatch.setattr(Forward, "law", counted)
+    assert np.array_equal(Forward(hypothesis("mooney_rivlin"), m, d).film_force(films), whole)
+    assert sizes == [2, 2, 2, 1]
