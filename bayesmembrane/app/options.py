@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from bayesmembrane.app.terminal import numbers
+from bayesmembrane.app.terminal import note, numbers
 
 if TYPE_CHECKING:
     from bayesmembrane.data.measurement import Measurement
@@ -77,10 +77,13 @@ class Curve(Group):
     specimen: Annotated[Path, typer.Option("--specimen", help="TOML with film, rig and noise.")]
 
     def read(self) -> Measurement:
-        """The whole measurement."""
+        """The whole measurement; what was left aside while reading is said on stderr."""
         from bayesmembrane.data.measurement import read_measurement
 
-        return read_measurement(self.curve, self.specimen)
+        measurement = read_measurement(self.curve, self.specimen)
+        for left_aside in measurement.provenance.notes:
+            note(f"{self.curve}: {left_aside}.")
+        return measurement
 
 
 @dataclass(frozen=True)

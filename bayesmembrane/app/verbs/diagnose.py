@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from bayesmembrane.app.options import Beside, Curve, Material, Output, Range, Stored
-from bayesmembrane.app.terminal import answer, say, status, table
+from bayesmembrane.app.terminal import answer, note, say, status, table
 
 if TYPE_CHECKING:
     from bayesmembrane.data.measurement import Measurement
@@ -21,9 +21,18 @@ def verb(curve: Curve, material: Material, beside: Beside, used: Range, stored: 
 
     claim = beside.with_material(material.material)
     measurement = used.of(curve.read())
+    say_thinning(measurement)
     with status(f"Diagnosing {claim.label()}") as tell:
         found = analyses.diagnose(measurement, claim, seed=output.seed, out=stored.folder, tell=tell)
     answer(found.document, output.as_json, lambda: show(found.document, measurement))
+
+
+def say_thinning(measurement: Measurement) -> None:
+    """On stderr, before the work: that not all readings will be used."""
+    from bayesmembrane.data.thinning import thinned, thinning_sentence
+
+    if sentence := thinning_sentence(measurement, thinned(measurement)):
+        note(sentence.replace("were diagnosed", "are diagnosed"))
 
 
 def show(document: dict[str, Any], measurement: Measurement) -> None:

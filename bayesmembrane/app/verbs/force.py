@@ -27,7 +27,7 @@ def verb(
 
     from bayesmembrane.app.answers import Asked, kept
     from bayesmembrane.ground.registry import material as named
-    from bayesmembrane.physics.mechanics import Note, Status, solve
+    from bayesmembrane.physics.mechanics import Note, Status, request, solve
 
     kind = named(film.material)
     made = kind.from_vector(numbers(film.parameters, "--parameters"))
@@ -38,7 +38,7 @@ def verb(
         "prestretch": prestretch,
         "solver": solver,
     }
-    curves = solve(kind, made.vector, np.array(where) * 1e-3, **settings)
+    curves = solve(request(kind, made.vector, np.array(where) * 1e-3, **settings))
     states = [Status(int(s)) for s in curves.status[0]]
     notes = [(Note(int(n)).name or "").lower() if n else "" for n in curves.note[0]]
     document = {

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from bayesmembrane.app.options import Output
-from bayesmembrane.app.terminal import answer, say
+from bayesmembrane.app.terminal import answer, note, say
 
 place = 3
 
@@ -24,6 +24,8 @@ def verb(
     from bayesmembrane.data.importers.base import import_export
 
     written = import_export(export, curve)
+    for left_aside in written.notes:
+        note(f"{export}: {left_aside}.")
     document = {
         "curve": str(written.curve),
         "specimen": str(written.specimen),

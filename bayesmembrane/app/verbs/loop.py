@@ -9,6 +9,7 @@ import typer
 
 from bayesmembrane.app.options import BesideAuto, Curve, Material, Output, Range, Sampling, Stored
 from bayesmembrane.app.terminal import answer, lines, resumable, say
+from bayesmembrane.app.verbs.diagnose import say_thinning
 from bayesmembrane.app.verbs.diagnose import show as show_diagnosis
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ def verb(
     adapt = beside.noise == "auto"
     claim = beside.with_material(material.material, noise="white" if adapt else "")
     measurement = used.of(curve.read())
+    say_thinning(measurement)
     with resumable(stored.folder), lines() as tell:
         found = analyses.loop(
             measurement,
