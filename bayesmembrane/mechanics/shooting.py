@@ -43,7 +43,7 @@ def solve(
 
         F = 2 pi R1 P1 sin(theta) at R = R1, with (l1, theta)(R1) such that l2 = l0 and h = delta at the ring.
 
-    Sensitivities, if asked for, are central differences in each parameter.
+    Sensitivities, if asked for, are differences in each parameter: central, or one-sided next to a film that is lost.
     """
     locks = locking_deflection(extensibility(problem), problem.prestretch, problem.ratio)
     lines = np.stack([_film(problem, i, float(locks[i]), rtol) for i in range(problem.parameters.shape[0])])
@@ -113,6 +113,13 @@ def _curves(problem: Problem, lines: Array) -> Curves:
 
 
 def _differences(problem: Problem, rtol: float) -> Array:
+    """dF/dp (B, N, n): central, or to the side that has a force where the other film is no longer stable."""
+    tight = rtol * 1e-2
+
+    def force(parameters: Array) -> Array:
+        return solve(replace(problem, parameters=parameters), rtol=tight).force
+
+    middle = None
     columns = []
     for i in range(problem.parameters.shape[1]):
         step = 1e-4 * np.maximum(np.abs(problem.parameters[:, i]), 1e-3)
@@ -120,6 +127,11 @@ def _differences(problem: Problem, rtol: float) -> Array:
         for side in (1, -1):
             p = problem.parameters.copy()
             p[:, i] += side * step
-            forces.append(solve(replace(problem, parameters=p), rtol=rtol * 1e-2).force)
-        columns.append((forces[0] - forces[1]) / (2 * step[:, None]))
+            forces.append(force(p))
+        column = (forces[0] - forces[1]) / (2 * step[:, None])
+        if np.any(np.isfinite(forces[0]) != np.isfinite(forces[1])):
+            middle = force(problem.parameters) if middle is None else middle
+            for side, there in zip((1, -1), forces, strict=True):
+                column = np.where(np.isnan(column), side * (there - middle) / step[:, None], column)
+        columns.append(column)
     return np.stack(columns, axis=-1)
