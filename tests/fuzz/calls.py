@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bayesmembrane.cli import main
 from tests.fuzz.cases import Case
+from tests.fuzz.package import main
 
 LIMIT = {"fit": 60.0, "sample": 120.0, "diagnose": 120.0}
 """Seconds of the process after which a call is given up: what takes minutes is no answer to a small curve."""
@@ -64,7 +64,7 @@ def call(case: Case, folder: Path, limit: float | None = None) -> Row:
         except Exception as error:
             fault = "traceback", f"{type(error).__name__}: {_one_line(str(error))} at {_place(error)}"
     seconds = time.process_time() - begun
-    outcome, sentence = fault if fault[0] else judged(case.verb, code, out.getvalue(), err.getvalue())
+    outcome, sentence = fault if fault[0] else judged(case, code, out.getvalue(), err.getvalue())
     heard = [w for w in told if issubclass(w.category, RuntimeWarning)]
     if outcome in GOOD and heard:
         first = heard[0]
@@ -116,7 +116,7 @@ def _one_line(text: str) -> str:
 # ---- judgement -------------------------------------------------------------------------------------------------------
 
 
-def judged(verb: str, code: int, out: str, err: str) -> tuple[str, str]:
+def judged(case: Case, code: int, out: str, err: str) -> tuple[str, str]:
     """(outcome, sentence) of an exit status and both streams."""
     if "Traceback" in err:
         return "traceback", _one_line(err.rpartition("Traceback")[2])
@@ -124,23 +124,24 @@ def judged(verb: str, code: int, out: str, err: str) -> tuple[str, str]:
         words = _one_line(re.sub(r"[│╭╮╰╯─]+", " ", err))
         return ("refused", words) if "Error" in words and not out else ("no sentence", words)
     if code != 0:
-        return _refusal(code, out, err)
+        return _refusal(case, code, out, err)
     try:
         document = json.loads(out, parse_constant=_refuse_constant)
     except ValueError as error:
         return "wrong answer", f"not JSON: {_one_line(str(error))}"
-    wrong = contradiction(verb, document)
-    return ("wrong answer", wrong) if wrong else ("answered", _told(verb, document))
+    wrong = contradiction(case.verb, document)
+    return ("wrong answer", wrong) if wrong else ("answered", _told(case.verb, document))
 
 
 def _refuse_constant(name: str) -> Any:
     raise ValueError(f"the document holds {name}")
 
 
-def _refusal(code: int, out: str, err: str) -> tuple[str, str]:
+def _refusal(case: Case, code: int, out: str, err: str) -> tuple[str, str]:
     """Progress may stand above; the last line is the sentence: what is wrong; how to mend it."""
     last = (err.strip().splitlines() or [""])[-1].strip()
-    whole = last.endswith(".") and ";" in last and len(last.split()) >= 5 and not _NO_NUMBER.search(last)
+    lost = {m[0] for m in _NO_NUMBER.finditer(last)} - set(case.options)  # what was asked for may be quoted
+    whole = last.endswith(".") and ";" in last and len(last.split()) >= 5 and not lost
     return ("refused" if code == 1 and whole and not out else "no sentence"), last
 
 

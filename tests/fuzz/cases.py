@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bayesmembrane.hypothesis import CONVEXITY
-from bayesmembrane.registry import components
 from tests.fuzz.curves import FAULTS, PROTOCOLS, RIGS, Bench, Motion, columns, motion, noisy, spoilt
+from tests.fuzz.package import CONVEXITY, components
 from tests.generator.energies import FAMILIES, Array
 
 VERBS = ("fit", "fit", "sample", "diagnose")
