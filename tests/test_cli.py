@@ -107,7 +107,7 @@ def test_a_negative_seed_is_wrong_usage(run: Run) -> None:
     code, out, err = run("fit", CURVE, "--specimen", SPECIMEN, "--material", "gent", "--seed", "-1")
     assert (code, out) == (2, "")
     assert "--seed" in err
-    assert "-1" in err
+    assert "Traceback" not in err
 
 
 def test_fit_answers_the_contract(run: Run) -> None:

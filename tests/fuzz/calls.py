@@ -22,6 +22,8 @@ from tests.fuzz.package import main
 LIMIT = {"fit": 60.0, "sample": 120.0, "diagnose": 120.0}
 """Seconds of the process after which a call is given up: what takes minutes is no answer to a small curve."""
 GOOD = ("answered", "refused")
+SOLVER = " problem"
+"""The function that checks what a solver is given: what it refuses came from inside, for a user gives it nothing."""
 VERDICTS = ("adequate", "named", "ambiguous", "material", "unknown")
 _NO_NUMBER = re.compile(r"(?<![\w-])(nan|inf|None|-inf)(?![\w-])")
 
@@ -35,7 +37,8 @@ class Row:
     """What came of one call.
 
     outcome : one of `GOOD`; "traceback", "timeout"; "no sentence" for a refusal that is not one sentence with a remedy;
-    "wrong answer" for a document that is not JSON or contradicts itself; "warned" for a warning that reached the user
+    "inner refusal" for one that blames the user for what came from inside; "wrong answer" for a document
+    that is not JSON or contradicts itself; "warned" for a warning that reached the user
     sentence : the refusal, or what is wrong
     """
 
@@ -52,18 +55,20 @@ def call(case: Case, folder: Path, limit: float | None = None) -> Row:
     """The call of ``case`` with its files in ``folder``, judged."""
     out, err = io.StringIO(), io.StringIO()
     arguments = case.arguments(folder)
-    begun, code, fault = time.process_time(), 0, ("", "")
+    begun, code, refused, fault = time.process_time(), 0, None, ("", "")
     with warnings.catch_warnings(record=True) as told, redirect_stdout(out), redirect_stderr(err):
         # Rather than as a default, so that a place that warned in an earlier call is heard in this one too.
         warnings.simplefilter("always", RuntimeWarning)
         try:
             with _limited(limit or LIMIT[case.verb]):
-                code = _exit_status(arguments)
+                code, refused = _exit_status(arguments)
         except TimeUpError:
             fault = "timeout", f"no answer in {limit or LIMIT[case.verb]:g} s, at {_place(sys.exc_info()[1])}"
         except Exception as error:
             fault = "traceback", f"{type(error).__name__}: {_one_line(str(error))} at {_place(error)}"
     seconds = time.process_time() - begun
+    if refused is not None and (place := _place(refused)).endswith(SOLVER):
+        fault = "inner refusal", f"{_one_line(str(refused))} At {place}"
     outcome, sentence = fault if fault[0] else judged(case, code, out.getvalue(), err.getvalue())
     heard = [w for w in told if issubclass(w.category, RuntimeWarning)]
     if outcome in GOOD and heard:
@@ -73,16 +78,17 @@ def call(case: Case, folder: Path, limit: float | None = None) -> Row:
     return Row(case.seed, case.verb, case.short, code, round(seconds, 1), outcome, sentence)
 
 
-def _exit_status(arguments: list[str]) -> int:
+def _exit_status(arguments: list[str]) -> tuple[int, BaseException | None]:
+    """The exit status, and the error behind it."""
     before = sys.argv
     sys.argv = ["bayesmembrane", *arguments]
     try:
         main()
     except SystemExit as stop:
-        return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
+        return stop.code if isinstance(stop.code, int) else int(stop.code is not None), stop.__context__
     finally:
         sys.argv = before
-    return 0
+    return 0, None
 
 
 @contextmanager
