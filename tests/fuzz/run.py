@@ -15,6 +15,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, fields
+from functools import partial
 from pathlib import Path
 
 from tests.fuzz.calls import GOOD, Row, call
@@ -25,10 +26,10 @@ RESULTS = ROOT / "reports" / "study-fuzz" / "results.csv"
 SHOWN = 12
 
 
-def run_case(asked: Case) -> Row:
+def run_case(asked: Case, limit: float | None = None) -> Row:
     """The call, in a folder that is removed afterwards."""
     with tempfile.TemporaryDirectory() as folder:
-        return call(asked, Path(folder))
+        return call(asked, Path(folder), limit)
 
 
 def stored(path: Path) -> dict[int, Row]:
@@ -45,8 +46,8 @@ def stored(path: Path) -> dict[int, Row]:
     }
 
 
-def run(cases: Iterable[Case], path: Path, jobs: int) -> None:
-    """Run what is not stored yet."""
+def run(cases: Iterable[Case], path: Path, jobs: int, limit: float | None = None) -> None:
+    """Run what is not stored yet, at most ``limit`` seconds a call."""
     done = stored(path)
     todo = (c for c in cases if c.seed not in done)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -55,18 +56,19 @@ def run(cases: Iterable[Case], path: Path, jobs: int) -> None:
         writer = csv.DictWriter(file, [f.name for f in fields(Row)])
         if new:
             writer.writeheader()
-        for row in _rows(todo, jobs):
+        for row in _rows(todo, jobs, limit):
             writer.writerow(asdict(row))
             file.flush()
             print(f"{row.seed} {row.verb}: {row.outcome}, {row.seconds:.1f} s: {row.sentence[:150]}", flush=True)
 
 
-def _rows(todo: Iterator[Case], jobs: int) -> Iterator[Row]:
+def _rows(todo: Iterator[Case], jobs: int, limit: float | None) -> Iterator[Row]:
+    one = partial(run_case, limit=limit)
     if jobs == 1:
-        yield from map(run_case, todo)
+        yield from map(one, todo)
         return
     with ProcessPoolExecutor(jobs) as pool:
-        yield from pool.map(run_case, todo)
+        yield from pool.map(one, todo)
 
 
 def table(rows: Iterable[Row]) -> str:
@@ -94,6 +96,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=500, help="how many seeds")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--only", choices=sorted(set(VERBS)), help="only the calls of this verb")
+    parser.add_argument("--limit", type=float, help="seconds of a call; without, those of its verb")
     parser.add_argument("--results", type=Path, default=RESULTS, help="CSV, one row a call")
     parser.add_argument("--write", type=Path, help="write the files of the first call here, and print its command")
     asked = parser.parse_args(arguments)
@@ -101,7 +104,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(shlex.join(["bayesmembrane", *case(asked.first).arguments(asked.write)]))
         return 0
     seeds = range(asked.first, asked.first + asked.count)
-    run((c for c in map(case, seeds) if asked.only in (None, c.verb)), asked.results, asked.jobs)
+    run((c for c in map(case, seeds) if asked.only in (None, c.verb)), asked.results, asked.jobs, asked.limit)
     rows = [r for r in stored(asked.results).values() if r.seed in seeds and asked.only in (None, r.verb)]
     print(table(rows))
     return int(any(r.outcome not in GOOD for r in rows))
