@@ -51,11 +51,12 @@ def run(cases: Iterable[Case], path: Path, jobs: int, limit: float | None = None
     done = stored(path)
     todo = (c for c in cases if c.seed not in done)
     path.parent.mkdir(parents=True, exist_ok=True)
-    new = not path.exists()
+    new = not path.exists() or path.stat().st_size == 0
     with path.open("a", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, [f.name for f in fields(Row)])
         if new:
             writer.writeheader()
+            file.flush()
         for row in _rows(todo, jobs, limit):
             writer.writerow(asdict(row))
             file.flush()

@@ -68,6 +68,7 @@ def test_the_judge_knows_a_contradiction() -> None:
 def test_a_run_goes_on_where_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     results = tmp_path / "results.csv"
     refused = Case(7, "fit", (("curve.csv", ""), ("film.toml", "")), ("--material", "gent"), "empty")
+    results.touch()  # as an interruption before the first row leaves it
     run([refused], results, 1)
     first = results.read_text()
     run([refused], results, 1)
