@@ -22,7 +22,8 @@ from bayesmembrane.calibration import store as storage
 from bayesmembrane.calibration.crosscheck import crosscheck
 from bayesmembrane.calibration.goodness import dominates, dominates_sentence, goodness
 from bayesmembrane.calibration.posterior import Posterior, failure_sentence
-from bayesmembrane.calibration.sampling.walk import Callback, Chains, Sampled, Settings, run_ensembles
+from bayesmembrane.calibration.sampling.chains import Chains, read_chains
+from bayesmembrane.calibration.sampling.walk import Callback, Sampled, Settings, run_ensembles
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.cache import CachedSolver, Tally
@@ -111,7 +112,7 @@ def sample(
     folder = None if out is None else storage.claim(Path(out) / name, asked)
     if folder is not None and (folder / storage.STATUS).exists() and not (folder / storage.CHAINS).exists():
         return load_run(folder)
-    before = storage.read_chains(folder) if folder is not None else None
+    before = read_chains(folder / storage.CHAINS) if folder is not None else None
     sampled = run_ensembles(posterior, settings, seed, progress, before)
     run = _assemble(posterior, sampled, settings, seed, name, folder, asked)
     if cached is not None and (now := _tally(solve)) is not None:

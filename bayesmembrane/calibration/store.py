@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
 import re
-import tempfile
 import tomllib
-from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -21,11 +18,14 @@ import arviz
 import numpy as np
 import tomli_w
 
-from bayesmembrane.calibration.sampling.walk import Chains, Settings
+from bayesmembrane.calibration.sampling.chains import Chains, write_chains
+from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen
 from bayesmembrane.data.motion import Path as Motion
 from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.files import write_text, write_whole
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.plain import json_text
 from bayesmembrane.ground.registry import component
 from bayesmembrane.physics.hypothesis import Hypothesis
 
@@ -108,7 +108,7 @@ def claim(folder: Path, asked: dict[str, Any]) -> Path:
         elif content:
             raise StorageError("the folder holds files that are no run", str(folder), "choose another name or folder")
         else:
-            _write(folder / ASKED, lambda path: path.write_text(tomli_w.dumps(asked), encoding="utf-8"))
+            write_text(folder / ASKED, tomli_w.dumps(asked), "the run")
     except (OSError, tomllib.TOMLDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "run.toml is damaged"
         raise StorageError(f"the run cannot be stored there ({reason})", str(folder), "choose another folder") from None
@@ -120,17 +120,13 @@ def write_run(folder: Path, asked: dict[str, Any], data: Any, status: dict[str, 
 
     Raises `StorageError` if that fails; every file is then as it was before, or complete.
     """
-    try:
-        _write(folder / ASKED, lambda path: path.write_text(tomli_w.dumps(asked), encoding="utf-8"))
-        _write(folder / POSTERIOR, lambda path: data.to_netcdf(str(path), engine="h5netcdf"))
-        if chains is not None:
-            _write(folder / CHAINS, lambda path: _save_chains(path, chains))
-        text = json.dumps(_plain(status), indent=1, allow_nan=False)
-        _write(folder / STATUS, lambda path: path.write_text(text, encoding="utf-8"))
-        if chains is None:
-            (folder / CHAINS).unlink(missing_ok=True)
-    except OSError as error:
-        raise StorageError(f"the run cannot be stored ({error.strerror or error})", str(folder)) from None
+    write_text(folder / ASKED, tomli_w.dumps(asked), "the run")
+    write_whole(folder / POSTERIOR, lambda part: data.to_netcdf(str(part), engine="h5netcdf"), "the run")
+    if chains is not None:
+        write_chains(folder / CHAINS, chains)
+    write_text(folder / STATUS, json_text(status, indent=1), "the run")
+    if chains is None:
+        (folder / CHAINS).unlink(missing_ok=True)
 
 
 def read_run(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Any]:
@@ -145,69 +141,6 @@ def read_run(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Any]:
     except (OSError, ValueError, KeyError) as error:
         raise StorageError(f"the run is damaged ({error})", str(folder), "remove the folder and sample again") from None
     return asked, status, stored
-
-
-def _write(path: Path, writer: Callable[[Path], Any]) -> None:
-    """Let ``writer`` fill a file beside ``path``, then rename it."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    os.close(handle)
-    try:
-        writer(Path(temporary))
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
-def _plain(value: Any) -> Any:
-    """JSON has no nan and no infinity: they become null."""
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value
-
-
-# ---- chains of an interrupted run ------------------------------------------------------------------------------------
-
-
-def _save_chains(path: Path, chains: Chains) -> None:
-    states: dict[str, Any] = {}
-    for e, (_, key, position, has_gauss, gauss) in enumerate(chains.random_states):
-        states |= {f"key{e}": key, f"rest{e}": np.array([position, has_gauss, gauss])}
-    with path.open("wb") as file:
-        np.savez(
-            file,
-            x=chains.x,
-            log_posterior=chains.log_posterior,
-            counts=np.array(json.dumps(chains.counts)),
-            seconds=np.array(chains.seconds),
-            lessons=np.array(chains.lessons, dtype=int),
-            **states,
-        )
-
-
-def read_chains(folder: Path) -> Chains | None:
-    """Where an interrupted run stands, None if it is not one; raises `StorageError` if the file is damaged."""
-    path = folder / CHAINS
-    if not path.exists():
-        return None
-    try:
-        with np.load(path) as f:
-            states = tuple(
-                ("MT19937", f[f"key{e}"], int(rest[0]), int(rest[1]), float(rest[2]))
-                for e, rest in ((e, f[f"rest{e}"]) for e in range(len(f["x"])))
-            )
-            counts = Counter(json.loads(str(f["counts"])))
-            lessons = tuple(int(s) for s in f["lessons"])
-            return Chains(f["x"], f["log_posterior"], states, counts, float(f["seconds"]), lessons)
-    except (OSError, ValueError, KeyError) as error:
-        raise StorageError(
-            f"the chains are damaged ({error})", str(path), "remove the folder and sample again"
-        ) from None
 
 
 # ---- InferenceData ---------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array, Prior, Uniform
 from bayesmembrane.physics.forward import Forward, Solve
@@ -86,7 +87,7 @@ def scaled(prior: Prior, factor: float) -> Prior | None:
 
 def _reweighted(name: str, factor: float, log_ratio: Array, worth: float, mass: tuple[float, float]) -> Widened:
     w = np.exp(log_ratio - np.max(log_ratio))
-    ess = float(worth * np.sum(w) ** 2 / np.sum(w * w))
+    ess = worth * effective_draws(w)
     log_mass, log_mass_sd = mass
     change = float(np.max(log_ratio) + np.log(np.mean(w))) - log_mass
     sd = float(np.hypot(np.std(w) / np.mean(w) / np.sqrt(worth * len(w)), log_mass_sd))
