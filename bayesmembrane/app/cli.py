@@ -67,20 +67,13 @@ def force(
     import numpy as np
 
     from bayesmembrane.ground.registry import material as named
-    from bayesmembrane.physics.mechanics import Note, Status, solve
+    from bayesmembrane.physics.mechanics import Note, Status, request, solve
 
     kind = named(material)
     film = kind.from_vector(numbers(parameters, "--parameters"))
     where = numbers(deflection_mm, "--deflection-mm")
-    curves = solve(
-        kind,
-        film.vector,
-        np.array(where) * 1e-3,
-        inner_radius=inner_radius_mm * 1e-3,
-        outer_radius=outer_radius_mm * 1e-3,
-        prestretch=prestretch,
-        solver=solver,
-    )
+    radii = inner_radius_mm * 1e-3, outer_radius_mm * 1e-3
+    curves = solve(request(kind, film.vector, np.array(where) * 1e-3, *radii, prestretch=prestretch, solver=solver))
     states = [Status(int(s)) for s in curves.status[0]]
     notes = [(Note(int(n)).name or "").lower() if n else "" for n in curves.note[0]]
     document = {
@@ -147,6 +140,8 @@ def import_(
     from bayesmembrane.data.importers.base import import_export
 
     written = import_export(export, out_file)
+    for note in written.notes:
+        log.print(f"{export}: {note}.", markup=False)
     document = {
         "curve": str(written.curve),
         "specimen": str(written.specimen),
@@ -253,13 +248,14 @@ def sample(
 ) -> None:
     """The posterior, stored as a run; the same command continues a run that was interrupted."""
     from bayesmembrane.calibration.run import sample as run
+    from bayesmembrane.data.measurement import read_measurement
     from bayesmembrane.physics.cache import CachedSolver
     from bayesmembrane.words.sampling import document
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
     cache, rest = CachedSolver(out_folder / "curves"), None
     if max_deflection_mm is not None and measurement.full_range > measurement.deflection.max():
-        whole = _measurement(curve, specimen)
+        whole = read_measurement(curve, specimen)
         rest = whole.select(whole.deflection > measurement.deflection.max())
     with _bar(claim.label()) as tell:
         done = run(measurement, claim, seed=seed, out=out_folder, ess=ess, progress=tell, solve=cache, rest=rest)
@@ -414,6 +410,7 @@ def diagnose(
     from bayesmembrane.diagnosis.diagnose import diagnose as run
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
+    _say_thinning(measurement)
     with log.status(f"Diagnosing {claim.label()}") as status:
         found = run(measurement, claim, seed=seed, tell=status.update)
     document = found.summary()
@@ -445,6 +442,7 @@ def loop(
     measurement, claim = _asked(
         curve, specimen, material, effects, max_deflection_mm, convexity, "white" if adapt else noise
     )
+    _say_thinning(measurement)
     try:
         with lines() as tell:
             found = run(
@@ -542,7 +540,18 @@ def demo(
 def _measurement(curve: Path, specimen: Path) -> Measurement:
     from bayesmembrane.data.measurement import read_measurement
 
-    return read_measurement(curve, specimen)
+    measurement = read_measurement(curve, specimen)
+    for note in measurement.provenance.notes:
+        log.print(f"{curve}: {note}.", markup=False)
+    return measurement
+
+
+def _say_thinning(measurement: Measurement) -> None:
+    """On stderr, before the work: that not all readings will be used."""
+    from bayesmembrane.data.thinning import thinned, thinning_sentence
+
+    if sentence := thinning_sentence(measurement, thinned(measurement)):
+        log.print(sentence.replace("were diagnosed", "are diagnosed"), markup=False)
 
 
 def _asked(

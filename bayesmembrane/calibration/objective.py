@@ -60,10 +60,14 @@ class Objective:
         return white[:, :, 0], white[:, :, 1:]
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
-        """(r (N,), J (N, k)) of one x (k,), remembered: a search asks for them one after the other."""
+        """(r (N,), J (N, k)) of one x (k,), remembered: a search asks for them one after the other.
+
+        A film whose slopes are not all numbers has no r either: no search may start there or step there.
+        """
         if self._last is None or not np.array_equal(self._last[0], x):
             r, j = self.batch(x[None, :])
-            self._last = (x.copy(), r[0], j[0])
+            known = np.all(np.isfinite(j[0]))
+            self._last = (x.copy(), r[0] if known else np.full_like(r[0], np.nan), j[0])
         return self._last[1], self._last[2]
 
     def many(self, prediction: Prediction) -> Array:
@@ -134,11 +138,14 @@ class Objective:
         return np.array([float(p.prior.distribution().std()) for p in self.parameters])
 
     def polish(self, x: Array, evaluations: int = MOST, tolerance: float = 1e-8) -> tuple[Array, float, str]:
-        """(x, |r|, status) after a trust-region search from x (k,)."""
+        """(x, |r|, status) after a trust-region search from x (k,); |r| is inf where x has no curve or no slopes."""
         room = 1e-6 * (self.high - self.low)
+        start = np.clip(x, self.low + room, self.high - room)
+        if not np.all(np.isfinite(self(start)[0])):
+            return start, np.inf, "no curve at the start"
         done = least_squares(
             self._residual,
-            np.clip(x, self.low + room, self.high - room),
+            start,
             jac=self._slope,
             bounds=(self.low, self.high),
             x_scale="jac",

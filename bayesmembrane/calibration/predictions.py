@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.convexity import RESTRICTING
 from bayesmembrane.physics.forward import Forward, Solve, annulus
-from bayesmembrane.physics.hypothesis import CONVEXITY, Hypothesis
+from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.convexity import least_eigenvalue
@@ -150,7 +151,11 @@ def predict_draws(
     states = _profiles(film, shape_at, measurement)
     own_sd = measurement.force_sd
     unused = _points(rest)
-    rest_force = force(unused.at)[0] if unused.at.size else np.empty((len(x), 0))
+    rest_force = np.empty((len(x), 0))
+    if rest is not None and rest.across is not None:  # each reading has its own state
+        rest_force = Forward(hypothesis, rest, rest.deflection, solve)(x, reached=False).force
+    elif unused.at.size:
+        rest_force = force(unused.at)[0]
     rest_force = rest_force + _total_sd(hypothesis, measurement, x, np.nan_to_num(unused.sd)) * rng.standard_normal(
         rest_force.shape
     )
@@ -180,7 +185,7 @@ def predict_draws(
         rest_residual=_band(unused.force - rest_force),
         curves_at=_band(here.force),
         film=films[chosen],
-        convex={m: float(np.mean(_meets(here.margin(m, hypothesis), m))) for m in CONVEXITY if m != "none"},
+        convex={m.name: float(np.mean(m.holds(m.margin(here, hypothesis.material)))) for m in RESTRICTING},
         shape_at=shape_at,
         state_1=states[2],
         state_2=states[3],
@@ -267,10 +272,6 @@ def _total_sd(hypothesis: Hypothesis, measurement: Measurement, x: Array, given:
     if "noise.sd" in names:
         inferred = hypothesis.natural(x, measurement)[:, names.index("noise.sd")]
     return np.sqrt(given**2 + inferred[:, None] ** 2)
-
-
-def _meets(margin: Array, mode: str) -> NDArray[np.bool_]:
-    return np.asarray(margin > 0 if mode == "elliptic" else margin >= 0)
 
 
 def _profiles(film: Material, at: Array, measurement: Measurement) -> Array:
