@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bayesmembrane.calibration.store import inference_data, measurement_of
+from bayesmembrane.calibration.layout import inference_data, measurement_of
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.motion import NOMINAL_SPEED, Path, holds
 from bayesmembrane.physics.rigs.annulus import Annulus
