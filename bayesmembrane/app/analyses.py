@@ -5,16 +5,21 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from bayesmembrane.app.answers import Answer, Asked, asked, kept
 from bayesmembrane.app.documents import document
 from bayesmembrane.calibration.beside_paper import BreakPoint
+from bayesmembrane.calibration.fingerprint import fingerprint
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.calibration.fit import fit as run_fit
-from bayesmembrane.calibration.predictions import digest
-from bayesmembrane.calibration.run import Run
+from bayesmembrane.calibration.predictions import Wanted
+from bayesmembrane.calibration.run import Run, predictions_of
 from bayesmembrane.calibration.run import sample as run_sample
 from bayesmembrane.calibration.sampling.walk import Callback
 from bayesmembrane.comparison.compare import Range, compare_ranges
@@ -44,7 +49,8 @@ CURVES = "curves"  # the folder beside the runs in which the solver keeps what i
 def reconstruct(seed: int = 0, out: str | Path | None = None) -> Answer[Reconstruction]:
     """The measured curve behind the published losses of the paper."""
     found = run_reconstruct(read_published_table(), seed=seed)
-    what = Asked("reconstruct", "published losses", "", float("nan"), {"seed": seed})
+    mark = fingerprint(run_reconstruct.__module__, (), (), {}, seed)
+    what = Asked("reconstruct", "published losses", "", float("nan"), mark)
     return kept("reconstruction", found, document(found), what, out)
 
 
@@ -59,7 +65,8 @@ def fit(
 ) -> Answer[Fit]:
     """The least-squares optimum; ``starts`` are membrane parameters to search from as well."""
     found = run_fit(measurement, claim, loss=loss, seed=seed, starts=starts)
-    what = asked("fit", measurement, [claim], seed, loss=loss, starts=[list(s) for s in starts])
+    settings = {"seed": seed, "loss": loss, "starts": [list(s) for s in starts]}
+    what = asked("fit", run_fit, [measurement], [claim], settings)
     return kept("fit", found, document(found), what, out)
 
 
@@ -82,9 +89,11 @@ def sample(
     breaks : break points of other films of the same silicone, predicted likewise
     """
     solve = api.solve if out is None else CachedSolver(Path(out) / CURVES)
-    run = run_sample(measurement, claim, seed=seed, out=out, name=name, ess=ess, progress=progress, solve=solve)
-    if not run.interrupted:
-        digest(run, rest=_rest(measurement, whole), breaks=breaks, solve=solve)
+    options: dict[str, Any] = {"seed": seed, "out": out, "name": name, "ess": ess, "progress": progress}
+    run = run_sample(measurement, claim, solve=solve, predictions=False, **options)
+    rest = _rest(measurement, whole)
+    if run.path is not None and not run.interrupted:
+        predictions_of(run, Wanted(rest=rest, breaks=tuple(breaks)) if breaks or rest is not None else None, solve)
     return Answer(run, {**document(run), "stored": None if run.path is None else str(run.path)})
 
 
@@ -107,9 +116,10 @@ def compare(
 ) -> Answer[dict[str, Comparison]]:
     """The evidence for each hypothesis on each range; the result is by the names of the ranges."""
     found = compare_ranges(ranges, claims, seed, out=out, ess=ess, workers=workers, progress=progress)
-    last = max((r.measurement for r in ranges.values()), key=lambda m: float(m.deflection.max()))
-    hashes = {n: [r.measurement.data_hash, r.whole and r.whole.data_hash] for n, r in ranges.items()}
-    what = asked("compare", last, claims, seed, ess=ess, ranges=hashes)
+    parts = [r.measurement for r in ranges.values()]
+    wholes = [None if r.whole is None else r.whole.data_hash for r in ranges.values()]
+    settings = {"seed": seed, "ess": ess, "names": list(ranges), "wholes": wholes}
+    what = asked("compare", compare_ranges, parts, claims, settings)
     return kept("comparison", found, document(found), what, out)
 
 
@@ -125,7 +135,8 @@ def valleys(
     """The valleys of the loss over ranges that end at ``ends`` (m), with effects also those without."""
     how = valleys_beside if claim.effects else run_valleys
     found: Valleys | Beside = how(measurement, claim, ends, rise=rise, seed=seed)
-    what = asked("valleys", measurement, [claim], seed, ends=list(ends), rise=rise)
+    settings = {"seed": seed, "ends": list(ends), "rise": rise}
+    what = asked("valleys", how, [measurement], [claim], settings)
     return kept("valleys", found, document(found), what, out)
 
 
@@ -139,8 +150,7 @@ def valleys_with_draws(
 ) -> Answer[Valleys]:
     """`valleys` over measurements of one film, with posterior draws (B, k) of each."""
     found = valleys_of(measurements, claim, seed=seed, draws=draws)
-    last = max(measurements, key=lambda m: float(m.deflection.max()))
-    what = asked("valleys", last, [claim], seed, ranges=[m.data_hash for m in measurements], draws=True)
+    what = asked("valleys", valleys_of, measurements, [claim], {"seed": seed, "draws": [_mark(d) for d in draws]})
     return kept("valleys", found, document(found), what, out)
 
 
@@ -154,7 +164,8 @@ def diagnose(
 ) -> Answer[Diagnosis]:
     """Whether the hypothesis misses something, and what."""
     found = run_diagnose(measurement, claim, seed=seed, tell=tell)
-    return kept("diagnosis", found, document(found), asked("diagnose", measurement, [claim], seed), out)
+    what = asked("diagnose", run_diagnose, [measurement], [claim], {"seed": seed})
+    return kept("diagnosis", found, document(found), what, out)
 
 
 def loop(
@@ -171,10 +182,13 @@ def loop(
 ) -> Answer[Loop]:
     """Diagnose, add what is missing, calibrate again; its runs lie beside it in ``out``, with their predictions."""
     found = run_loop(measurement, claim, seed=seed, out=out, ess=ess, tell=tell, watch=watch, adapt_noise=adapt_noise)
-    for run in loop_runs(found):
-        digest(run)
-    what = asked("loop", measurement, [claim], seed, ess=ess, adapt_noise=adapt_noise)
+    what = asked("loop", run_loop, [measurement], [claim], {"seed": seed, "ess": ess, "adapt_noise": adapt_noise})
     return kept("loop", found, document(found), what, out)
+
+
+def _mark(draws: Array) -> str:
+    """What tells these draws from others."""
+    return hashlib.sha256(np.ascontiguousarray(draws).tobytes()).hexdigest()
 
 
 def loop_runs(found: Loop) -> list[Run]:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from bayesmembrane.calibration.fingerprint import fingerprint
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.ground.plain import json_text
 from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.hypothesis import Hypothesis
 
@@ -46,40 +44,44 @@ class Answer(Generic[Result]):
 
 @dataclass(frozen=True)
 class Asked:
-    """What an answer depends on, and what its folder is called after.
+    """What the folder of an answer is called after.
 
     verb : that was asked
-    specimen, model, end : film, hypothesis, and largest deflection in m, for the name; "" and nan where there is none
-    settings : plain values that tell this answer from others
+    specimen, model, end : film, hypothesis, and largest deflection in m; "" and nan where there is none
+    fingerprint : of all that the answer depends on
     """
 
     verb: str
     specimen: str
     model: str
     end: float
-    settings: Mapping[str, Any]
+    fingerprint: str
 
     @property
     def name(self) -> str:
         """``film-1_yeoh_35.1mm_fit_3f2a9c41``: specimen, hypothesis, range, verb, fingerprint."""
-        text = json.dumps([self.verb, json_text(dict(self.settings))], sort_keys=True)
-        fingerprint = hashlib.sha256(text.encode()).hexdigest()[:8]
         reach = f"{1e3 * self.end:.4g}mm" if np.isfinite(self.end) else ""
         specimen = re.sub(r"[^a-z0-9]+", "-", self.specimen.lower()).strip("-")
-        parts = (specimen[:LONGEST], self.model[:LONGEST], reach, self.verb, fingerprint)
+        parts = (specimen[:LONGEST], self.model[:LONGEST], reach, self.verb, self.fingerprint[:8])
         return "_".join(part for part in parts if part)
 
 
-def asked(verb: str, measurement: Measurement, hypotheses: Sequence[Hypothesis], seed: int, **options: Any) -> Asked:
-    """A verb asked about hypotheses on one measurement."""
-    settings = {
-        "data": measurement.data_hash,
-        "hypotheses": [h.settings() for h in hypotheses],
-        "seed": seed,
-        **options,
-    }
-    model = "-".join(h.label() for h in hypotheses)
-    return Asked(verb, measurement.specimen.name, model, float(np.max(measurement.deflection)), settings)
+def asked(
+    verb: str,
+    by: Callable[..., Any],
+    measurements: Sequence[Measurement],
+    hypotheses: Sequence[Hypothesis],
+    settings: Mapping[str, Any],
+) -> Asked:
+    """A verb asked about hypotheses on one film; ``by`` is what computes, ``settings`` are plain, the seed among them.
+
+    The fingerprint covers the code that ``by`` reaches.
+    """
+    last = max(measurements, key=lambda m: float(np.max(m.deflection)))
+    options = {name: value for name, value in settings.items() if name != "seed"}
+    found = fingerprint(by.__module__, hypotheses, measurements, options, settings["seed"])
+    models = "-".join(h.label() for h in hypotheses)
+    return Asked(verb, last.specimen.name, models, float(np.max(last.deflection)), found)
 
 
 def kept(kind: str, result: Result, document: Mapping[str, Any], what: Asked, out: str | Path | None) -> Answer[Result]:

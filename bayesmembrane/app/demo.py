@@ -117,7 +117,7 @@ def calibrate(name: str, range_name: str, place: Place, tell: Tell) -> None:
     (beside,) = compare_with_paper(
         measurement, [found.result], range_name, solve=CachedSolver(place.folder / analyses.CURVES)
     )
-    what = asked("paper", measurement, [claim], place.seed)
+    what = asked("paper", compare_with_paper, [measurement], [claim], {"seed": place.seed, "range": range_name})
     kept("beside_paper", beside, plain(beside), what, place.folder)
     last = range_name == RANGES[-1]
     run = analyses.sample(

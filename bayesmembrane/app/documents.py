@@ -15,6 +15,7 @@ from bayesmembrane.ground.plain import plain
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
+from bayesmembrane.words import sampling
 
 
 def document(result: Any) -> dict[str, Any]:
@@ -24,8 +25,12 @@ def document(result: Any) -> dict[str, Any]:
 
 def _document(result: Any) -> Mapping[str, Any]:
     match result:
-        case Fit() | Run() | Comparison() | Valleys() | Beside() | Diagnosis():
+        case Fit() | Valleys() | Beside() | Diagnosis():
             return result.summary()
+        case Run():
+            return sampling.document(result)
+        case Comparison():
+            return sampling.with_notes(result)
         case Reconstruction():
             return result.to_json_dict()
         case Loop():
@@ -35,6 +40,6 @@ def _document(result: Any) -> Mapping[str, Any]:
                 "left": None if result.left is None else result.left.sentence,
             }
         case Mapping() if result and all(isinstance(c, Comparison) for c in result.values()):
-            answers = {name: c.summary() for name, c in result.items()}
+            answers = {name: sampling.with_notes(c) for name, c in result.items()}
             return {**list(answers.values())[-1], "ranges": [{"range": n, **a} for n, a in answers.items()]}
     raise SettingsError(f"a {type(result).__name__} is no result of a verb", remedy="give what fit or sample returned")

@@ -35,7 +35,7 @@ class Output(Group):
     """What every verb can be asked for beside its answer."""
 
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout; logs go to stderr.")] = False
-    seed: Annotated[int, typer.Option("--seed", help="Seed of every random number.")] = 0
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of every random number.")] = 0
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from bayesmembrane.calibration.beside_paper import Compared
-from bayesmembrane.calibration.predictions import digest
 from bayesmembrane.calibration.run import Run, load_run, run_folders
 from bayesmembrane.calibration.store import ASKED
 from bayesmembrane.comparison.result import Comparison
@@ -51,8 +50,6 @@ def gathered(folders: Sequence[Path]) -> list[Found]:
 def write(results: Sequence[Any], out: Path, title: str | None = None) -> Path:
     """The page about ``results`` in the folder ``out``; returns its path."""
     runs = _of(results, Run)
-    for run in runs:
-        digest(run)
     comparisons = {name: c for each in _of(results, dict) for name, c in each.items() if isinstance(c, Comparison)}
     return write_report(
         runs,

@@ -15,6 +15,7 @@ import bayesmembrane as bm
 from bayesmembrane.app import analyses
 from bayesmembrane.app.answers import Asked, asked, kept
 from bayesmembrane.app.pages import gathered
+from bayesmembrane.calibration.fit import fit as least_squares
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError, StorageError
 from bayesmembrane.ground.plain import plain
@@ -34,39 +35,42 @@ def equal(a: Any, b: Any) -> bool:
     return json.dumps(plain(a)) == json.dumps(plain(b))
 
 
+def named(measurement: Measurement, *claims: Any, verb: str = "fit", seed: int = 0, **options: Any) -> str:
+    return asked(verb, least_squares, [measurement], claims or [PLAIN], {"seed": seed, **options}).name
+
+
 def test_the_folder_says_what_lies_in_it(curve: Measurement) -> None:
-    named = replace(curve, specimen=replace(curve.specimen, name="Film No. 1 / µ"))
-    name = asked("fit", named, [PLAIN], 0).name
-    assert re.fullmatch(r"film-no-1_neo_hookean_30mm_fit_[0-9a-f]{8}", name)
+    film = replace(curve, specimen=replace(curve.specimen, name="Film No. 1 / µ"))
+    assert re.fullmatch(r"film-no-1_neo_hookean_30mm_fit_[0-9a-f]{8}", named(film))
 
 
 def test_what_was_asked_decides_the_folder(curve: Measurement) -> None:
     """Another seed, option, range or hypothesis is another answer; the same question the same one."""
     several = [
-        asked("fit", curve, [PLAIN], 0),
-        asked("fit", curve, [PLAIN], 1),
-        asked("fit", curve, [PLAIN], 0, loss="weighted"),
-        asked("diagnose", curve, [PLAIN], 0),
-        asked("fit", curve.up_to(0.02), [PLAIN], 0),
-        asked("fit", curve, [hypothesis("neo_hookean", ["zero_offset"])], 0),
-        asked("fit", curve, [hypothesis("neo_hookean", noise="ar1")], 0),
-        asked("fit", curve, [hypothesis("neo_hookean", convexity="none")], 0),
+        named(curve),
+        named(curve, seed=1),
+        named(curve, loss="weighted"),
+        named(curve, verb="diagnose"),
+        named(curve.up_to(0.02)),
+        named(curve, hypothesis("neo_hookean", ["zero_offset"])),
+        named(curve, hypothesis("neo_hookean", noise="ar1")),
+        named(curve, hypothesis("neo_hookean", convexity="none")),
     ]
-    assert len({a.name for a in several}) == len(several)
-    assert asked("fit", curve, [PLAIN], 0).name == several[0].name
+    assert len(set(several)) == len(several)
+    assert named(curve) == several[0]
 
 
 def test_a_name_never_grows_beyond_what_a_disk_takes(curve: Measurement) -> None:
     long = replace(curve, specimen=replace(curve.specimen, name="film " * 100))
-    assert len(asked("compare", long, [PLAIN] * 40, 0).name) < 200
-    assert Asked("reconstruct", "published losses", "", float("nan"), {}).name.startswith(
-        "published-losses_reconstruct_"
+    assert len(named(long, *[PLAIN] * 40)) < 200
+    assert Asked("reconstruct", "published losses", "", float("nan"), 8 * "0a").name == (
+        "published-losses_reconstruct_0a0a0a0a"
     )
 
 
 def test_without_a_folder_nothing_is_stored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    found = kept("fit", 1, {"loss_N": 2.0}, Asked("fit", "a", "b", 1.0, {}), None)
+    found = kept("fit", 1, {"loss_N": 2.0}, Asked("fit", "a", "b", 1.0, "0a"), None)
     assert found.document == {"loss_N": 2.0, "stored": None}
     assert found.folder is None
     assert list(tmp_path.iterdir()) == []

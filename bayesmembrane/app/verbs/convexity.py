@@ -21,6 +21,7 @@ def verb(
 ) -> None:
     """Whether an energy is convex in the stretches on a box, by what margin, and where it is worst."""
     from bayesmembrane.app.answers import Asked, kept
+    from bayesmembrane.ground.fingerprint import digest
     from bayesmembrane.ground.registry import material as named
     from bayesmembrane.physics.mechanics.convexity import box_convexity, box_ellipticity
 
@@ -48,7 +49,6 @@ def verb(
         f"{elliptic.margin:.4g} G d)."
     )
     settings = {"parameters": made.vector.tolist(), "box": edges}
-    kept_as = kept(
-        "convexity", document, document, Asked("convexity", "", made.name, float("nan"), settings), stored.folder
-    )
+    what = Asked("convexity", "", made.name, float("nan"), digest(settings))
+    kept_as = kept("convexity", document, document, what, stored.folder)
     answer(kept_as.document, output.as_json, lambda: say(sentence))

@@ -26,6 +26,7 @@ def verb(
     import numpy as np
 
     from bayesmembrane.app.answers import Asked, kept
+    from bayesmembrane.ground.fingerprint import digest
     from bayesmembrane.ground.registry import material as named
     from bayesmembrane.physics.mechanics import Note, Status, request, solve
 
@@ -50,7 +51,7 @@ def verb(
         "notes": notes,
     }
     settings |= {"parameters": made.vector.tolist(), "deflection_mm": where}
-    what = Asked("force", "", kind.name, 1e-3 * max(where), settings)
+    what = Asked("force", "", kind.name, 1e-3 * max(where), digest(settings))
     found = kept("force", document, document, what, stored.folder)
     rows = zip(where, curves.force[0], curves.max_stretch[0], states, notes, strict=True)
     cells = [[f"{d:g}", f"{f:.6g}", f"{m:.4g}", f"{s.sentence} {n}".strip()] for d, f, m, s, n in rows]
