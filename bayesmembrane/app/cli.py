@@ -304,7 +304,8 @@ def valleys(
 
     With --effects also the valley without them, and how far the two lie apart.
     """
-    from bayesmembrane.report.sections.valleys.section import valley_table, write_valleys
+    from bayesmembrane.report.sections.valleys import write_valleys
+    from bayesmembrane.report.sections.valleys.tables import valley_table
     from bayesmembrane.valleys.beside import Beside, valleys_beside
     from bayesmembrane.valleys.follow import valleys as run
 
@@ -365,7 +366,7 @@ def compare(
 ) -> None:
     """Which materials the data support, by two estimators of the evidence, with prediction beside it."""
     from bayesmembrane.comparison.compare import claimed, compare_ranges, ranges_of
-    from bayesmembrane.report.sections.comparison.section import evidence_table
+    from bayesmembrane.report.sections.evidence.tables import evidence_table
 
     claims = claimed(materials, effects, noise, convexity)
     if ranges_mm and max_deflection_mm is not None:
@@ -463,7 +464,7 @@ def loop(
     runs = list({str(s.run.path): s.run for r in found.rounds for s in (r.before, r.after)}.values())
     for stored in runs:
         digest(stored)
-    page = write_report([r.path for r in runs if r.path is not None], report_folder, loops=[found])
+    page = write_report([*runs, found], report_folder)
     document: dict[str, Any] = {
         "rounds": [r.summary() for r in found.rounds],
         "sentence": found.sentence,
@@ -524,7 +525,7 @@ def report(
     runs = [load_run(path) for path in found]
     for run in runs:
         digest(run)
-    page = write_report(runs, out_folder, title=title)
+    page = write_report(runs, out_folder, title)
     document = {"report": str(page), "runs": [str(path) for path in found]}
     answer(document, as_json, lambda: out.print(f"The report lies in {page}"))
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bayesmembrane.report.view import Sampling, Shown
 
 from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.calibration.goodness import goodness
@@ -14,7 +15,6 @@ from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.mechanics.api import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.report import view
-from bayesmembrane.report.view import Sampling, Shown
 
 TRUTH = (8.8, -0.6, 0.05)
 SD = 0.004

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bayesmembrane.report.reading import read
+from bayesmembrane.report.view import Shown
 
 from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.calibration.predictions import FILE, digest
@@ -18,8 +20,6 @@ from bayesmembrane.physics.cache import Tally
 from bayesmembrane.reconstruction.result import Influence, LossCheck, RangeResult, Reconstruction
 from bayesmembrane.reconstruction.rows import Correction, Suspect
 from bayesmembrane.report.page import PAGE, TWIN, write_report, write_shown
-from bayesmembrane.report.reading import read
-from bayesmembrane.report.view import Shown
 
 COMPARED = (
     Compared("yeoh", "OP1", 0.035, 0.01, 0.01, 0.1, 0.09, 0.09, {"c1": 8.8}, {"c1": 8.8}, {"c1": 8.9}, ("c3_c1",)),

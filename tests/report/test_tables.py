@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-
 from bayesmembrane.report.tables import Column, Table, facts_table, hdi
 from bayesmembrane.report.tables import fits_table as fits
 from bayesmembrane.report.view import Shown

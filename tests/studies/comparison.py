@@ -13,13 +13,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-
-from bayesmembrane.app.demo import paper_losses, shipped_ranges
-from bayesmembrane.comparison.compare import compare_ranges
-from bayesmembrane.comparison.result import Comparison
-from bayesmembrane.data.published import read_published_table
-from bayesmembrane.ground.registry import materials
-from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.sections.comparison.section import (
     comparison_sentences,
     evidence_table,
@@ -28,6 +21,13 @@ from bayesmembrane.report.sections.comparison.section import (
     widths_table,
 )
 from bayesmembrane.report.tables import Table
+
+from bayesmembrane.app.demo import paper_losses, shipped_ranges
+from bayesmembrane.comparison.compare import compare_ranges
+from bayesmembrane.comparison.result import Comparison
+from bayesmembrane.data.published import read_published_table
+from bayesmembrane.ground.registry import materials
+from bayesmembrane.physics.hypothesis import hypothesis
 
 TARGET = Path(__file__).resolve().parents[2] / "docs" / "studies" / "comparison.md"
 

@@ -4,13 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, together
-from bayesmembrane.comparison.evidence.target import Estimate
-from bayesmembrane.comparison.leave_out.score import LeaveOneOut
-from bayesmembrane.comparison.prior_widths import Widened
-from bayesmembrane.comparison.result import Comparison, Row, ranked
-from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.sections.comparison.figures import comparison_picture
 from bayesmembrane.report.sections.comparison.section import (
     alternative_text,
@@ -20,6 +13,13 @@ from bayesmembrane.report.sections.comparison.section import (
     ranking_table,
     widths_table,
 )
+
+from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, together
+from bayesmembrane.comparison.evidence.target import Estimate
+from bayesmembrane.comparison.leave_out.score import LeaveOneOut
+from bayesmembrane.comparison.prior_widths import Widened
+from bayesmembrane.comparison.result import Comparison, Row, ranked
+from bayesmembrane.physics.hypothesis import hypothesis
 
 
 def row(material: str, z: float, elpd: float, off: float = 0.0) -> Row:

@@ -7,18 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from bayesmembrane.calibration.run import sample
-from bayesmembrane.calibration.sampling.walk import Settings
-from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
-from bayesmembrane.diagnosis.discrepancy import discrepancy
-from bayesmembrane.diagnosis.loop import Loop, Round, Stage
-from bayesmembrane.diagnosis.separation import Experiment
-from bayesmembrane.diagnosis.wording import size_in_words
-from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
-from bayesmembrane.physics.rigs.annulus import Annulus
-from bayesmembrane.report.page import PAGE, TWIN, write_shown
 from bayesmembrane.report.sections.loop.figures import Place, Residual, discrepancy_picture, residual_picture
 from bayesmembrane.report.sections.loop.reading import Change, changes, models
 from bayesmembrane.report.sections.loop.section import (
@@ -33,6 +21,19 @@ from bayesmembrane.report.sections.loop.section import (
     rival_sentences,
     validation_sentences,
 )
+from bayesmembrane.report.view import Shown
+
+from bayesmembrane.calibration.run import sample
+from bayesmembrane.calibration.sampling.walk import Settings
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
+from bayesmembrane.diagnosis.discrepancy import discrepancy
+from bayesmembrane.diagnosis.loop import Loop, Round, Stage
+from bayesmembrane.diagnosis.separation import Experiment
+from bayesmembrane.diagnosis.wording import size_in_words
+from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
+from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.report.page import PAGE, TWIN, write_shown
 from bayesmembrane.report.sections.loop.tables import (
     candidate_title,
     confounded_table,
@@ -42,7 +43,6 @@ from bayesmembrane.report.sections.loop.tables import (
     ranking_table,
     scores_table,
 )
-from bayesmembrane.report.view import Shown
 from tests.generator.datasets import THICKNESS, generate
 from tests.generator.protocols import Protocol
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bayesmembrane.report.sections.valleys.section import TESTS, next_table, valley_table, write_valleys
+from bayesmembrane.report.view import Shown
 from matplotlib.image import imread
 
 from bayesmembrane.data.measurement import Measurement, Specimen
@@ -18,8 +20,6 @@ from bayesmembrane.physics.mechanics.reference import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.report.page import write_shown
 from bayesmembrane.report.sections.valleys.figures import valley_picture
-from bayesmembrane.report.sections.valleys.section import TESTS, next_table, valley_table, write_valleys
-from bayesmembrane.report.view import Shown
 from bayesmembrane.valleys.follow import Valleys, valleys
 
 

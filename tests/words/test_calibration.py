@@ -4,9 +4,9 @@ import math
 from dataclasses import replace
 
 import pytest
+from bayesmembrane.report.sentences import Case, LossPair
 
 from bayesmembrane.report import sentences
-from bayesmembrane.report.sentences import Case, LossPair
 
 GOOD = Case(
     name="Yeoh",
