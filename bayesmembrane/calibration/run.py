@@ -15,7 +15,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import arviz
 import numpy as np
 
 from bayesmembrane.calibration import store as storage
@@ -25,6 +24,7 @@ from bayesmembrane.calibration.posterior import Posterior, failure_sentence
 from bayesmembrane.calibration.sampling.walk import Callback, Chains, Sampled, Settings, run_ensembles
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.cache import CachedSolver, Tally
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis, from_settings

@@ -17,7 +17,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-import arviz
 import numpy as np
 import tomli_w
 
@@ -26,6 +25,7 @@ from bayesmembrane.data.measurement import Measurement, Provenance, Specimen
 from bayesmembrane.data.motion import Path as Motion
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.ground.registry import component
 from bayesmembrane.physics.hypothesis import Hypothesis
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -25,6 +26,7 @@ from bayesmembrane.report.style import INK, MUTED, colour, marker
 
 WIDTH = 9.0  # inches: 900 px at 100 dpi
 DPI = 120
+LINE = 112  # letters of a legend that fit into the width
 MOST_POINTS = 300  # of a line that is drawn
 _RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -77,6 +79,12 @@ def encoded(figure: Figure, kind: str) -> Picture:
         figure.savefig(out, format=kind, dpi=DPI, metadata=metadata)
     data = out.getvalue()
     return Picture(_PATH.sub(_rounded, data) if kind == "svg" else data, kind)
+
+
+def legend_columns(names: Sequence[str], most: int) -> int:
+    """How many columns of a legend fit side by side, ``most`` at most."""
+    widest = max((len(name) for name in names), default=1)
+    return max(1, min(most, LINE // (widest + 8)))
 
 
 _PATH = re.compile(rb' d="[^"]*"')
@@ -151,16 +159,16 @@ def band(ax: Axes, x: Array, quantiles: Array, where: NDArray[np.bool_], shade: 
 
 @dataclass(frozen=True)
 class Interval:
-    """One row of an interval plot: label, material, and 5, 50, 95 % (3,); ``note`` stands there if they are nan."""
+    """One row of an interval plot: label, look, and 5, 50, 95 % (3,); ``note`` stands there if they are nan."""
 
     label: str
-    material: str
+    look: str
     quantiles: Array
     note: str = ""
 
 
 def draw_interval(ax: Axes, interval: Interval, y: float, size: float = 6.0) -> None:
-    """A bar for the 90 % and a marker for the median, in the colour of the material."""
-    c, q = colour(interval.material), interval.quantiles
+    """A bar for the 90 % and a marker for the median, in its colour."""
+    c, q = colour(interval.look), interval.quantiles
     ax.plot([q[0], q[2]], [y, y], color=c, linewidth=2.4, solid_capstyle="butt", zorder=3)
-    ax.plot([q[1]], [y], marker=marker(interval.material), color=c, markersize=size, zorder=3.5)
+    ax.plot([q[1]], [y], marker=marker(interval.look), color=c, markersize=size, zorder=3.5)

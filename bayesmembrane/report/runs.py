@@ -118,6 +118,11 @@ class Shown:
         return self.hypothesis.material.name
 
     @property
+    def look(self) -> str:
+        """The name by which pictures choose colour, line and marker: of the material, or of it with its effects."""
+        return self.hypothesis.label()
+
+    @property
     def name(self) -> str:
         """Material and effects, for people."""
         return spoken(self.hypothesis)
@@ -196,7 +201,7 @@ def in_order(shown: Sequence[Shown]) -> list[Shown]:
 
 # ---- from the run ----------------------------------------------------------------------------------------------------
 
-MOST_TRACED, MOST_REPLICAS = 1000, 1000  # draws of an ensemble in a trace, new readings of each point
+MOST_TRACED, MOST_REPLICAS = 600, 1000  # draws of an ensemble in a trace, new readings of each point
 _SHOWN_APART = ("hypothesis", "sampling", "data", "code", "versions", "seed", "fingerprint")
 
 

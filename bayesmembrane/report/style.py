@@ -47,30 +47,33 @@ PALETTE = (
 STRANGERS = PALETTE[5:]  # what the materials of this package leave
 
 
-def look(material: str) -> Look:
-    """The look of a material, by name: that of the colour it declares, else one that depends on its name alone."""
-    declared = str(getattr(components("materials").get(material), "colour", ""))
+def look(name: str) -> Look:
+    """The look of a material, by name: that of the colour it declares, else one that depends on its name alone.
+
+    So does that of a hypothesis with effects (``yeoh+zero_offset``), which must not look like its bare material.
+    """
+    declared = str(getattr(components("materials").get(name), "colour", ""))
     own = next((kind for kind in PALETTE if kind.colour == declared), None)
     if own is not None:
         return own
-    chosen = STRANGERS[int(hashlib.sha256(material.encode()).hexdigest()[:8], 16) % len(STRANGERS)]
+    chosen = STRANGERS[int(hashlib.sha256(name.encode()).hexdigest()[:8], 16) % len(STRANGERS)]
     return Look(declared, chosen.dashes, chosen.marker) if declared else chosen
 
 
-def colour(material: str) -> str:
-    """One fixed colour per material."""
-    return look(material).colour
+def colour(name: str) -> str:
+    """One fixed colour per material or hypothesis."""
+    return look(name).colour
 
 
-def linestyle(material: str) -> LineStyle:
-    """One fixed line style per material: "-", or (offset, lengths of dashes and gaps in points)."""
-    dashes = look(material).dashes
+def linestyle(name: str) -> LineStyle:
+    """One fixed line style for each name: "-", or (offset, lengths of dashes and gaps in points)."""
+    dashes = look(name).dashes
     return (0.0, dashes) if dashes else "-"
 
 
-def marker(material: str) -> str:
-    """One fixed marker per material."""
-    return look(material).marker
+def marker(name: str) -> str:
+    """One fixed marker for each name."""
+    return look(name).marker
 
 
 def symbol(name: str) -> str:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bayesmembrane.report.sections.valleys.section import write_valleys
 from scipy.optimize import minimize_scalar
 from typer.testing import CliRunner
 
@@ -21,6 +20,7 @@ from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.reference import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.report.sections.valleys import write_valleys
 from bayesmembrane.valleys.beside import valleys_beside
 from bayesmembrane.valleys.follow import Valleys, valleys
 from bayesmembrane.valleys.surface import Chart, Surface

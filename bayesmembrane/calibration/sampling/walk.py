@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-import arviz
 import emcee
 import numpy as np
 from emcee.autocorr import integrated_time
@@ -19,6 +18,7 @@ from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mi
 from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.quiet import arviz
 
 LEAST_TAUS = 50
 BURN_TAUS = 10

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import arviz
 import numpy as np
 from scipy.special import logsumexp
 
@@ -13,6 +12,7 @@ from bayesmembrane.comparison.evidence.population import from_prior
 from bayesmembrane.comparison.evidence.target import Estimate, Problem, Target
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.quiet import arviz
 
 PROPOSED, PILOT = 4000, 1000
 FITTED, USED = 4000, 6000  # most draws of a half that a mixture is fitted to, and that the bridge stands on

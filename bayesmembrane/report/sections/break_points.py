@@ -12,12 +12,11 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.report.blocks import Block, Column, Figure, Picture, Points, Table, Value
-from bayesmembrane.report.canvas import Interval, draw_interval, encoded, new_figure, style
+from bayesmembrane.report.canvas import Interval, draw_interval, encoded, legend_columns, new_figure, style
 from bayesmembrane.report.runs import Shown, by_points
 from bayesmembrane.report.sections.base import Section, of_kind
 from bayesmembrane.report.style import FAINT, INK, SHADE, colour, marker
 from bayesmembrane.words.calibration import break_points
-from bayesmembrane.words.hypothesis import material_title
 from bayesmembrane.words.language import percent, without_exponent
 
 
@@ -40,8 +39,7 @@ def _blocks(group: Sequence[Shown]) -> list[Block]:
         for n, t, x in zip(d.specimens, d.break_thickness, d.break_at, strict=True)
     ]
     rows = [
-        [Interval(s.name, s.material, s.digest.break_predicted[:, i], "no force") for s in group]
-        for i in range(len(names))
+        [Interval(s.name, s.look, s.digest.break_predicted[:, i], "no force") for s in group] for i in range(len(names))
     ]
     figure = Figure(
         break_picture(names, d.break_force, rows),
@@ -116,12 +114,14 @@ def break_picture(
         ax.set_ylim(len(specimens) - 0.5, -0.5)
         ax.set_xlabel("force (N), logarithmic")
         ax.grid(axis="x", which="both", color=FAINT, linewidth=0.5)
-        names = {i.material: i for row in predicted for i in row}
+        named = {i.label: i.look for row in predicted for i in row}
         handles = [Line2D([], [], color=INK, linewidth=2.2, label="observed")]
         handles += [
-            Line2D([], [], color=colour(m), marker=marker(m), markersize=5, label=material_title(m)) for m in names
+            Line2D([], [], color=colour(look), marker=marker(look), markersize=5, label=name)
+            for name, look in named.items()
         ]
-        figure.legend(handles=handles, loc="outside upper center", ncols=6, columnspacing=1.2, handlelength=1.6)
+        columns = legend_columns(list(named), 6)
+        figure.legend(handles=handles, loc="outside upper center", ncols=columns, columnspacing=1.2, handlelength=1.6)
         return encoded(figure, kind)
 
 
@@ -140,7 +140,7 @@ def _log_force_axis(ax: Axes, observed: Array, predicted: Sequence[Sequence[Inte
 
 def _predicted(ax: Axes, interval: Interval, y: float, limits: tuple[float, float]) -> None:
     low, high = limits
-    c, q = colour(interval.material), interval.quantiles
+    c, q = colour(interval.look), interval.quantiles
     if not np.any(np.isfinite(q)):
         ax.text(high / 1.03, y, interval.note or "no force", color=c, fontsize=9, va="center", ha="right")
         return

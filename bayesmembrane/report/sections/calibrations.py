@@ -143,7 +143,7 @@ def losses_table(compared: Sequence[Compared]) -> Table:
 def _forest(runs: Sequence[Shown]) -> Figure:
     h = runs[0].hypothesis
     parameters = {
-        name: [Interval(s.end, s.material, np.quantile(s.natural[:, i], (0.05, 0.5, 0.95))) for s in runs]
+        name: [Interval(s.end, s.look, np.quantile(s.natural[:, i], (0.05, 0.5, 0.95))) for s in runs]
         for i, name in enumerate(h.natural_names)
     }
     units = dict(zip(h.natural_names, h.natural_units, strict=True))

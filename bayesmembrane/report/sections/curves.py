@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.report.blocks import Block, Figure, Picture, points
-from bayesmembrane.report.canvas import Measured, Shade, band, encoded, errorbars, new_figure, style
+from bayesmembrane.report.canvas import Measured, Shade, band, encoded, errorbars, legend_columns, new_figure, style
 from bayesmembrane.report.runs import Shown, by_points
 from bayesmembrane.report.sections.base import Section, of_kind
 from bayesmembrane.report.style import FAINT, INK, MUTED, SHADE, colour, linestyle, marker
 from bayesmembrane.words.calibration import held_out
-from bayesmembrane.words.hypothesis import material_title
 from bayesmembrane.words.language import listed
 
 
@@ -54,8 +53,7 @@ def look_of(group: Sequence[Shown]) -> Panel:
     if d.rest_at.size:
         rest = Measured(d.rest_at, d.rest_force, d.rest_sd if np.all(np.isfinite(d.rest_sd)) else None)
     curves = tuple(
-        Fitted(s.material, s.digest.deflection, s.digest.curve, s.digest.beyond, s.digest.residual, s.name)
-        for s in group
+        Fitted(s.look, s.digest.deflection, s.digest.curve, s.digest.beyond, s.digest.residual, s.name) for s in group
     )
     return Panel(group[0].points, curves, rest, f"Fitted up to {group[0].end}")
 
@@ -65,23 +63,18 @@ def look_of(group: Sequence[Shown]) -> Panel:
 
 @dataclass(frozen=True)
 class Fitted:
-    """What one material says: 5, 50 and 95 % of the force (3, G) N at ``deflection`` (G,) m, and the residuals.
+    """What one model says: 5, 50 and 95 % of the force (3, G) N at ``deflection`` (G,) m, and the residuals.
 
     ``beyond`` (G,) is True where the deflection lies outside the fitted range; ``residual`` (3, N) N is measured minus
     computed force at the measured points.
     """
 
-    material: str
+    look: str
     deflection: Array
     force: Array
     beyond: NDArray[np.bool_]
     residual: Array
-    label: str = ""
-
-    @property
-    def name(self) -> str:
-        """What the legend says."""
-        return self.label or material_title(self.material)
+    label: str
 
 
 @dataclass(frozen=True)
@@ -104,20 +97,18 @@ def first_look(looks: Sequence[Panel], kind: str = "svg") -> Picture:
             _look_residuals(grid[1, i], look, first=i == 0)
         if len(looks) > 1:
             _same_limits([grid[0, i] for i in range(len(looks))])
-        figure.legend(
-            handles=_look_legend(looks), loc="outside upper center", ncols=4, columnspacing=1.4, handlelength=2.4
-        )
+        handles = _look_legend(looks)
+        columns = legend_columns([str(h.get_label()) for h in handles], 4)
+        figure.legend(handles=handles, loc="outside upper center", ncols=columns, columnspacing=1.4, handlelength=2.4)
         return encoded(figure, kind)
 
 
 def _look(ax: Axes, look: Panel, first: bool) -> None:
-    points = [look.points] + ([look.rest] if look.rest is not None else [])
-    top = 1.12 * max(float(np.max(p.force)) for p in points)
-    lowest = min(0.0, 1.12 * min(float(np.min(p.force)) for p in points))
     end = 1e3 * float(np.max(look.points.deflection))
     for curve in look.curves:
         _curve(ax, curve)
     last = max([end, *(1e3 * float(c.deflection[-1]) for c in look.curves)])
+    lowest, top = _reach(look, 1e-3 * last)
     if last > end * (1 + 1e-6):
         ax.axvspan(end, last, color=SHADE, zorder=0)
         narrow = last - end < 0.3 * last
@@ -143,8 +134,15 @@ def _look(ax: Axes, look: Panel, first: bool) -> None:
         ax.set_ylabel("force (N)")
 
 
+def _reach(look: Panel, last: float) -> tuple[float, float]:
+    """The vertical axis: all measured points up to the deflection ``last``, m, with a margin."""
+    parts = [look.points] + ([look.rest] if look.rest is not None else [])
+    seen = np.concatenate([p.force[p.deflection <= last * (1 + 1e-9)] for p in parts])
+    return min(0.0, 1.12 * float(np.min(seen))), 1.12 * float(np.max(seen))
+
+
 def _curve(ax: Axes, curve: Fitted) -> None:
-    x, c = 1e3 * curve.deflection, colour(curve.material)
+    x, c = 1e3 * curve.deflection, colour(curve.look)
     inside = ~curve.beyond
     band(ax, x, curve.force, inside, Shade(c, 0.25))
     ax.plot(x[inside], curve.force[1][inside], color=c, zorder=3)
@@ -163,9 +161,9 @@ def _look_residuals(ax: Axes, look: Panel, first: bool) -> None:
         ax.fill_between(x[order], -sd, sd, color=FAINT, lw=0, zorder=1)
     ax.axhline(0, color=INK, linewidth=0.8)
     for curve in look.curves:
-        c = colour(curve.material)
-        mark = marker(curve.material) if n <= 60 else "none"
-        line = linestyle(curve.material)
+        c = colour(curve.look)
+        mark = marker(curve.look) if n <= 60 else "none"
+        line = linestyle(curve.look)
         ax.plot(x, curve.residual[1], color=c, linewidth=1.1, linestyle=line, marker=mark, markersize=3.5)
     _residual_scale(ax, [c.residual[1] for c in look.curves], look.points.sd)
     ax.set_xlabel("deflection (mm)")
@@ -195,7 +193,7 @@ def _same_limits(axes: Sequence[Axes]) -> None:
 
 
 def _look_legend(looks: Sequence[Panel]) -> list[Any]:
-    curves = {c.name: c for look in looks for c in look.curves}
+    curves = {c.label: c for look in looks for c in look.curves}
     handles: list[Any] = [
         Line2D([], [], color=INK, marker="o", linestyle="none", markersize=4.5, label="measured (bars: 2 sd)")
     ]
@@ -207,6 +205,6 @@ def _look_legend(looks: Sequence[Panel]) -> list[Any]:
             )
         )  # fmt: skip
     for name, c in curves.items():
-        line, mark = linestyle(c.material), marker(c.material)
-        handles.append(Line2D([], [], color=colour(c.material), linestyle=line, marker=mark, markersize=4, label=name))
+        line, mark = linestyle(c.look), marker(c.look)
+        handles.append(Line2D([], [], color=colour(c.look), linestyle=line, marker=mark, markersize=4, label=name))
     return handles

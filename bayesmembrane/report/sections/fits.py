@@ -104,7 +104,7 @@ def optima_table(fits: Sequence[Fit]) -> Table:
 
 def parameters_table(f: Fit, number: int) -> Table:
     """The natural parameters of one fit, and under the convexity prior where that changes them."""
-    held = f.constrained if f.constrained is not f else None
+    held = None if f.convex else f.constrained
     columns = (
         Column("parameter", "parameter"),
         Column("unit", "unit"),

@@ -114,8 +114,9 @@ def reconstruction_picture(ranges: Sequence[Recovered], losses: Sequence[LossBar
     names = [r.name for r in ranges]
     labels = list(dict.fromkeys(b.label for b in losses))
     with style():
-        figure = new_figure(4.2 + 0.5 + 0.23 * len(labels))
-        parts: Any = figure.subfigures(2, 1, height_ratios=(4.2, 0.5 + 0.23 * len(labels)))
+        lower = max(1.6, 0.5 + 0.23 * len(labels))
+        figure = new_figure(4.2 + lower)
+        parts: Any = figure.subfigures(2, 1, height_ratios=(4.2, lower))
         top, bottom = parts
         left, right = top.subfigures(1, 2, width_ratios=(1.7, 1))
         _recovered(left.subplots(2, 1, sharex=True, height_ratios=(3, 1)), ranges)

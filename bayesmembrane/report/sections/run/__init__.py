@@ -101,7 +101,7 @@ def _sentences(s: Shown) -> list[str]:
 def _residuals(s: Shown) -> Figure:
     unit = "in units of the stated noise (sd)" if s.digest.has_noise else "in N"
     return Figure(
-        residual_picture(s.points, s.digest.residual, s.material),
+        residual_picture(s.points, s.digest.residual, s.look),
         alt=f"Residuals of {s.name} against deflection {unit}",
         caption=f"{s.name}: measured minus computed force {unit} against deflection (mm), with the 90 % band of the "
         "posterior. The grey bands are one and two standard deviations. Residuals that follow each other with one "
@@ -116,7 +116,7 @@ def _calibrated(s: Shown) -> list[Block]:
     some = f" Of {doubtful} of the {s.replicas.shape.size} points the draws cannot quite tell it." if doubtful else ""
     return [
         Figure(
-            calibration_picture(s.replicas, s.material),
+            calibration_picture(s.replicas, s.look),
             alt=f"Whether readings predicted by {s.name} spread as the measured points do",
             caption=f"{s.name}: each point is predicted by the posterior without it, noise included. Its place is the "
             "share (-) of the predicted readings that lie below it; the curve is the place minus the rank among all "
@@ -141,7 +141,7 @@ def _corner(s: Shown, compared: Compared | None) -> Figure:
         )
     names = listed(f"{spoken_parameter(n)} ({u})" for n, u in zip(h.natural_names, h.natural_units, strict=True))
     return Figure(
-        corner_plot(thin, h.natural_names, h.natural_units, s.material, optimum, published),
+        corner_plot(thin, h.natural_names, h.natural_units, s.look, optimum, published),
         alt=f"Corner plot of the parameters of {s.name}",
         caption=f"{s.name}: posterior of {names}, one by one and in pairs (regions that hold 50 % and 90 %; dashed: "
         f"5, 50 and 95 %; axes are logarithmic where a parameter spans more than a decade).{marked}",
@@ -155,7 +155,7 @@ def _coordinates(s: Shown) -> str:
 def _priors(s: Shown) -> Figure:
     marginals = [Marginal(p.name, p.unit, s.prior[:, i], s.x[:, i]) for i, p in enumerate(s.hypothesis.parameters)]
     return Figure(
-        prior_posterior(marginals, s.material),
+        prior_posterior(marginals, s.look),
         alt=f"Prior and posterior of the sampled coordinates of {s.name}",
         caption=f"{s.name}: what the data add to the prior, for {_coordinates(s)}; each scaled to its own maximum.",
     )
@@ -198,7 +198,7 @@ def _profiles(s: Shown) -> list[Block]:
     shapes = Shapes(d.shape_at, d.shape_radius, d.shape_height, rig.inner_radius, rig.outer_radius)
     return [
         Figure(
-            profiles(shapes, s.material),
+            profiles(shapes, s.look),
             alt=f"Deformed film of {s.name} at {at} mm",
             caption=f"{s.name}: the deformed film, height (mm) against radius (mm), at deflections of {at} mm; one "
             f"thin line for each of {d.shape_radius.shape[1]} posterior draws.",

@@ -30,12 +30,12 @@ def corner_plot(
     draws: Array,
     names: Sequence[str],
     units: Sequence[str],
-    material: str,
+    look: str,
     optimum: Sequence[float | None] | None = None,
     published: Sequence[float | None] | None = None,
 ) -> Picture:
     """Draws (S, m) of the natural parameters, each pair of them, with the optimum and the paper's point."""
-    m, c = draws.shape[1], colour(material)
+    m, c = draws.shape[1], colour(look)
     logarithmic = [_wide(draws[:, i]) for i in range(m)]
     ranges = [_span(draws[:, i], log) for i, log in enumerate(logarithmic)]
     size = WIDTH if m > 2 else 6.0
@@ -187,7 +187,7 @@ def _arviz_trace(walk: Walk, axes: Any, colours: Sequence[str]) -> None:
         )
 
 
-def calibration_picture(replicas: Replicas, material: str, kind: str = "svg") -> Picture:
+def calibration_picture(replicas: Replicas, look: str, kind: str = "svg") -> Picture:
     """Where each point lies among readings predicted without it: LOO-PIT, by arviz, minus what chance would make."""
     with style():
         figure = new_figure(3.2)
@@ -198,7 +198,7 @@ def calibration_picture(replicas: Replicas, material: str, kind: str = "svg") ->
             log_weights=replicas.log_weights,
             ecdf=True,
             hdi_prob=0.9,
-            color=colour(material),
+            color=colour(look),
             ax=ax,
             legend=False,
             plot_kwargs={"linewidth": 1.8},
@@ -211,7 +211,7 @@ def calibration_picture(replicas: Replicas, material: str, kind: str = "svg") ->
         ax.set_ylabel("place minus\nits rank (-)")
         ax.tick_params(labelsize=10)
         handles = [
-            Line2D([], [], color=colour(material), linewidth=1.8, label="measured points"),
+            Line2D([], [], color=colour(look), linewidth=1.8, label="measured points"),
             Patch(color=FAINT, label="what chance does (90 %)"),
         ]
         figure.legend(handles=handles, loc="outside upper center", ncols=2)
@@ -228,7 +228,7 @@ class Marginal:
     posterior: Array
 
 
-def prior_posterior(marginals: Sequence[Marginal], material: str, kind: str = "svg") -> Picture:
+def prior_posterior(marginals: Sequence[Marginal], look: str, kind: str = "svg") -> Picture:
     """Prior and posterior of every coordinate, each scaled to its own maximum."""
     columns = min(4, len(marginals))
     rows = -(-len(marginals) // columns)
@@ -239,8 +239,8 @@ def prior_posterior(marginals: Sequence[Marginal], material: str, kind: str = "s
             if k >= len(marginals):
                 ax.set_visible(False)
                 continue
-            _marginal(ax, marginals[k], colour(material))
-        handles = [Patch(color=FAINT, label="prior"), Patch(color=colour(material), label="posterior")]
+            _marginal(ax, marginals[k], colour(look))
+        handles = [Patch(color=FAINT, label="prior"), Patch(color=colour(look), label="posterior")]
         figure.legend(handles=handles, loc="outside upper center", ncols=2)
         return encoded(figure, kind)
 

@@ -17,19 +17,19 @@ from bayesmembrane.report.style import ALARM, FAINT, INK, SHADE, colour, marker
 from bayesmembrane.words.hypothesis import material_title
 
 
-def residual_picture(points: Measured, quantiles: Array, material: str, kind: str = "svg") -> Picture:
+def residual_picture(points: Measured, quantiles: Array, look: str, kind: str = "svg") -> Picture:
     """Residuals (3, N) N with their 90 % band, in units of the measurement's own noise; in N if it states none."""
     with style():
         figure = new_figure(3.4)
         ax = figure.subplots()
         scale = points.sd if points.sd is not None else np.ones(points.deflection.size)
-        x, z, c = 1e3 * points.deflection, quantiles / scale, colour(material)
+        x, z, c = 1e3 * points.deflection, quantiles / scale, colour(look)
         if points.sd is not None:
             ax.axhspan(-2, 2, color=SHADE, zorder=0)
             ax.axhspan(-1, 1, color=FAINT, zorder=0)
         ax.axhline(0, color=INK, linewidth=0.8)
         ax.vlines(x, z[0], z[2], color=c, linewidth=3, alpha=0.4)
-        ax.plot(x, z[1], color=c, linewidth=0.8, marker=marker(material), markersize=points.marker_size + 0.5)
+        ax.plot(x, z[1], color=c, linewidth=0.8, marker=marker(look), markersize=points.marker_size + 0.5)
         largest = float(np.nanmax(np.abs(z))) if np.any(np.isfinite(z)) else 0.0
         reach = 1.1 * (max(largest, 3.0) if points.sd is not None else largest or 1.0)
         ax.set_ylim(-reach, reach)
@@ -104,10 +104,10 @@ class Shapes:
     outer: float
 
 
-def profiles(shapes: Shapes, material: str, kind: str = "png") -> Picture:
+def profiles(shapes: Shapes, look: str, kind: str = "png") -> Picture:
     """The deformed film; disc and ring as bars."""
     x, y, deflections = 1e3 * shapes.radius, 1e3 * shapes.height, shapes.at
-    inner, outer, c = shapes.inner, shapes.outer, colour(material)
+    inner, outer, c = shapes.inner, shapes.outer, colour(look)
     with style():
         top = float(np.nanmax(y)) if np.any(np.isfinite(y)) else 1.0
         figure = new_figure(float(np.clip(0.9 + 5.3 * 1.14 * top / (2.35e3 * outer), 2.2, 8.0)), width=6.2)
