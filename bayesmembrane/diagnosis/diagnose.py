@@ -11,6 +11,7 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import enough_points
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.thinning import thinned, thinning_sentence
 from bayesmembrane.diagnosis.candidates import Candidate, Search, absorbed, available
 from bayesmembrane.diagnosis.description import describe
 from bayesmembrane.diagnosis.detection import Detection, detect
@@ -56,6 +57,7 @@ class Diagnosis:
     before, after : errors in sample
     validation : errors on points that were set aside, or None
     experiments : what to measure next where rivals are left
+    thinning : what is said of readings that were left out, since there were too many; else ""
     """
 
     verdict: str
@@ -75,6 +77,7 @@ class Diagnosis:
     after: Error
     validation: HeldOut | None
     experiments: tuple[Experiment, ...]
+    thinning: str = ""
 
     @property
     def hypothesis(self) -> Hypothesis:
@@ -84,7 +87,8 @@ class Diagnosis:
     def summary(self) -> dict[str, Any]:
         """Plain values for the JSON answer of ``diagnose``."""
         reference = self.null.log_evidence
-        return {
+        thinning = {"thinning": self.thinning} if self.thinning else {}
+        return thinning | {
             "verdict": self.verdict,
             "effects": list(self.effects),
             "material": self.material,
@@ -146,9 +150,11 @@ def diagnose(
 ) -> Diagnosis:
     """Whether ``hypothesis`` leaves structure in the residual, and which effect, pair or other energy explains it.
 
-    Raises `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
+    A measurement of more readings than `thinning.MOST` is thinned, and so is what the answer holds by reading. Raises
+    `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
     """
     say: Tell = tell or (lambda _: None)
+    whole, measurement = measurement, thinned(measurement)
     _enough(measurement, hypothesis)
     rng = np.random.default_rng([seed, 7])
     basis = reference_basis(measurement)
@@ -173,7 +179,9 @@ def diagnose(
                 verdict = Verdict("adequate", (everything[0],))
             if not detection.adequate:
                 tracer, verdict, everything = explained(tracer, effects, singles, found, rng, say)
-    return _told(tracer, detection, verdict, everything, found, seed, say)
+    told = _told(tracer, detection, verdict, everything, found, seed, say)
+    thinning = thinning_sentence(whole, measurement)
+    return replace(told, thinning=thinning, sentence=f"{told.sentence} {thinning}".rstrip())
 
 
 def _better_null(search: Search, null: Candidate, singles: Sequence[Judged]) -> Candidate | None:

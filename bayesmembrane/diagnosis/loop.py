@@ -17,6 +17,7 @@ from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.target import PosteriorTarget
 from bayesmembrane.comparison.leave_out.score import leave_one_out
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.thinning import thinned, thinning_sentence
 from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
 from bayesmembrane.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesmembrane.physics.forward import Solve
@@ -90,10 +91,14 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """All rounds, the last one being adequate or abstaining; ``left`` is kept, unnamed, where it abstains."""
+    """All rounds, the last one being adequate or abstaining; ``left`` is kept, unnamed, where it abstains.
+
+    thinning : what is said of readings that were left out, since there were too many; else ""
+    """
 
     rounds: tuple[Round, ...]
     left: Discrepancy | None
+    thinning: str = ""
 
     @property
     def sentence(self) -> str:
@@ -107,7 +112,7 @@ class Loop:
                 steps.append(f"{new.material.title} instead of {old.material.title}")
             steps += [e.title for e in new.effects if e.name not in {e.name for e in old.effects}]
         start = f"Changed: {', '.join(steps)}. " if steps else ""
-        return start + self.rounds[-1].diagnosis.sentence
+        return f"{start}{self.rounds[-1].diagnosis.sentence} {self.thinning}".rstrip()
 
 
 def loop(
@@ -125,12 +130,14 @@ def loop(
 ) -> Loop:
     """Diagnose, sample, add what is named, and again; every run is stored in the folder ``out``.
 
-    A named effect or a better energy makes the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop,
-    and so does a hypothesis that was there before. Of an ambiguous answer the first `LEADERS` are sampled. With
+    A named effect or a better energy makes the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop, and
+    so does a hypothesis that was there before. Of an ambiguous answer the first `LEADERS` are sampled. With
     ``adapt_noise`` all are sampled with AR(1) noise where the readings turn out to be correlated: white noise would
-    make the posterior too narrow. Raises what `sample` and `diagnose` raise.
+    make the posterior too narrow. More readings than `thinning.MOST` are thinned, for all of it. Raises what
+    `sample` and `diagnose` raise.
     """
     say = tell or (lambda _: None)
+    whole, measurement = measurement, thinned(measurement)
 
     def staged(claim: Hypothesis) -> Stage:
         say(f"sampling {claim.label()}")
@@ -163,7 +170,8 @@ def loop(
         stage, found = after, diagnosed(following)
     last = rounds[-1].diagnosis
     abstains = last.verdict in ("unknown", "ambiguous")
-    return Loop(tuple(rounds), discrepancy(measurement, last.null.residual, last.noise) if abstains else None)
+    left = discrepancy(measurement, last.null.residual, last.noise) if abstains else None
+    return Loop(tuple(rounds), left, thinning_sentence(whole, measurement))
 
 
 def moved(before: Run, after: Run) -> dict[str, dict[str, float]]:
@@ -182,7 +190,7 @@ def _stage(run: Run, solve: Solve, seed: int) -> Stage:
     posterior = Posterior(run.hypothesis, run.measurement, solve)
     draws = run.draws()
     z = bridge(PosteriorTarget(posterior), draws, seed=seed, effective=float(run.status["ess_bulk"]))
-    mode = run.status["prior_mass"][run.hypothesis.convexity]
+    mode = run.status["prior_mass"][run.hypothesis.convexity.name]
     mass = Mass(mode["value"], mode["sd"])
     loo = leave_one_out(posterior, run.data, seed)
     return Stage(

@@ -21,7 +21,7 @@ def spoken_apart(hypotheses: Sequence[Hypothesis]) -> list[str]:
     names = [spoken(h) for h in hypotheses]
     if len(set(names)) == len(names):
         return names
-    return [f"{name} ({h.noise.name}, {h.convexity})" for name, h in zip(names, hypotheses, strict=True)]
+    return [f"{name} ({h.noise.name}, {h.convexity.name})" for name, h in zip(names, hypotheses, strict=True)]
 
 
 def material_title(name: str) -> str:

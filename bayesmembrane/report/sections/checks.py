@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from bayesmembrane.calibration.posterior import Outcome
+from bayesmembrane.physics.convexity import RESTRICTING
 from bayesmembrane.report.blocks import Block, Column, Table, Value
 from bayesmembrane.report.runs import Shown, in_order
 from bayesmembrane.report.sections.base import Section, of_kind
 from bayesmembrane.words.calibration import disagreement
 
-MODES = ("reached", "box", "elliptic")
+MODES = tuple(m.name for m in RESTRICTING)
 
 
 class ChecksSection(Section):
@@ -47,7 +48,7 @@ def masses_table(shown: Sequence[Shown]) -> Table:
         (
             s.name,
             1e3 * s.digest.end,
-            s.hypothesis.convexity,
+            s.hypothesis.convexity.name,
             *(s.masses[m][0] if m in s.masses else None for m in MODES),
             *(s.digest.convex.get(m) for m in MODES),
         )

@@ -14,7 +14,6 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.physics.mechanics.reference import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.report.page import write_report
 from bayesmembrane.report.runs import Shown
@@ -22,6 +21,7 @@ from bayesmembrane.report.sections.valleys import write_valleys
 from bayesmembrane.report.sections.valleys.figures import valley_picture
 from bayesmembrane.report.sections.valleys.tables import TESTS, next_table, valley_table
 from bayesmembrane.valleys.follow import Valleys, valleys
+from tests.reference.slow_solver import force_curve
 
 
 def curve(name: str, parameters: tuple[float, ...]) -> Measurement:

@@ -185,7 +185,7 @@ def _map(s: Shown) -> Figure:
         alt=f"Map of the convexity of {s.name} over the stretches, with the states that the film reaches",
         caption=f"{s.name}: least eigenvalue of the Hessian of the energy over G d (-) in the plane of the stretches "
         f"(-), for the draw nearest to the median curve, and {states} at several deflections (mm). Convexity prior: "
-        f"{s.hypothesis.convexity}; posterior draws that meet each mode: {shares}.",
+        f"{s.hypothesis.convexity.name}; posterior draws that meet each mode: {shares}.",
     )
 
 

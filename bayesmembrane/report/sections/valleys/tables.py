@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bayesmembrane.physics.hypothesis import CONVEXITY
+from bayesmembrane.physics.convexity import RESTRICTING
 from bayesmembrane.report.blocks import Column, Table, Value
 from bayesmembrane.valleys.next_tests import ASSUMPTION
 from bayesmembrane.valleys.result import Valley, Valleys
@@ -55,7 +55,7 @@ def _row(v: Valley) -> tuple[Value, ...]:
         v.metric.unit if v.metric.unit != "-" else "ln",
         v.spectra[0].condition_number,
         (f"{opened}: {v.limit or 'no end'}" if opened else "no"),
-        ", ".join(f"{100 * v.share(m):.3g} %" for m in CONVEXITY[:3]),
+        ", ".join(f"{100 * v.share(m.name):.3g} %" for m in RESTRICTING),
         inside,
         "-" if first is None else f"{first.test}: {100 * first.reduction:.0f} %",
     )
