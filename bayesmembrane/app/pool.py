@@ -19,7 +19,7 @@ Submit = Callable[..., "Future[None]"]
 
 @contextmanager
 def workers(tell: Tell) -> Iterator[Submit]:
-    """Something that takes ``(work, label, *arguments)``; the work is called with the arguments and a `Tell`."""
+    """Something that takes ``(work, *arguments)``; the work is called with the arguments and a `Tell`."""
     context = multiprocessing.get_context("spawn")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     with context.Manager() as manager, ProcessPoolExecutor(cores, mp_context=context) as pool:
@@ -27,7 +27,7 @@ def workers(tell: Tell) -> Iterator[Submit]:
         listener = Thread(target=_listen, args=(queue, tell, stop), daemon=True)
         listener.start()
         try:
-            yield lambda work, label, *given: pool.submit(_in_worker, work, label, given, queue)
+            yield lambda work, *given: pool.submit(_in_worker, work, given, queue)
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
             raise
@@ -36,10 +36,8 @@ def workers(tell: Tell) -> Iterator[Submit]:
             listener.join(timeout=2)
 
 
-def _in_worker(work: Callable[..., None], label: str, given: tuple[Any, ...], queue: Any) -> None:
-    queue.put((label, "working"))
-    work(*given, lambda name, now: queue.put((name, now)))
-    queue.put((label, ""))
+def _in_worker(work: Callable[..., None], given: tuple[Any, ...], queue: Any) -> None:
+    work(*given, lambda label, now: queue.put((label, now)))
 
 
 def _listen(queue: Any, tell: Tell, stop: list[bool]) -> None:
