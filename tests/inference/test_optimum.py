@@ -135,7 +135,7 @@ def test_bad_questions_are_refused(film) -> None:  # type: ignore[no-untyped-def
 
 
 def without_slopes(keeps: float) -> Any:
-    """A solver whose films with |c3 / c1| above ``keeps`` have forces and no slopes, as at the end of what is stable."""
+    """A solver whose films with |c3 / c1| above ``keeps`` have forces and no slopes, as next to a loss of stability."""
 
     def solver(kind: Any, parameters: Any, *args: Any, **options: Any) -> Curves:
         curves = solve(kind, parameters, *args, **options)
