@@ -48,8 +48,8 @@ def code_of(
 ) -> str:
     """SHA-256 of what the modules ``entries`` reach for these hypotheses on these measurements.
 
-    That is the statements of the modules that they import, of the own material, effects, noise and rig and of what
-    these import, but of no other component that code does not name; every prior and its bounds as values; and the major versions of the
+    That is the statements of the modules that they import, of the own material, effects, noise and rig, of components
+    named in ``also``, and of what these import; every prior and its bounds as values; and the major versions of the
     packages that do the numerical work.
     """
     claims = tuple(hypotheses)
