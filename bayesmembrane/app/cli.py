@@ -40,7 +40,7 @@ Parameters = Annotated[
     typer.Option("--parameters", help="Membrane parameters, N/m (exponents and Gent's c2 pure numbers), by commas."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on stdout; logs go to stderr.")]
-Seed = Annotated[int, typer.Option("--seed", help="Seed of every random number.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of every random number.")]
 Curve = Annotated[Path, typer.Argument(help="The measured curve: CSV whose header names carry units.", metavar="CURVE")]
 SpecimenFile = Annotated[Path, typer.Option("--specimen", help="TOML with film, rig and noise.")]
 Effects = Annotated[str, typer.Option("--effects", help="Physical effects beside the material, by commas.")]

@@ -24,6 +24,14 @@ MOST = 300  # evaluations of one search
 ON_THE_WAY = 24  # states at which a film is looked at before it is solved
 
 
+class _LevelError(Exception):
+    """The loss is level at ``x`` (k,), as where the film is slack at every point: no step can be made from there."""
+
+    def __init__(self, x: Array) -> None:
+        super().__init__()
+        self.x = x
+
+
 class Objective:
     """r(x) = L^-1 (F(x) - y) of coordinates that shape the curve, with its Jacobian."""
 
@@ -143,24 +151,30 @@ class Objective:
         start = np.clip(x, self.low + room, self.high - room)
         if not np.all(np.isfinite(self(start)[0])):
             return start, np.inf, "no curve at the start"
-        done = least_squares(
-            self._residual,
-            start,
-            jac=self._slope,
-            bounds=(self.low, self.high),
-            x_scale="jac",
-            ftol=tolerance,
-            xtol=tolerance,
-            gtol=None,
-            max_nfev=evaluations,
-        )
+        try:
+            done = least_squares(
+                self._residual,
+                start,
+                jac=self._slope,
+                bounds=(self.low, self.high),
+                x_scale="jac",
+                ftol=tolerance,
+                xtol=tolerance,
+                gtol=None,
+                max_nfev=evaluations,
+            )
+        except _LevelError as level:
+            return level.x, float(np.linalg.norm(self(level.x)[0])), "converged"
         return done.x, float(np.sqrt(2 * done.cost)), "converged" if done.status > 0 else "evaluation limit"
 
     def _residual(self, x: Array) -> Array:
         return self(x)[0]
 
     def _slope(self, x: Array) -> Array:
-        return self(x)[1]
+        r, jacobian = self(x)
+        if not np.any(r @ jacobian):  # least_squares would divide zero by zero, and go on with nan
+            raise _LevelError(x.copy())
+        return jacobian
 
 
 def separated(pool: Array, distance: Array, count: int) -> list[Array]:
