@@ -412,11 +412,12 @@ def diagnose(
 ) -> None:
     """Whether the model misses something, which effect or energy explains it, or that this cannot be told."""
     from bayesmembrane.diagnosis.diagnose import diagnose as run
+    from bayesmembrane.words.diagnosis import document as words
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
     with log.status(f"Diagnosing {claim.label()}") as status:
         found = run(measurement, claim, seed=seed, tell=status.update)
-    document = found.summary()
+    document = words(found)
     answer(document, as_json, lambda: _shown(document, measurement))
 
 
@@ -439,8 +440,10 @@ def loop(
 ) -> None:
     """Calibrate, diagnose, add what is missing, calibrate again, until adequate or abstaining; and report."""
     from bayesmembrane.calibration.predictions import digest
+    from bayesmembrane.diagnosis.loop import LoopSettings
     from bayesmembrane.diagnosis.loop import loop as run
     from bayesmembrane.report.page import write_report
+    from bayesmembrane.words.loop import document as words
 
     adapt = noise == "auto"
     measurement, claim = _asked(
@@ -448,15 +451,8 @@ def loop(
     )
     try:
         with lines() as tell:
-            found = run(
-                measurement,
-                claim,
-                seed=seed,
-                out=out_folder,
-                ess=ess,
-                tell=lambda text: tell(claim.label(), text),
-                adapt_noise=adapt,
-            )
+            settings = LoopSettings(seed, out_folder, ess, adapt)
+            found = run(measurement, claim, settings, tell=lambda text: tell(claim.label(), text))
     except KeyboardInterrupt:
         log.print(f"Interrupted; the runs are stored in {out_folder}. The same command resumes: {_command()}")
         raise typer.Exit(130) from None
@@ -464,12 +460,7 @@ def loop(
     for stored in runs:
         digest(stored)
     page = write_report([r.path for r in runs if r.path is not None], report_folder, loops=[found])
-    document: dict[str, Any] = {
-        "rounds": [r.summary() for r in found.rounds],
-        "sentence": found.sentence,
-        "left": None if found.left is None else found.left.sentence,
-        "report": str(page),
-    }
+    document: dict[str, Any] = {**words(found), "report": str(page)}
 
     def show() -> None:
         for number, round_ in enumerate(document["rounds"], 1):

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesmembrane.calibration.run import Run
-from bayesmembrane.diagnosis.candidates import Candidate
-from bayesmembrane.diagnosis.diagnose import Diagnosis
-from bayesmembrane.diagnosis.heldout import Error, error_of
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.left.heldout import Misfit, misfit_of
 from bayesmembrane.diagnosis.loop import Loop, Round, Stage
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -31,8 +31,8 @@ class Model:
 
     title: str
     candidate: Candidate
-    error: Error
-    held_out: Error | None
+    error: Misfit
+    held_out: Misfit | None
     stage: Stage | None
     added: bool = True
     covered: float | None = None
@@ -83,8 +83,8 @@ def models(loop: Loop) -> list[Model]:
         d = r.diagnosis
         if d.verdict == "ambiguous":
             out += _undecided(r)
-        elif d.best is not d.null and d.verdict in ("named", "material"):
-            stage = r.after if r.after is not r.before else None
+        elif d.explains:
+            stage = r.after if r.changed else None
             out.append(replace(_model(d, d.best, d.after, stage, before=False), added=stage is not None))
     return out
 
@@ -101,7 +101,7 @@ def _undecided(r: Round) -> list[Model]:
             Model(
                 spoken_hypothesis(j.candidate.hypothesis),
                 j.candidate,
-                error_of(j.candidate.residual, sd, j.candidate.x.size),
+                misfit_of(j.candidate.residual, sd, j.candidate.x.size),
                 None,
                 stage,
                 added=False,
@@ -111,7 +111,7 @@ def _undecided(r: Round) -> list[Model]:
     ]
 
 
-def _model(d: Diagnosis, candidate: Candidate, error: Error, stage: Stage | None, before: bool) -> Model:
+def _model(d: Diagnosis, candidate: Candidate, error: Misfit, stage: Stage | None, before: bool) -> Model:
     v, title = d.validation, spoken_hypothesis(candidate.hypothesis)
     if v is None:
         return Model(title, candidate, error, None, stage)

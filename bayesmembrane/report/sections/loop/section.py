@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bayesmembrane.diagnosis.diagnose import Diagnosis
-from bayesmembrane.diagnosis.heldout import held_out
+from bayesmembrane.diagnosis.left.heldout import held_out
 from bayesmembrane.diagnosis.loop import Loop
-from bayesmembrane.diagnosis.separation import CLEAR
+from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.diagnosis.thresholds import NEXT_TEST
 from bayesmembrane.report.blocks import Block, Section
 from bayesmembrane.report.sections.loop.figures import Place, Residual, discrepancy_picture, residual_picture
 from bayesmembrane.report.sections.loop.reading import (
@@ -35,6 +35,8 @@ from bayesmembrane.report.sections.loop.tables import (
 from bayesmembrane.report.sentences import listed
 from bayesmembrane.report.style import spoken
 from bayesmembrane.report.tables import Table
+from bayesmembrane.words.diagnosis import absorbed_sentences, experiment_sentence, sentence, set_aside
+from bayesmembrane.words.loop import left_sentence
 
 MATTERS = 1.0  # standard deviations: a smaller change of a parameter is none
 SAME = 1e-3
@@ -54,10 +56,10 @@ def loop_answers(loops: Sequence[Loop]) -> list[str]:
 
 def answer(found: Loop) -> list[str]:
     """What was found and added, with the size, and how it ended."""
-    told = [r.diagnosis.sentence for r in found.rounds]
+    told = [sentence(r.diagnosis) for r in found.rounds]
     told = [told[0], *(f"With that: {s}" for s in told[1:])]
     last = found.rounds[-1]
-    if last.after is not last.before:
+    if last.changed:
         told.append(
             f"The loop stops after {len(found.rounds)} round{'s' if len(found.rounds) > 1 else ''}: whether "
             f"{spoken_hypothesis(last.after.run.hypothesis)} is adequate has not been asked."
@@ -75,7 +77,7 @@ def _section(found: Loop, number: int) -> Section:
     end = f" {number}" if number else ""
     first, last = found.rounds[0].diagnosis, found.rounds[-1].diagnosis
     way = models(found)
-    where = "nothing" if first.validation is None else first.validation.where
+    where = set_aside(first.validation)
     blocks = [Block("text", text) for text in answer(found)]
     told = [*validation_sentences(found), *bound_sentences(found), *moved_sentences(found), *rival_sentences(found)]
     blocks += [Block("list", lines=tuple(told))] if told else []
@@ -83,7 +85,7 @@ def _section(found: Loop, number: int) -> Section:
     blocks += [_table(errors_table(way, where, f"loop errors{end}")), _table(scores_table(way, f"loop scores{end}"))]
     blocks += _left(found, last)
     before, after = stages(found)
-    if after is not before:
+    if any(r.changed for r in found.rounds):
         blocks.append(Block("heading", "How the parameters moved"))
         blocks.append(_table(moved_table(changes(before.run, after.run), f"loop parameters{end}")))
     blocks += _explanations(found, end)
@@ -109,7 +111,7 @@ def validation_sentences(found: Loop) -> list[str]:
             else f"the others choose {labels.get(v.chosen, v.chosen)} instead: the choice rests on the points left out"
         )
         fall = f"their root mean square goes from {1e3 * v.before.rmse_N:.3g} to {1e3 * v.after.rmse_N:.3g} mN"
-        told.append(f"Set aside before looking: {v.where}. Without these points {same}; {fall}.")
+        told.append(f"Set aside before looking: {set_aside(v)}. Without these points {same}; {fall}.")
     if not told and found.rounds[-1].diagnosis.validation is None:
         told.append("No points were set aside: there are too few.")
     return told
@@ -133,7 +135,7 @@ def bound_sentences(found: Loop) -> list[str]:
 def moved_sentences(found: Loop) -> list[str]:
     """How the material moved, and why that matters."""
     before, after = stages(found)
-    if after is before:
+    if not any(r.changed for r in found.rounds):
         return []
     every = [c for c in changes(before.run, after.run) if c.material or c.name == "shear modulus"]
     modulus, rest = every[0], every[1:]
@@ -187,7 +189,7 @@ def modulus_sentence(c: Change, model: str) -> str:
 def place_of(found: Loop) -> Place:
     """Where the points lie, which were set aside, and their noise as the last diagnosis has it."""
     m, d = found.rounds[0].before.run.measurement, found.rounds[-1].diagnosis
-    mask = held_out(m)[0] if d.validation is not None else np.zeros(len(m), dtype=bool)
+    mask = held_out(m) if d.validation is not None else np.zeros(len(m), dtype=bool)
     return Place(m.deflection, m.time, m.leg, m.cycle, mask, d.noise.each)
 
 
@@ -226,8 +228,8 @@ def _left(found: Loop, last: Diagnosis) -> list[Block]:
     if found.left is None:
         return []
     caption = (
-        f"{found.left.sentence} Lines and bands: mean and two standard deviations of the process that is kept for it "
-        "along the way of the disc; it has no name, and predicts nothing for another test."
+        f"{left_sentence(found.left)} Lines and bands: mean and two standard deviations of the process that is kept "
+        "for it along the way of the disc; it has no name, and predicts nothing for another test."
     )
     picture = discrepancy_picture(place_of(found), last.null.residual, found.left.mean, found.left.sd)
     model = spoken_hypothesis(last.null.hypothesis)
@@ -259,9 +261,11 @@ def _rivals(d: Diagnosis) -> list[str]:
         words = "the most probable" if behind == 0 else f"{behind:.1f} behind in ln of the evidence"
         size = ", ".join(sizes(j.candidate, d.null))
         told.append(f"{candidate_title(j.candidate, d.null)}{f' ({size})' if size else ''}: {words}.")
-    clear = [e for e in d.experiments if e.separation >= CLEAR]
-    rest = [f"{e.what} ({e.separation:.1f} standard deviations)" for e in d.experiments if e.separation < CLEAR]
-    told += [f"To tell them apart: {e.sentence}." for e in clear]
+    clear = [e for e in d.experiments if e.separation >= NEXT_TEST.clear]
+    rest = [
+        f"{e.what} ({e.separation:.1f} standard deviations)" for e in d.experiments if e.separation < NEXT_TEST.clear
+    ]
+    told += [f"To tell them apart: {experiment_sentence(e)}." for e in clear]
     if not clear:
         told.append("None of the further tests that were simulated would tell them apart.")
     if rest:
@@ -275,7 +279,7 @@ def _limits(found: Loop, end: str) -> list[Block]:
     if d.confounded:
         out.append(_table(confounded_table(d, f"loop confounded{end}")))
     if d.absorbed:
-        lines = tuple(f"{s[0].upper()}{s[1:].rstrip('.')}." for s in d.absorbed)
+        lines = tuple(f"{s[0].upper()}{s[1:].rstrip('.')}." for s in absorbed_sentences(d))
         out += [Block("text", "The material absorbs without trace, so that no residual shows it:")]
         out.append(Block("list", lines=lines))
     if last.power:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from bayesmembrane.diagnosis.candidates import Candidate
-from bayesmembrane.diagnosis.diagnose import Diagnosis
-from bayesmembrane.diagnosis.heldout import Error
-from bayesmembrane.diagnosis.trace import UNEXPLAINED
-from bayesmembrane.diagnosis.wording import size_in_words
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.left.heldout import Misfit
+from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.diagnosis.thresholds import EXPLANATION
 from bayesmembrane.ground.registry import components
 from bayesmembrane.report.sections.loop.reading import Change, Model, effect_title, spoken_hypothesis
 from bayesmembrane.report.style import spoken
 from bayesmembrane.report.tables import Column, Table, Value
+from bayesmembrane.words.diagnosis import size_in_words
 
 MOST_CANDIDATES = 20
 
@@ -38,7 +38,7 @@ def errors_table(found: Sequence[Model], where: str, name: str) -> Table:
     return Table(name, caption, columns, rows)
 
 
-def _error(error: Error | None) -> tuple[Value, ...]:
+def _error(error: Misfit | None) -> tuple[Value, ...]:
     return (None, None, None) if error is None else (1e3 * error.rmse_N, 1e3 * error.max_N, error.reduced_chi2)
 
 
@@ -80,7 +80,7 @@ def ranking_table(d: Diagnosis, name: str) -> Table:
         Column("at_bound", "at a bound"),
         Column("in_answer", "in the answer"),
     )
-    members = {id(j.candidate) for j in d.members} if d.verdict != "unknown" else set()
+    members = {j.candidate.label for j in d.members} if d.verdict != "unknown" else set()
     rows = []
     for j in d.ranking[:MOST_CANDIDATES]:
         c = j.candidate
@@ -92,14 +92,14 @@ def ranking_table(d: Diagnosis, name: str) -> Table:
                 j.unexplained,
                 j.explains,
                 ", ".join(spoken(n) for n in c.at_bound) or "-",
-                id(c) in members,
+                c.label in members,
             )
         )
     caption = (
         f"What could explain the residual of {spoken_hypothesis(d.null.hypothesis)}: each candidate was refitted with "
         "the material. ln Bayes factor: against the model as it was (Laplace approximation). Unexplained: part of the "
         "lack of fit that is left; a candidate explains the curve if that is noise, or at most "
-        f"{100 * UNEXPLAINED:g} %."
+        f"{100 * EXPLANATION.unexplained:g} %."
     )
     if len(d.ranking) > MOST_CANDIDATES:
         caption += f" The {MOST_CANDIDATES} most probable of {len(d.ranking)}."
