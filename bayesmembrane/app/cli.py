@@ -40,7 +40,7 @@ Parameters = Annotated[
     typer.Option("--parameters", help="Membrane parameters, N/m (exponents and Gent's c2 pure numbers), by commas."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on stdout; logs go to stderr.")]
-Seed = Annotated[int, typer.Option("--seed", help="Seed of every random number.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of every random number.")]
 Curve = Annotated[Path, typer.Argument(help="The measured curve: CSV whose header names carry units.", metavar="CURVE")]
 SpecimenFile = Annotated[Path, typer.Option("--specimen", help="TOML with film, rig and noise.")]
 Effects = Annotated[str, typer.Option("--effects", help="Physical effects beside the material, by commas.")]
@@ -67,20 +67,13 @@ def force(
     import numpy as np
 
     from bayesmembrane.ground.registry import material as named
-    from bayesmembrane.physics.mechanics import Note, Status, solve
+    from bayesmembrane.physics.mechanics import Note, Status, request, solve
 
     kind = named(material)
     film = kind.from_vector(numbers(parameters, "--parameters"))
     where = numbers(deflection_mm, "--deflection-mm")
-    curves = solve(
-        kind,
-        film.vector,
-        np.array(where) * 1e-3,
-        inner_radius=inner_radius_mm * 1e-3,
-        outer_radius=outer_radius_mm * 1e-3,
-        prestretch=prestretch,
-        solver=solver,
-    )
+    radii = inner_radius_mm * 1e-3, outer_radius_mm * 1e-3
+    curves = solve(request(kind, film.vector, np.array(where) * 1e-3, *radii, prestretch=prestretch, solver=solver))
     states = [Status(int(s)) for s in curves.status[0]]
     notes = [(Note(int(n)).name or "").lower() if n else "" for n in curves.note[0]]
     document = {
@@ -147,6 +140,8 @@ def import_(
     from bayesmembrane.data.importers.base import import_export
 
     written = import_export(export, out_file)
+    for note in written.notes:
+        log.print(f"{export}: {note}.", markup=False)
     document = {
         "curve": str(written.curve),
         "specimen": str(written.specimen),
@@ -252,36 +247,36 @@ def sample(
     seed: Seed = 0,
 ) -> None:
     """The posterior, stored as a run; the same command continues a run that was interrupted."""
-    from bayesmembrane.calibration.predictions import digest
     from bayesmembrane.calibration.run import sample as run
+    from bayesmembrane.data.measurement import read_measurement
     from bayesmembrane.physics.cache import CachedSolver
+    from bayesmembrane.words.sampling import document
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
-    cache = CachedSolver(out_folder / "curves")
+    cache, rest = CachedSolver(out_folder / "curves"), None
+    if max_deflection_mm is not None and measurement.full_range > measurement.deflection.max():
+        whole = read_measurement(curve, specimen)
+        rest = whole.select(whole.deflection > measurement.deflection.max())
     with _bar(claim.label()) as tell:
-        done = run(measurement, claim, seed=seed, out=out_folder, ess=ess, progress=tell, solve=cache)
+        done = run(measurement, claim, seed=seed, out=out_folder, ess=ess, progress=tell, solve=cache, rest=rest)
     if done.interrupted:
         log.print(f"Interrupted; the run is stored in {done.path}. The same command resumes it: {_command()}")
         raise typer.Exit(130)
-    rest = None
-    if max_deflection_mm is not None and measurement.full_range > measurement.deflection.max():
-        whole = _measurement(curve, specimen)
-        rest = whole.select(whole.deflection > measurement.deflection.max())
-    digest(done, rest=rest, solve=cache)
+    told = document(done)
 
     def show() -> None:
         rows = [
             [name, f"{v['mean']:.5g}", f"{v['sd']:.2g}", f"{v['hdi_94'][0]:.5g} to {v['hdi_94'][1]:.5g}"]
-            for name, v in done.status["posterior"].items()
+            for name, v in told["posterior"].items()
         ]
         table(f"{claim.material.title} on {curve}", ["parameter", "mean", "sd", "94 % interval"], rows)
-        s = done.status
-        out.print(f"ESS {s['ess_bulk']:.0f}, R-hat {s['r_hat']:.3f}, {s['evaluations']} curves, {s['seconds']:.0f} s.")
-        for sentence in s["sentences"]:
+        spent = f"{told['evaluations']} curves, {told['seconds']:.0f} s"
+        out.print(f"ESS {told['ess_bulk']:.0f}, R-hat {told['r_hat']:.3f}, {spent}.")
+        for sentence in told["sentences"]:
             out.print(sentence)
         out.print(f"Stored in {done.path}; bayesmembrane report {done.path} shows it.")
 
-    answer(done.summary(), as_json, show)
+    answer(told, as_json, show)
 
 
 @app.command()
@@ -366,6 +361,7 @@ def compare(
     """Which materials the data support, by two estimators of the evidence, with prediction beside it."""
     from bayesmembrane.comparison.compare import claimed, compare_ranges, ranges_of
     from bayesmembrane.report.sections.comparison.section import evidence_table
+    from bayesmembrane.words.sampling import with_notes
 
     claims = claimed(materials, effects, noise, convexity)
     if ranges_mm and max_deflection_mm is not None:
@@ -378,7 +374,7 @@ def compare(
     except KeyboardInterrupt:
         log.print(f"Interrupted; what is finished is stored in {out_folder}. The same command resumes it: {_command()}")
         raise typer.Exit(130) from None
-    answers = {name: c.summary() for name, c in found.items()}
+    answers = {name: with_notes(c) for name, c in found.items()}
     document = {**list(answers.values())[-1], "ranges": [{"range": n, **a} for n, a in answers.items()]}
 
     def show() -> None:
@@ -415,6 +411,7 @@ def diagnose(
     from bayesmembrane.words.diagnosis import document as words
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
+    _say_thinning(measurement)
     with log.status(f"Diagnosing {claim.label()}") as status:
         found = run(measurement, claim, seed=seed, tell=status.update)
     document = words(found)
@@ -439,7 +436,6 @@ def loop(
     seed: Seed = 0,
 ) -> None:
     """Calibrate, diagnose, add what is missing, calibrate again, until adequate or abstaining; and report."""
-    from bayesmembrane.calibration.predictions import digest
     from bayesmembrane.diagnosis.loop import LoopSettings
     from bayesmembrane.diagnosis.loop import loop as run
     from bayesmembrane.report.page import write_report
@@ -449,6 +445,7 @@ def loop(
     measurement, claim = _asked(
         curve, specimen, material, effects, max_deflection_mm, convexity, "white" if adapt else noise
     )
+    _say_thinning(measurement)
     try:
         with lines() as tell:
             settings = LoopSettings(seed, out_folder, ess, adapt)
@@ -457,8 +454,6 @@ def loop(
         log.print(f"Interrupted; the runs are stored in {out_folder}. The same command resumes: {_command()}")
         raise typer.Exit(130) from None
     runs = list({str(s.run.path): s.run for r in found.rounds for s in (r.before, r.after)}.values())
-    for stored in runs:
-        digest(stored)
     page = write_report([r.path for r in runs if r.path is not None], report_folder, loops=[found])
     document: dict[str, Any] = {**words(found), "report": str(page)}
 
@@ -507,14 +502,11 @@ def report(
     seed: Seed = 0,
 ) -> None:
     """One self-contained HTML page about one run or several."""
-    from bayesmembrane.calibration.predictions import digest
     from bayesmembrane.calibration.run import load_run, run_folders
     from bayesmembrane.report.page import write_report
 
     found = [path for folder in folders for path in run_folders(folder)]
     runs = [load_run(path) for path in found]
-    for run in runs:
-        digest(run)
     page = write_report(runs, out_folder, title=title)
     document = {"report": str(page), "runs": [str(path) for path in found]}
     answer(document, as_json, lambda: out.print(f"The report lies in {page}"))
@@ -539,7 +531,20 @@ def demo(
 def _measurement(curve: Path, specimen: Path) -> Measurement:
     from bayesmembrane.data.measurement import read_measurement
 
-    return read_measurement(curve, specimen)
+    measurement = read_measurement(curve, specimen)
+    for note in measurement.provenance.notes:
+        log.print(f"{curve}: {note}.", markup=False)
+    return measurement
+
+
+def _say_thinning(measurement: Measurement) -> None:
+    """On stderr, before the work: that not all readings will be used."""
+    from bayesmembrane.data.thinning import thinned
+    from bayesmembrane.diagnosis.result import thinning
+    from bayesmembrane.words.diagnosis import thinning_sentence
+
+    if (found := thinning(measurement, thinned(measurement))) is not None:
+        log.print(thinning_sentence(found).replace("were diagnosed", "are diagnosed"), markup=False)
 
 
 def _asked(

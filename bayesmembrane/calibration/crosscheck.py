@@ -41,8 +41,7 @@ def crosscheck(forward: Forward, x: Array, seed: int = 0, draws: int = DRAWS) ->
     rng = np.random.default_rng(seed)
     sample = x[rng.choice(len(x), min(draws, len(x)), replace=False)]
     films = forward.hypothesis.films(sample)
-    at = np.unique(forward.deflection)
-    at = at[np.unique(np.linspace(0, at.size - 1, min(at.size, POINTS)).astype(int))]
+    at = _sample(forward)
     first, second = forward.curves(films, at), forward.curves(films, at, solver="shooting")
     both = first.ok & second.ok & (first.force != 0)
     missing = int(np.sum(first.ok != second.ok))
@@ -51,3 +50,11 @@ def crosscheck(forward: Forward, x: Array, seed: int = 0, draws: int = DRAWS) ->
     apart = np.where(both, np.abs(second.force - first.force) / np.where(both, np.abs(first.force), 1.0), -1.0)
     _, column = np.unravel_index(int(np.argmax(apart)), apart.shape)
     return CrossCheck(len(films), float(np.max(apart)), 1e3 * float(at[column]), int(np.sum(both)), missing)
+
+
+def _sample(forward: Forward) -> Array:
+    """(M,) m: `POINTS` of the deflections at most; all of a biaxial test, whose readings each have their own state."""
+    if forward.measurement.across is not None:
+        return forward.deflection
+    at = np.unique(forward.deflection)
+    return np.asarray(at[np.unique(np.linspace(0, at.size - 1, min(at.size, POINTS)).astype(int))])

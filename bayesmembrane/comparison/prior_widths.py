@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import arviz
 import numpy as np
 
 from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array, Prior, Uniform
 from bayesmembrane.physics.forward import Forward, Solve
@@ -21,6 +23,9 @@ Ratio = Callable[[int, float], tuple[float, float]]
 
 LEAST_ESS = 100.0
 LARGEST_SHARE = 0.1  # of the sum that a single weight may hold
+BATCHES = 20  # of draws in their order, by which the error of a mean of correlated weights is told
+HEAVIEST = 0.7  # tail index of the weights from which on their mean says nothing, and less with few draws
+MOST_TAIL = 0.9
 
 
 @dataclass(frozen=True)
@@ -53,9 +58,10 @@ def prior_widths(
 ) -> tuple[Widened, ...]:
     """Z'/Z = mean of p'(x) / p(x) over the posterior of the prior p, times mass / mass' of the two truncated priors.
 
-    ``draws`` (B, k) are those of ``posterior`` and worth ``effective`` independent ones. Normal priors keep their mean,
-    uniform ones their middle. The masses come from one survey of the widest prior, reweighted. A wider uniform prior
-    allows what no draw has seen, and weights that rest on a few draws say nothing: then the reason is given.
+    ``draws`` (B, k) are those of ``posterior``, in the order of the walk, and worth ``effective`` independent ones.
+    Normal priors keep their mean, uniform ones their middle. The masses come from one survey of the widest prior,
+    reweighted. A wider uniform prior allows what no draw has seen, and weights that rest on a few draws say
+    nothing: then the reason is given.
     """
     parameters = posterior.hypothesis.parameters
     masses = _masses(posterior.hypothesis, posterior.measurement, max([1.0, *factors]), seed, solve)
@@ -85,29 +91,64 @@ def scaled(prior: Prior, factor: float) -> Prior | None:
 
 
 def _reweighted(name: str, factor: float, log_ratio: Array, worth: float, mass: tuple[float, float]) -> Widened:
+    """ln of the mean weight over n draws worth ``worth`` n, less ln(mass' / mass); its error, or why there is none.
+
+    The error of the mean is the larger of that of ``worth`` n independent weights and that of the means of batches,
+    since weights may be correlated longer than coordinates. What lies beyond the largest weight is not in it: of a tail
+    of index k that is about max(w) / (worth n (1 - k)), which counts as an error, too. Heavy tails are refused as in
+    A. Vehtari et al., J. Mach. Learn. Res. 25 (2024) 72: k above min(0.7, 1 - 1 / log10 n_eff).
+    """
+    n = len(log_ratio)
     w = np.exp(log_ratio - np.max(log_ratio))
-    ess = float(worth * np.sum(w) ** 2 / np.sum(w * w))
+    w /= np.mean(w)
+    ess = worth * effective_draws(w)
     log_mass, log_mass_sd = mass
-    change = float(np.max(log_ratio) + np.log(np.mean(w))) - log_mass
-    sd = float(np.hypot(np.std(w) / np.mean(w) / np.sqrt(worth * len(w)), log_mass_sd))
-    if not np.isfinite(log_mass) or ess < LEAST_ESS or np.max(w) > LARGEST_SHARE * np.sum(w):
+    change = float(np.max(log_ratio) + np.log(np.mean(np.exp(log_ratio - np.max(log_ratio))))) - log_mass
+    k = _tail_index(log_ratio, worth)
+    thin = ess < LEAST_ESS or np.max(w) > LARGEST_SHARE * n
+    if thin or not np.isfinite(log_mass):
         why = f"Reweighted to {factor:g} times the width, the draws are worth only {ess:.0f}: sample again with it."
         return Widened(name, factor, np.nan, np.nan, ess, why)
+    if k > min(HEAVIEST, 1 - 1 / np.log10(worth * n)):
+        why = (
+            f"Reweighted to {factor:g} times the width, a few draws far out count most (tail index {k:.2f}): "
+            "sample again with it."
+        )
+        return Widened(name, factor, np.nan, np.nan, ess, why)
+    if np.ptp(w) == 0:
+        return Widened(name, factor, change, log_mass_sd, ess, "")
+    batches = np.array([np.mean(part) for part in np.array_split(w, BATCHES)])
+    scatter = max(np.std(w) / np.sqrt(worth * n), np.std(batches, ddof=1) / np.sqrt(BATCHES))
+    unseen = np.max(w) / (worth * n) / (1 - min(k + _index_sd(k, worth * n), MOST_TAIL))
+    sd = float(np.sqrt(scatter**2 + unseen**2 + log_mass_sd**2))
     return Widened(name, factor, change, sd, ess, "")
+
+
+def _tail_index(log_ratio: Array, worth: float) -> float:
+    """Pareto index k of the largest weights; 0 where they are all alike, and so bounded."""
+    largest = np.partition(log_ratio, -int(np.ceil(0.2 * len(log_ratio))))[-int(np.ceil(0.2 * len(log_ratio))) :]
+    if np.ptp(largest) < 1e-6:
+        return 0.0
+    with np.errstate(all="ignore"):  # its own fit overflows harmlessly
+        return float(arviz.psislw(log_ratio.copy(), reff=worth)[1])  # type: ignore[no-untyped-call]
+
+
+def _index_sd(k: float, effective: float) -> float:
+    """Standard error of a Pareto index from the 3 sqrt(n_eff) largest weights: (1 + k) / sqrt(their number)."""
+    return float((1 + max(k, 0.0)) / np.sqrt(3 * np.sqrt(effective)))
 
 
 def _masses(hypothesis: Hypothesis, measurement: Measurement, widest: float, seed: int, solve: Solve) -> Ratio:
     """(i, factor) -> ln(mass with the i-th prior scaled / mass as it is) and its error."""
-    if hypothesis.convexity == "none":
+    if not hypothesis.convexity.restricts:
         return lambda i, factor: (0.0, 0.0)
     priors = [p.prior for p in hypothesis.parameters[: hypothesis.curve_size]]
     wide = [scaled(p, widest) or p for p in priors]
     rng = np.random.default_rng([seed, 3])
     x = np.stack([p.draw(rng, SURVEYED) for p in wide], axis=1)
-    only = {"reached": "convex", "elliptic": "elliptic"}.get(hypothesis.convexity, "all")
-    prediction = Forward(hypothesis, measurement, measurement.deflection, solve)(x, only=only)
-    margin = prediction.margin(hypothesis.convexity, hypothesis)
-    inside = margin > 0 if hypothesis.convexity == "elliptic" else margin >= 0
+    mode = hypothesis.convexity
+    prediction = Forward(hypothesis, measurement, measurement.deflection, solve)(x, spare=mode.spare)
+    inside = mode.holds(mode.margin(prediction, hypothesis.material))
     base = np.stack([p.log_density(x[:, j]) for j, p in enumerate(priors)], axis=1)
     source = sum(p.log_density(x[:, j]) for j, p in enumerate(wide))
 

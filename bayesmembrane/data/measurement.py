@@ -22,7 +22,7 @@ from bayesmembrane.ground.errors import DataError, SettingsError, StorageError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.ground.units import FORCE, LENGTH, TIME
-from bayesmembrane.physics.rigs.base import Rig
+from bayesmembrane.physics.rigs.base import Rig, Strip
 
 # What lies beyond these is a wrong unit, not a film.
 THICKNESSES = (1e-8, 5e-3)  # m
@@ -251,18 +251,25 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     rig = _rig(root.section("rig"))
     specimen = _specimen(root.section("specimen"), rig, curve_csv.stem)
     options = root.section("measurement", required=False)
-    found, notes = curve_columns(table, rig.columns)
-    found = rig.from_columns(found, specimen.thickness)
+    columns, notes = curve_columns(table, rig.columns, rig.noise)
+    found = _at(table.file, rig.from_columns, columns, specimen.thickness)
     deflection, force, across = found["deflection"], found["force"], found.get("across")
-    if across is None:
+    if isinstance(rig, Strip):
+        _check_strip(found, table)
+    else:
         check_samples(found, table.file, table.lines)
     _check_size(deflection, table, rig)
-    sd, covariance, covariance_file = _noise(options, found.get("force_sd"), force.size)
+    single = _stated(options, rig, specimen.thickness)
+    sd, covariance, covariance_file = _noise(options, single, found.get("force_sd"), force.size)
     origin = [options.text("origin"), root.section("origin", required=False).all_text()]
     for section in (options, root):
         section.finish()
     provenance = Provenance(
-        curve_csv.name, specimen_toml.name, covariance_file, "; ".join(o for o in origin if o), notes
+        curve_csv.name,
+        specimen_toml.name,
+        covariance_file,
+        "; ".join(o for o in origin if o),
+        (*notes, *rig.remarks(found)),
     )
     if sd is not None and np.min(sd) < LEAST_SD:
         fault = f"a standard deviation of {np.min(sd):g} N looks like a wrong unit"
@@ -358,14 +365,16 @@ def _at(where: str, cls: Callable[..., T], *values: Any) -> T:
         raise DataError(error.what, where, error.remedy) from None
 
 
-def curve_columns(table: Table, required: Mapping[str, str]) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """The columns of a curve in SI, (N,) each, by name: ``required`` ones, time and force_sd; and a note on the others.
+def curve_columns(
+    table: Table, required: Mapping[str, str], noise: Mapping[str, str] = Rig.noise
+) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """The columns of a curve in SI, (N,) each, by name: ``required`` ones, time and ``noise``; a note on the others.
 
-    ``required`` maps names to quantities. Raises `DataError` if one is missing or holds what is no number, and for
+    Both map names to quantities. Raises `DataError` if one is missing or holds what is no number, and for
     fewer than two points.
     """
     places = {name: table.require(name, quantity) for name, quantity in required.items()}
-    for name, quantity in (("time", TIME), ("force_sd", FORCE)):
+    for name, quantity in (("time", TIME), *noise.items()):
         if (place := table.find(name, quantity)) is not None:
             places[name] = place
     if len(table.rows) < 2:
@@ -382,16 +391,47 @@ def check_samples(columns: dict[str, Array], file: str, lines: Sequence[int]) ->
     ``columns`` are those of a curve in SI, (N,) each; ``lines`` the N line numbers of ``file`` that errors name.
     """
     places = [f"{file}, line {k}" for k in lines]
-    if "time" in columns:
-        check_time(columns["time"], places)
-    else:
-        check_order(columns["deflection"], places)
+    _check_sequence(columns, places)
     for name in ("deflection", "force"):
         if np.mean(columns[name] < 0) > 0.5:
             fault = f"the {name} is negative at most points, and a lifted disc has a positive one"
             raise DataError(fault, file, "change the sign of the column")
     if not np.any(columns["deflection"] > 0):
         raise DataError("the disc is never lifted: no deflection is positive", file, "check the column")
+    _check_sd(columns, places)
+
+
+def _check_strip(columns: dict[str, Array], table: Table) -> None:
+    """As `check_samples`, for a homogeneous test: what pushes has a stretch below 1 and a negative stress."""
+    places = [f"{table.file}, line {k}" for k in table.lines]
+    deflection, force, across = columns["deflection"], columns["force"], columns.get("across")
+    if across is None:
+        _check_sequence(columns, places)
+    else:
+        places = 2 * places
+    pulled, pushed = deflection > 0, deflection < 0
+    if across is not None:  # held wide a film pulls below rest, and held narrow it may push above
+        pulled, pushed = pulled & (across >= 1), pushed & (across <= 1)
+    against = ((pulled & (force < 0)) | (pushed & (force > 0))) & (np.abs(force) > 0.01 * np.max(np.abs(force)))
+    if np.sum(against) > 0.5 * np.sum(pulled | pushed):
+        k = int(np.argmax(against))
+        fault = "at most points the stress is negative above a stretch of 1 or positive below it"
+        remedy = "write the stretch as length over length at rest, and the stress positive where it pulls"
+        raise DataError(fault, places[k], remedy)
+    if not np.any(deflection > 0):
+        fault = "no stretch is above 1, and a test in compression alone cannot be calibrated"
+        raise DataError(fault, table.file, "keep the signs as they are, and add the readings in tension of this rubber")
+    _check_sd(columns, places)
+
+
+def _check_sequence(columns: dict[str, Array], places: list[str]) -> None:
+    if "time" in columns:
+        check_time(columns["time"], places)
+    else:
+        check_order(columns["deflection"], places)
+
+
+def _check_sd(columns: dict[str, Array], places: list[str]) -> None:
     if "force_sd" in columns and np.any(columns["force_sd"] <= 0):
         k = int(np.argmax(columns["force_sd"] <= 0))
         raise DataError("the standard deviation of the force must be positive", places[k], "correct the column")
@@ -407,9 +447,22 @@ def _check_size(deflection: Array, table: Table, rig: Rig) -> None:
         raise DataError(fault, f"{table.file}, line {row}", "check the unit in the header")
 
 
-def _noise(options: Section, column: Array | None, n: int) -> tuple[Array | None, Array | None, str]:
+def _stated(options: Section, rig: Rig, thickness: float) -> float | None:
+    """N, the standard deviation that the specimen file states for all points, or None; in any quantity of the rig."""
+    found = {}
+    for name, quantity in rig.noise.items():
+        value = options.measure(name, quantity, f"{name}_{'N' if quantity == FORCE else 'MPa'}", required=False)
+        if value is not None:
+            found[name] = value * rig.newton(quantity, thickness)
+    if len(found) > 1:
+        raise DataError(f"{' and '.join(found)} both give the noise", options.where, "remove one of them")
+    return next(iter(found.values()), None)
+
+
+def _noise(
+    options: Section, single: float | None, column: Array | None, n: int
+) -> tuple[Array | None, Array | None, str]:
     """(force_sd, covariance, file of the covariance) from the specimen file and the column."""
-    single = options.measure("force_sd", FORCE, "force_sd_N", required=False)
     name = options.text("covariance")
     if single is not None and (name or column is not None):
         other = "covariance" if name else "column force_sd"

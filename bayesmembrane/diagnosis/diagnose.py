@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.thinning import thinned
 from bayesmembrane.diagnosis.candidates.candidate import absorbed
 from bayesmembrane.diagnosis.candidates.sudden import SuddenChange, sudden_change
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
@@ -11,7 +14,7 @@ from bayesmembrane.diagnosis.explanation.refits import left_by_form
 from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, explained
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
 from bayesmembrane.diagnosis.left.shape import residual_shape
-from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.diagnosis.result import Diagnosis, thinning
 from bayesmembrane.diagnosis.separation import Experiment, experiments
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -28,9 +31,15 @@ def diagnose(
 ) -> Diagnosis:
     """Whether ``hypothesis`` leaves structure in the residual, and which effect, pair or other energy explains it.
 
-    Raises `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
+    A measurement of more readings than `thinning.MOST` is thinned, and so is what the answer holds by reading. Raises
+    `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
     """
-    case = opened(measurement, hypothesis, seed, solve, tell or (lambda _: None))
+    part = thinned(measurement)
+    found = _diagnosed(opened(part, hypothesis, seed, solve, tell or (lambda _: None)))
+    return replace(found, thinned=thinning(measurement, part))
+
+
+def _diagnosed(case: Case) -> Diagnosis:
     if case.detection.adequate:
         return _concluded(case, adequate(case))
     form = left_by_form(case)

@@ -16,10 +16,11 @@ from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.target import PosteriorTarget
 from bayesmembrane.comparison.leave_out.score import leave_one_out
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.thinning import thinned
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.explanation.case import Tell
 from bayesmembrane.diagnosis.left.discrepancy import Discrepancy, discrepancy
-from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.diagnosis.result import Diagnosis, Thinned, thinning
 from bayesmembrane.diagnosis.thresholds import LOOP, TINY
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -69,10 +70,14 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """All rounds, the last one being adequate or abstaining; ``left`` is kept, unnamed, where it abstains."""
+    """All rounds, the last one being adequate or abstaining; ``left`` is kept, unnamed, where it abstains.
+
+    thinned : what was taken of a measurement with too many readings; else None
+    """
 
     rounds: tuple[Round, ...]
     left: Discrepancy | None
+    thinned: Thinned | None = None
 
 
 @dataclass(frozen=True)
@@ -107,10 +112,11 @@ def loop(
     """Diagnose, sample, add what is named, and again.
 
     A named effect or a better energy makes the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop,
-    and so does a hypothesis that was there before. Of an ambiguous answer the first few are sampled. Raises what
-    `sample` and `diagnose` raise.
+    and so does a hypothesis that was there before. Of an ambiguous answer the first few are sampled. More readings
+    than `thinning.MOST` are thinned, for all of it. Raises what `sample` and `diagnose` raise.
     """
-    closing = _Closing(measurement, settings or LoopSettings(), tell or (lambda _: None), watch)
+    part = thinned(measurement)
+    closing = _Closing(part, settings or LoopSettings(), tell or (lambda _: None), watch)
     found = closing.diagnosed(hypothesis)
     noise = _noise_for(found, hypothesis) if closing.settings.adapt_noise else hypothesis.noise
     stage = closing.sampled(replace(hypothesis, noise=noise))
@@ -126,7 +132,7 @@ def loop(
             break
         seen.add(following.label())
         stage, found = after, closing.diagnosed(following)
-    return Loop(tuple(rounds), closing.left(rounds[-1].diagnosis))
+    return Loop(tuple(rounds), closing.left(rounds[-1].diagnosis), thinning(measurement, part))
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +188,7 @@ def _stage(run: Run, solve: Solve, seed: int) -> Stage:
     posterior = Posterior(run.hypothesis, run.measurement, solve)
     draws = run.draws()
     z = bridge(PosteriorTarget(posterior), draws, seed=seed, effective=float(run.status["ess_bulk"]))
-    mode = run.status["prior_mass"][run.hypothesis.convexity]
+    mode = run.status["prior_mass"][run.hypothesis.convexity.name]
     mass = Mass(mode["value"], mode["sd"])
     loo = leave_one_out(posterior, run.data, seed)
     return Stage(

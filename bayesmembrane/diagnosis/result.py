@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.sudden import SuddenChange
 from bayesmembrane.diagnosis.detection.detect import Detection
@@ -17,6 +18,14 @@ from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.rigs.base import Rig
 
 VERDICTS = ("adequate", "named", "ambiguous", "material", "unknown")
+
+
+@dataclass(frozen=True)
+class Thinned:
+    """How many readings were diagnosed, of a measurement that has more than a diagnosis takes."""
+
+    used: int
+    measured: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +54,7 @@ class Diagnosis:
     shape : of the residual before
     validation : misfit on points that were set aside, or None
     experiments : what to measure next where rivals are left
+    thinned : what was diagnosed of a measurement with too many readings, and what all of the above is about; else None
     """
 
     verdict: str
@@ -69,6 +79,7 @@ class Diagnosis:
     shape: ResidualShape
     validation: HeldOut | None
     experiments: tuple[Experiment, ...]
+    thinned: Thinned | None = None
 
     @property
     def hypothesis(self) -> Hypothesis:
@@ -79,3 +90,8 @@ class Diagnosis:
     def explains(self) -> bool:
         """True if one model explains the curve: the one with what is named, or with the better energy."""
         return self.verdict in ("named", "material")
+
+
+def thinning(whole: Measurement, part: Measurement) -> Thinned | None:
+    """What is to be told where ``part`` has fewer readings than ``whole``."""
+    return None if len(part) == len(whole) else Thinned(len(part), len(whole))

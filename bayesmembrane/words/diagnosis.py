@@ -11,7 +11,7 @@ import numpy as np
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.sudden import SuddenChange
 from bayesmembrane.diagnosis.left.heldout import HeldOut
-from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.diagnosis.thresholds import EXPLANATION, WORDS
 from bayesmembrane.ground.registry import components
@@ -27,7 +27,8 @@ SCALES: Units = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "N": (1e3, "mN"), "N/s"
 def document(found: Diagnosis) -> dict[str, Any]:
     """Plain values: the JSON answer of ``diagnose``."""
     fit, waves, noise, held = found.detection.lack_of_fit, found.detection.periodicity, found.noise, found.validation
-    return {
+    thinned = {"thinning": thinning_sentence(found.thinned)} if found.thinned is not None else {}
+    return thinned | {
         "verdict": found.verdict,
         "effects": list(found.effects),
         "material": found.material,
@@ -78,7 +79,17 @@ def document(found: Diagnosis) -> dict[str, Any]:
 def sentence(found: Diagnosis) -> str:
     """What to read first: the verdict, how sure, how large, and what to do; in the units of the rig."""
     text = _form(found, found.form) if found.form is not None else _ANSWERS[found.verdict](found)
-    return text.strip() + _better_energy(found) + _noise(found)
+    thinned = "" if found.thinned is None else f" {thinning_sentence(found.thinned)}"
+    return text.strip() + _better_energy(found) + _noise(found) + thinned
+
+
+def thinning_sentence(thinned: Thinned) -> str:
+    """Which readings of a long measurement were taken."""
+    used, measured = thinned.used, thinned.measured
+    return (
+        f"{used} of the {measured} readings were diagnosed, one in {measured / used:.2g}: evenly along the test, with "
+        "its first and last, its turning points and the ends of its holds; effects of history still follow all of them."
+    )
 
 
 def absorbed_sentences(found: Diagnosis) -> list[str]:

@@ -40,7 +40,8 @@ def sentence(found: Loop) -> str:
             steps.append(f"{new.material.title} instead of {old.material.title}")
         steps += [e.title for e in new.effects if e.name not in {e.name for e in old.effects}]
     start = f"Changed: {', '.join(steps)}. " if steps else ""
-    return start + words.sentence(found.rounds[-1].diagnosis)
+    thinned = "" if found.thinned is None else f" {words.thinning_sentence(found.thinned)}"
+    return start + words.sentence(found.rounds[-1].diagnosis) + thinned
 
 
 def left_sentence(left: Discrepancy) -> str:

@@ -11,7 +11,7 @@ import pytest
 from bayesmembrane.app.cli import main
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.ground.registry import material
-from bayesmembrane.physics.mechanics import solve
+from bayesmembrane.physics.mechanics import request, solve
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -35,7 +35,7 @@ def test_force_answers_what_the_solver_answers(run: Run) -> None:
         "force", "--material", "yeoh", "--parameters", "8.84,-0.63,0.056", "--deflection-mm", "1,10,35.1", "--json"
     )
     answer = json.loads(out)
-    direct = solve(material("yeoh"), [8.84, -0.63, 0.056], [1e-3, 0.01, 0.0351], inner_radius=0.01, outer_radius=0.035)
+    direct = solve(request(material("yeoh"), [8.84, -0.63, 0.056], [1e-3, 0.01, 0.0351], 0.01, 0.035))
     assert code == 0
     assert answer["status"] == ["ok"] * 3
     np.testing.assert_allclose(answer["force_N"], direct.force[0], rtol=1e-12)
@@ -103,6 +103,13 @@ def test_a_missing_option_is_wrong_usage(run: Run) -> None:
     assert run("force", "--material", "gent")[0] == 2
 
 
+def test_a_negative_seed_is_wrong_usage(run: Run) -> None:
+    code, out, err = run("fit", CURVE, "--specimen", SPECIMEN, "--material", "gent", "--seed", "-1")
+    assert (code, out) == (2, "")
+    assert "--seed" in err
+    assert "Traceback" not in err
+
+
 def test_fit_answers_the_contract(run: Run) -> None:
     code, out, _ = run("fit", CURVE, "--specimen", SPECIMEN, "--material", "neo_hookean", "--json")
     answer = json.loads(out)
@@ -142,7 +149,7 @@ def test_fit_finds_effects_in_a_curve_of_the_other_solver(run: Run, tmp_path: Pa
     """The curve is shot, and the shift and the frame are put in by hand, point by point."""
     film, shift, compliance = [8.0, -0.2, 0.03], 6e-4, 4e-4
     knots = np.linspace(1e-3, 0.07, 60)
-    shot = solve(material("yeoh"), film, knots, inner_radius=0.01, outer_radius=0.035, solver="shooting").force[0]
+    shot = solve(request(material("yeoh"), film, knots, 0.01, 0.035, solver="shooting")).force[0]
     deflection = knots + compliance * shot + shift
     force = shot + 1e-3 * np.random.default_rng(4).standard_normal(knots.size)
     rows = "".join(f"{1e3 * d!r},{f!r}\n" for d, f in zip(deflection.tolist(), force.tolist(), strict=True))
@@ -191,3 +198,45 @@ def test_errors_of_a_strip_are_told_in_stress(run: Run, tmp_path: Path) -> None:
     shown = [float(x) for x in line.replace("│", " ").split()[1:3]]
     assert shown[0] == pytest.approx(6, rel=0.05)
     assert 6 <= shown[1] < 9
+
+
+def test_a_biaxial_measurement_is_sampled_compared_and_diagnosed(run: Run, tmp_path: Path) -> None:
+    """Every verb on a neo-Hookean film held across, also on a part of it; what was not read is said on stderr."""
+    l1 = np.array([1.2, 1.2, 1.5, 1.5, 1.9, 1.9])
+    l2 = np.array([1.0, 0.95, 1.0, 1.5, 1.0, 1.3])
+    noise = 2e-3 * np.random.default_rng(5).standard_normal((2, 6))
+    p1, p2 = (0.3 * (a - a**-3.0 * b**-2.0) + e for a, b, e in ((l1, l2, noise[0]), (l2, l1, noise[1])))
+    rows = "".join(f"{a},{b},{s},{t},x\n" for a, b, s, t in zip(l1, l2, p1, p2, strict=True))
+    (tmp_path / "c.csv").write_text("stretch_1,stretch_2,nominal_stress_1_MPa,nominal_stress_2_MPa,remark\n" + rows)
+    (tmp_path / "c.toml").write_text(
+        '[specimen]\nthickness_um = 500\n[rig]\nkind = "biaxial"\n[measurement]\nnominal_stress_sd_kPa = 2\n'
+    )
+    common = [tmp_path / "c.csv", "--specimen", tmp_path / "c.toml", "--ess", "100", "--json"]
+    chains = ["--out", tmp_path / "chains"]
+    for part in ([], ["--max-deflection-mm", "30"]):
+        code, out, err = run("sample", *common, "--material", "neo_hookean", *chains, *part)
+        assert code == 0, err
+        assert err.count("ignored columns: remark") == 1
+        c1 = json.loads(out)["posterior"]["c1"]
+        assert abs(c1["mean"] - 75) < 5 * c1["sd"]
+    code, out, err = run("loop", *common, "--material", "neo_hookean", *chains, "--report", tmp_path / "page")
+    assert code == 0, err
+    assert Path(json.loads(out)["report"]).is_file()
+    code, out, err = run("compare", *common, "--materials", "neo_hookean", *chains)
+    assert code == 0, err
+    assert len(json.loads(out)["table"]) == 1
+
+
+def test_a_long_measurement_is_thinned_and_it_is_said(run: Run, tmp_path: Path) -> None:
+    stretch = np.concatenate([np.linspace(1.01, 2.0, 1000), np.linspace(1.999, 1.02, 900)])
+    stress = 0.3 * (stretch - stretch**-2.0) + 2e-3 * np.random.default_rng(9).standard_normal(1900)
+    rows = "".join(f"{t},{x},{s}\n" for t, (x, s) in enumerate(zip(stretch, stress, strict=True)))
+    (tmp_path / "c.csv").write_text("time_s,stretch,nominal_stress_MPa\n" + rows)
+    (tmp_path / "c.toml").write_text('[specimen]\nthickness_um = 500\n[rig]\nkind = "uniaxial"\n')
+    common = [tmp_path / "c.csv", "--specimen", tmp_path / "c.toml", "--material", "neo_hookean", "--json"]
+    code, out, err = run("diagnose", *common)
+    assert code == 0, err
+    answer = json.loads(out)
+    assert "of the 1900 readings were diagnosed" in answer["thinning"]
+    assert answer["sentence"].endswith(answer["thinning"])
+    assert "of the 1900 readings are diagnosed" in " ".join(err.split())

@@ -79,7 +79,11 @@ def test_evidence_under_another_mode_comes_from_the_draws_of_one():
 
 @pytest.mark.parametrize("name", ["gent", "mooney_rivlin"])
 def test_prior_widths_agree_with_priors_of_that_width(name):
-    """The reweighted change is that of the two cubatures, with the mass of either prior."""
+    """The reweighted change is that of the two cubatures, with the mass of either prior.
+
+    Twice the width uses the tail of the draws: whether it can be answered is up to them. What is answered is right
+    within eight stated errors, which no seed and no machine should miss: tests/inference/test_evidence_sensitivity.py.
+    """
     p = posterior(name)
     x, _, worth = sampled(name)
     # All draws: twice the width uses the tail, where they are few.
@@ -96,6 +100,11 @@ def test_prior_widths_agree_with_priors_of_that_width(name):
         change = log_evidence(wide) - exact(name) - np.log(masses[0].value / masses[1].value)
         error = np.hypot(*(m.sd / m.value for m in masses))
         found = widths[parameter.name, factor]
+        if factor > 1 and found.reason:
+            assert "sample again" in found.reason
+            assert np.isnan(found.change)
+            continue
         assert found.reason == ""
-        assert abs(found.change - change) < 3.5 * np.hypot(found.sd, error) + 0.01
+        assert found.sd < 0.2
+        assert abs(found.change - change) < 8 * np.hypot(found.sd, error) + 0.01
     assert widths[parameter.name, 1.0].change == 0.0

@@ -5,12 +5,13 @@ import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.left.shape import residual_shape
+from bayesmembrane.diagnosis.result import Thinned, thinning
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.base import Rig
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
-from bayesmembrane.words.diagnosis import SCALES, size_in_words
+from bayesmembrane.words.diagnosis import SCALES, size_in_words, thinning_sentence
 from bayesmembrane.words.shape import shape_in_words
 
 THICKNESS = 1e-3
@@ -70,3 +71,11 @@ def test_every_rig_shows_the_same_quantities() -> None:
         rig = kind(0.01, 0.035) if kind is Annulus else kind()
         assert set(rig.shown(THICKNESS)) == set(SCALES)
     assert Annulus(0.010, 0.035).shown(THICKNESS) == SCALES
+
+
+def test_it_is_said_how_many_readings_were_taken_and_only_where_some_were_left_out() -> None:
+    whole = strip(0.02)
+    part = whole.select(np.arange(0, 60, 3))
+    assert thinning(whole, whole) is None
+    assert (found := thinning(whole, part)) == Thinned(20, 60)
+    assert thinning_sentence(found).startswith("20 of the 60 readings were diagnosed, one in 3: ")

@@ -11,6 +11,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import effective_weight, starts_with
 from bayesmembrane.diagnosis.explanation.case import Case, Judged, judged
 from bayesmembrane.diagnosis.reference.inferred import own_noise
+from bayesmembrane.diagnosis.reference.noise import orthonormal
 from bayesmembrane.diagnosis.thresholds import EXPLANATION, SEARCH
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import materials
@@ -71,7 +72,10 @@ def renewed(case: Case, found: Sequence[Judged]) -> tuple[Case, list[Judged]]:
     Misfit looks like noise that remembers: what the best model leaves is closer to the truth.
     """
     best = found[0].candidate
-    noise = own_noise(case.measurement, np.column_stack([case.smooth, best.slopes]))
+    basis = np.column_stack([case.smooth, best.slopes])
+    if orthonormal(basis).shape[1] >= len(case.measurement):
+        return case, list(found)  # few points: what the best model leaves is nothing at all, and says nothing of noise
+    noise = own_noise(case.measurement, basis)
     search = replace(case.search, noise=noise, weight=effective_weight(noise.white(best.residual)))
     null = search.fit(case.null.hypothesis, [case.null.x]) or case.null
     case = replace(case, search=search, null=null)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from abc import ABC, abstractmethod
 from dataclasses import astuple, dataclass, fields
+from types import FunctionType
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -30,7 +31,7 @@ class Material(ABC):
     units : unit of each field
     scales : per field, 1 if it scales with the modulus (N/m), 0 if it does not: F(s c) = s F(c)
     coordinates : the `Parameter` s in which it is sampled, with their priors
-    ``derivatives``, ``sensitivities`` : closed forms, see there
+    ``derivatives``, ``sensitivities`` : closed forms, see there; models of invariants find theirs in `invariants`
     ``to_coordinates``, ``from_coordinates`` : the bijection between fields and coordinates
     ``shear_modulus`` : G d in N/m
     """
@@ -70,6 +71,15 @@ class Material(ABC):
     @abstractmethod
     def shear_modulus(p: Any) -> Any:
         """G d in N/m: the initial slope is W11(1, 1) = 2 W12(1, 1) = 4 G d."""
+
+    @staticmethod
+    def neo_hookean(gd: float) -> Array | None:
+        """Coordinates (n_coordinates,) within bounds of the film that is neo-Hookean with modulus ``gd`` = G d (N/m).
+
+        Where the energy becomes neo-Hookean only in a limit, those next to it; None if it never does. A fit tries them
+        too, so that an energy never fits worse than the one that it contains.
+        """
+        return None
 
     @staticmethod
     def extensibility(p: Any) -> Any:
@@ -137,5 +147,21 @@ class Material(ABC):
 
     @classmethod
     def source_text(cls) -> str:
-        """The text of the class: compiled kernels are cached under its hash."""
-        return inspect.getsource(cls)
+        """The texts of the class and of all that its closed forms call: compiled kernels are cached under its hash."""
+        found: dict[str, str] = {}
+        for function in (cls.derivatives, cls.sensitivities):
+            _collect(function, found)
+        return "".join([inspect.getsource(cls), *(found[k] for k in sorted(found))])
+
+
+def _collect(function: Any, found: dict[str, str]) -> None:
+    """Add the text of a function, of the functions that it names, and the numbers that it names to ``found``."""
+    if (key := f"{function.__module__}.{function.__qualname__}") in found:
+        return
+    found[key] = inspect.getsource(function)
+    for name in function.__code__.co_names:
+        value = function.__globals__.get(name)
+        if isinstance(value, FunctionType):
+            _collect(value, found)
+        elif isinstance(value, int | float | tuple):
+            found[f"{function.__module__}.{name}"] = f"{name} = {value!r}\n"

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.physics.materials.base import Derivatives, Material
+from bayesmembrane.physics.materials.invariants import first_invariant, of_first, rate_of_first
 
 
 @dataclass(frozen=True)
@@ -35,48 +36,26 @@ class Gent(Material):
 
     @staticmethod
     def derivatives(p: Any, l1: Any, l2: Any) -> Derivatives:
-        # With x = l1^2 - 1 and y = l2^2 - 1, K and its slopes are free of cancellation at small strain.
-        x, y = (l1 - 1.0) * (l1 + 1.0), (l2 - 1.0) * (l2 + 1.0)
-        s1, s2 = l1 * l1, l2 * l2
-        ab = 1.0 / (s1 * s2)
-        a, b = s2 * ab, s1 * ab
-        k = ab * (x * x + y * y + x * y * (1.0 + x + y))
-        k1 = 2.0 * l1 * a * ab * (x * (2.0 + x) * s2 + y)
-        k2 = 2.0 * l2 * b * ab * (y * (2.0 + y) * s1 + x)
-        u = k / p[1]
+        i = first_invariant(l1, l2)
+        u = i[0] / p[1]
         t = 1.0 - u
         r = 1.0 / t
         # ln(1 - u) with the rounding error of 1 - u put back: exact for u -> 0, nan beyond the limit.
         ln = np.log(t) + ((1.0 - t) - u) * r
         # 0 ln carries that nan into the derivatives, which would be finite there.
         d = p[0] * r + 0.0 * ln
-        dd = d * r / p[1]
-        return (
-            0.0 * ln - p[0] * p[1] * ln,
-            d * k1,
-            d * k2,
-            d * (2.0 + 6.0 * a * ab) + dd * k1 * k1,
-            d * 4.0 * ab * ab * l1 * l2 + dd * k1 * k2,
-            d * (2.0 + 6.0 * b * ab) + dd * k2 * k2,
-        )
+        return of_first(i, 0.0 * ln - p[0] * p[1] * ln, d, d * r / p[1])
 
     @staticmethod
     def sensitivities(p: Any, l1: Any, l2: Any) -> tuple[tuple[Any, Any, Any], ...]:
-        x, y = (l1 - 1.0) * (l1 + 1.0), (l2 - 1.0) * (l2 + 1.0)
-        s1, s2 = l1 * l1, l2 * l2
-        ab = 1.0 / (s1 * s2)
-        a, b = s2 * ab, s1 * ab
-        k = ab * (x * x + y * y + x * y * (1.0 + x + y))
-        k1 = 2.0 * l1 * a * ab * (x * (2.0 + x) * s2 + y)
-        k2 = 2.0 * l2 * b * ab * (y * (2.0 + y) * s1 + x)
-        u = k / p[1]
+        i = first_invariant(l1, l2)
+        u = i[0] / p[1]
         t = 1.0 - u
         ln = np.log(t) + ((1.0 - t) - u) / t
         r = 1.0 / t + 0.0 * ln
-        e = -p[0] * u * r * r / p[1]
         return (
-            (0.0 * ln - p[1] * ln, r * k1, r * k2),
-            (-p[0] * (ln + u * r), e * k1, e * k2),
+            rate_of_first(i, 0.0 * ln - p[1] * ln, r),
+            rate_of_first(i, -p[0] * (ln + u * r), -p[0] * u * r * r / p[1]),
         )
 
     @staticmethod
@@ -89,6 +68,10 @@ class Gent(Material):
     def from_coordinates(x: ArrayLike) -> Array:
         ln_gd, ln_jm = np.asarray(x, dtype=float)
         return np.stack([0.5 * np.exp(ln_gd), np.exp(ln_jm)])
+
+    @staticmethod
+    def neo_hookean(gd: float) -> Array:
+        return np.array([np.log(gd), Gent.coordinates[1].bounds[1]])
 
     @staticmethod
     def shear_modulus(p: Any) -> Any:

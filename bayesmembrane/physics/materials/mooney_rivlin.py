@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.physics.materials.base import Derivatives, Material
+from bayesmembrane.physics.materials.invariants import both_invariants, of_both, rate_of_both
 
 
 @dataclass(frozen=True)
@@ -37,39 +38,13 @@ class MooneyRivlin(Material):
 
     @staticmethod
     def derivatives(p: Any, l1: Any, l2: Any) -> Derivatives:
-        # With x = l1^2 - 1 and y = l2^2 - 1, invariants and slopes are free of cancellation at small strain.
-        x, y = (l1 - 1.0) * (l1 + 1.0), (l2 - 1.0) * (l2 + 1.0)
-        s1, s2 = l1 * l1, l2 * l2
-        ab = 1.0 / (s1 * s2)
-        a, b = s2 * ab, s1 * ab
-        # The slopes of I2 are those of I1 times the square of the other stretch.
-        k1 = 2.0 * l1 * a * ab * (x * (2.0 + x) * s2 + y)
-        k2 = 2.0 * l2 * b * ab * (y * (2.0 + y) * s1 + x)
-        i1 = ab * (x * x + y * y + x * y * (1.0 + x + y))
-        u, v = -x * a, -y * b
-        i2 = s1 * s2 * (u * u + v * v + u * v * (1.0 + u + v))
-        return (
-            p[0] * i1 + p[1] * i2,
-            (p[0] + p[1] * s2) * k1,
-            (p[0] + p[1] * s1) * k2,
-            p[0] * (2.0 + 6.0 * a * ab) + p[1] * (2.0 * s2 + 6.0 * a * a),
-            (p[0] * ab * ab + p[1]) * 4.0 * l1 * l2,
-            p[0] * (2.0 + 6.0 * b * ab) + p[1] * (2.0 * s1 + 6.0 * b * b),
-        )
+        i = both_invariants(l1, l2)
+        return of_both(i, p[0] * i[0][0] + p[1] * i[1][0], (p[0], p[1]), (0.0, 0.0, 0.0))
 
     @staticmethod
     def sensitivities(p: Any, l1: Any, l2: Any) -> tuple[tuple[Any, Any, Any], ...]:
-        x, y = (l1 - 1.0) * (l1 + 1.0), (l2 - 1.0) * (l2 + 1.0)
-        s1, s2 = l1 * l1, l2 * l2
-        ab = 1.0 / (s1 * s2)
-        a, b = s2 * ab, s1 * ab
-        k1 = 2.0 * l1 * a * ab * (x * (2.0 + x) * s2 + y)
-        k2 = 2.0 * l2 * b * ab * (y * (2.0 + y) * s1 + x)
-        u, v = -x * a, -y * b
-        return (
-            (ab * (x * x + y * y + x * y * (1.0 + x + y)), k1, k2),
-            (s1 * s2 * (u * u + v * v + u * v * (1.0 + u + v)), s2 * k1, s1 * k2),
-        )
+        i = both_invariants(l1, l2)
+        return rate_of_both(i, i[0][0], 1.0, 0.0), rate_of_both(i, i[1][0], 0.0, 1.0)
 
     @staticmethod
     def to_coordinates(p: ArrayLike) -> Array:
@@ -83,6 +58,10 @@ class MooneyRivlin(Material):
         ln_gd, share = np.asarray(x, dtype=float)
         half = 0.5 * np.exp(ln_gd)
         return np.stack([(1.0 - share) * half, share * half])
+
+    @staticmethod
+    def neo_hookean(gd: float) -> Array:
+        return np.array([np.log(gd), 0.0])
 
     @staticmethod
     def shear_modulus(p: Any) -> Any:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.physics.materials.base import Derivatives, Material
+from bayesmembrane.physics.materials.invariants import first_invariant, rate_of_first
 
 
 @dataclass(frozen=True)
@@ -29,33 +30,13 @@ class NeoHookean(Material):
 
     @staticmethod
     def derivatives(p: Any, l1: Any, l2: Any) -> Derivatives:
-        # With x = l1^2 - 1 and y = l2^2 - 1, K and its slopes are free of cancellation at small strain.
-        x, y = (l1 - 1.0) * (l1 + 1.0), (l2 - 1.0) * (l2 + 1.0)
-        s1, s2 = l1 * l1, l2 * l2
-        ab = 1.0 / (s1 * s2)
-        a, b = s2 * ab, s1 * ab
-        return (
-            p[0] * ab * (x * x + y * y + x * y * (1.0 + x + y)),
-            p[0] * 2.0 * l1 * a * ab * (x * (2.0 + x) * s2 + y),
-            p[0] * 2.0 * l2 * b * ab * (y * (2.0 + y) * s1 + x),
-            p[0] * (2.0 + 6.0 * a * ab),
-            p[0] * 4.0 * ab * ab * l1 * l2,
-            p[0] * (2.0 + 6.0 * b * ab),
-        )
+        i = first_invariant(l1, l2)
+        return p[0] * i[0], p[0] * i[1], p[0] * i[2], p[0] * i[3], p[0] * i[4], p[0] * i[5]
 
     @staticmethod
     def sensitivities(p: Any, l1: Any, l2: Any) -> tuple[tuple[Any, Any, Any], ...]:
-        x, y = (l1 - 1.0) * (l1 + 1.0), (l2 - 1.0) * (l2 + 1.0)
-        s1, s2 = l1 * l1, l2 * l2
-        ab = 1.0 / (s1 * s2)
-        a, b = s2 * ab, s1 * ab
-        return (
-            (
-                ab * (x * x + y * y + x * y * (1.0 + x + y)),
-                2.0 * l1 * a * ab * (x * (2.0 + x) * s2 + y),
-                2.0 * l2 * b * ab * (y * (2.0 + y) * s1 + x),
-            ),
-        )
+        i = first_invariant(l1, l2)
+        return (rate_of_first(i, i[0], 1.0),)
 
     @staticmethod
     def to_coordinates(p: ArrayLike) -> Array:
@@ -67,6 +48,10 @@ class NeoHookean(Material):
     def from_coordinates(x: ArrayLike) -> Array:
         (ln_gd,) = np.asarray(x, dtype=float)
         return np.stack([0.5 * np.exp(ln_gd)])
+
+    @staticmethod
+    def neo_hookean(gd: float) -> Array:
+        return np.array([np.log(gd)])
 
     @staticmethod
     def shear_modulus(p: Any) -> Any:

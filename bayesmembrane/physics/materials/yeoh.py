@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.physics.materials.base import Derivatives, Material
+from bayesmembrane.physics.materials.invariants import first_invariant, of_first, rate_of_first
 
 
 @dataclass(frozen=True)
@@ -33,39 +34,19 @@ class Yeoh(Material):
 
     @staticmethod
     def derivatives(p: Any, l1: Any, l2: Any) -> Derivatives:
-        # With x = l1^2 - 1 and y = l2^2 - 1, K and its slopes are free of cancellation at small strain.
-        x, y = (l1 - 1.0) * (l1 + 1.0), (l2 - 1.0) * (l2 + 1.0)
-        s1, s2 = l1 * l1, l2 * l2
-        ab = 1.0 / (s1 * s2)
-        a, b = s2 * ab, s1 * ab
-        k = ab * (x * x + y * y + x * y * (1.0 + x + y))
-        k1 = 2.0 * l1 * a * ab * (x * (2.0 + x) * s2 + y)
-        k2 = 2.0 * l2 * b * ab * (y * (2.0 + y) * s1 + x)
-        w = k * (p[0] + k * (p[1] + k * p[2]))
-        d = p[0] + k * (2.0 * p[1] + 3.0 * k * p[2])
-        dd = 2.0 * p[1] + 6.0 * k * p[2]
-        return (
-            w,
-            d * k1,
-            d * k2,
-            d * (2.0 + 6.0 * a * ab) + dd * k1 * k1,
-            d * 4.0 * ab * ab * l1 * l2 + dd * k1 * k2,
-            d * (2.0 + 6.0 * b * ab) + dd * k2 * k2,
-        )
+        i = first_invariant(l1, l2)
+        k = i[0]
+        psi = k * (p[0] + k * (p[1] + k * p[2]))
+        return of_first(i, psi, p[0] + k * (2.0 * p[1] + 3.0 * k * p[2]), 2.0 * p[1] + 6.0 * k * p[2])
 
     @staticmethod
     def sensitivities(p: Any, l1: Any, l2: Any) -> tuple[tuple[Any, Any, Any], ...]:
-        x, y = (l1 - 1.0) * (l1 + 1.0), (l2 - 1.0) * (l2 + 1.0)
-        s1, s2 = l1 * l1, l2 * l2
-        ab = 1.0 / (s1 * s2)
-        a, b = s2 * ab, s1 * ab
-        k = ab * (x * x + y * y + x * y * (1.0 + x + y))
-        k1 = 2.0 * l1 * a * ab * (x * (2.0 + x) * s2 + y)
-        k2 = 2.0 * l2 * b * ab * (y * (2.0 + y) * s1 + x)
+        i = first_invariant(l1, l2)
+        k = i[0]
         return (
-            (k, k1, k2),
-            (k * k, 2.0 * k * k1, 2.0 * k * k2),
-            (k * k * k, 3.0 * k * k * k1, 3.0 * k * k * k2),
+            rate_of_first(i, k, 1.0),
+            rate_of_first(i, k * k, 2.0 * k),
+            rate_of_first(i, k * k * k, 3.0 * k * k),
         )
 
     @staticmethod
@@ -79,6 +60,10 @@ class Yeoh(Material):
         ln_gd, b2, b3 = np.asarray(x, dtype=float)
         c1 = 0.5 * np.exp(ln_gd)
         return np.stack([c1, b2 * c1, b3 * c1])
+
+    @staticmethod
+    def neo_hookean(gd: float) -> Array:
+        return np.array([np.log(gd), 0.0, 0.0])
 
     @staticmethod
     def shear_modulus(p: Any) -> Any:

@@ -1,4 +1,10 @@
-"""The law of a homogeneous test, in closed form: F = width P1(l, l2(l)) with l = 1 + delta / L."""
+"""The law of a homogeneous test, in closed form: F = width P1(l, l2(l)) with l = 1 + delta / L.
+
+A thin film bears no compression. Where both stretches are measured, that is a matter of stress, not of stretch: held
+across at l2, a film is taut along down to l = l2^(-1/2), where P1(l, l2) falls to zero, though l is below 1 there.
+Below, it wrinkles. This is tension-field theory (A. C. Pipkin, IMA J. Appl. Math. 36 (1986) 85) of an incompressible
+film whose energy obeys the Baker-Ericksen inequality: P1 > 0 where l > l3 = 1 / (l l2), whatever the energy.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +17,7 @@ from numpy.typing import NDArray
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics.convexity import least_eigenvalue
-from bayesmembrane.physics.mechanics.solution import Curves, Status
+from bayesmembrane.physics.mechanics.solution import Curves, Note, Status
 from bayesmembrane.physics.rigs.base import Strip
 
 
@@ -43,8 +49,7 @@ class StripLaw:
         """
         longer = 1.0 if excess is None else 1.0 + excess
         stretch = (1.0 + deflection / self.rig.length) / longer
-        pulled = np.maximum(stretch, 1e-3 if self.pushes else 1.0)
-        l2, dl2 = self.rig.lateral(pulled, self.across)
+        pulled, l2, dl2 = self.taut(stretch)
         width = self.rig.width
         with np.errstate(all="ignore"):
             _, p1, _, p11, p12, _ = self.material.derivatives(self.parameters.T[:, :, None], pulled, l2)
@@ -53,6 +58,29 @@ class StripLaw:
         force = np.where(pulled == stretch, width * p1, 0.0 * p1)
         slope = np.where(np.isnan(p1), p1, np.where(pulled == stretch, slope, 0.0))
         return force, slope
+
+    def taut(self, stretch: Array) -> tuple[Array, Array, Array]:
+        """(l, l2, dl2/dl) of the taut state at stretches (B, N): l is larger than the stretch where nothing is carried.
+
+        A film held across is slack below l = max(l2, 1)^(-1/2), and where l2 is below l^(-1/2) it wrinkles across: it
+        carries along what a strip with free sides does.
+        """
+        if self.across is None or self.pushes:
+            pulled = np.maximum(stretch, 1e-3 if self.pushes else 1.0)
+            return pulled, *self.rig.lateral(pulled, self.across)
+        pulled = np.maximum(stretch, np.maximum(self.across, 1.0) ** -0.5)
+        free = pulled**-0.5
+        wrinkles = self.across < free
+        return pulled, np.where(wrinkles, free, self.across), np.where(wrinkles, -0.5 * pulled**-1.5, 0.0)
+
+    def note(self, stretch: Array) -> NDArray[np.int8]:
+        """`Note` of states (B, N) whose stretch across was measured: slack, or wrinkled one way or the other."""
+        if self.across is None or self.pushes:
+            return np.zeros(stretch.shape, np.int8)
+        pulled, l2, _ = self.taut(stretch)
+        slack = (stretch <= 1.0) & (self.across <= 1.0) & (pulled > stretch)
+        wrinkled = ~slack & ((pulled > stretch) | (l2 > self.across))
+        return (Note.SLACK * slack + Note.WRINKLED * wrinkled).astype(np.int8)
 
     def varied(self, change: Array) -> StripLaw:
         """The law of films whose parameters differ by ``change`` (B, n)."""
@@ -69,22 +97,25 @@ def strip_curves(law: StripLaw, deflection: Array, sensitivities: bool = False) 
     d = np.broadcast_to(deflection, (len(law.parameters), deflection.size))
     force, slope = law(d)
     stretch = np.maximum(1.0 + d / law.rig.length, 1e-3)
-    l2, _ = law.rig.lateral(stretch, law.across)
+    if law.across is None:
+        state, (l2, _) = stretch, law.rig.lateral(stretch)
+    else:
+        state, l2, _ = law.taut(stretch)
     p = law.parameters.T[:, :, None]
     with np.errstate(all="ignore"):
-        w, _, _, a, b, c = law.material.derivatives(p, stretch, l2)
-        rates = np.stack([s[1] + 0.0 * stretch for s in law.material.sensitivities(p, stretch, l2)], axis=2)
+        w, _, _, a, b, c = law.material.derivatives(p, state, l2)
+        rates = np.stack([s[1] + 0.0 * state for s in law.material.sensitivities(p, state, l2)], axis=2)
         gd = np.abs(np.asarray(law.material.shear_modulus(law.parameters.T)))[:, None]
     zero = np.zeros(d.shape)
     return Curves(
         deflection=d,
         force=force,
         status=np.where(np.isfinite(force), Status.OK, Status.LOCKED).astype(np.int8),
-        note=np.zeros(d.shape, np.int8),
+        note=law.note(stretch),
         slope=slope,
         sensitivity=np.where((force == 0)[:, :, None], 0.0, law.rig.width * rates) if sensitivities else None,
         variation=zero,
-        max_stretch=np.maximum(stretch, l2),
+        max_stretch=np.maximum(state, l2),
         ellipticity=np.asarray(np.minimum(a, c) / gd),
         convexity=np.asarray(least_eigenvalue(a, b, c) / gd),
         energy=w * law.rig.width * law.rig.length + zero,

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.units import RATIO, STRESS
+from bayesmembrane.ground.units import FORCE, RATIO, STRESS
 
 
 @dataclass(frozen=True)
@@ -19,12 +19,14 @@ class Rig(ABC):
 
     name, title : how a specimen file calls it (``rig.kind``) and how reports print it
     columns : what its curve holds, column name without unit -> quantity (see `units`)
+    noise : by what names a standard deviation may be stated, likewise; one for all points in the specimen file, too
     ``check`` : what its lengths must satisfy among themselves
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
     columns: ClassVar[Mapping[str, str]]
+    noise: ClassVar[Mapping[str, str]] = {"force_sd": FORCE}
 
     def __post_init__(self) -> None:
         """Raise `DataError` unless every length is finite and positive, and `check` agrees."""
@@ -44,6 +46,14 @@ class Rig(ABC):
     def from_columns(self, found: Mapping[str, Array], thickness: float) -> dict[str, Array]:
         """``deflection`` (m), ``force`` (N), their ``force_sd`` and others, from the columns of a curve in SI."""
         return dict(found)
+
+    def remarks(self, found: Mapping[str, Array]) -> tuple[str, ...]:
+        """What must be said of readings, as `from_columns` gives them, that a film on this rig cannot bear."""
+        return ()
+
+    def newton(self, quantity: str, thickness: float) -> float:
+        """N of one SI unit of a quantity in which this rig's noise is stated."""
+        return 1.0
 
     def to_columns(self, arrays: Mapping[str, Array], thickness: float) -> dict[str, Array]:
         """The inverse of `from_columns`: header names with units -> values."""
@@ -85,6 +95,7 @@ class Strip(Rig, ABC):
     length: float
     width: float
     columns: ClassVar[Mapping[str, str]] = {"stretch": RATIO, "nominal_stress": STRESS}
+    noise: ClassVar[Mapping[str, str]] = {"force_sd": FORCE, "nominal_stress_sd": STRESS}
 
     def check(self) -> None:
         """Any length goes with any width."""
@@ -97,10 +108,23 @@ class Strip(Rig, ABC):
     def lateral(stretch: Array, across: Array | None = None) -> tuple[Array, Array]:
         """(l2, dl2/dl) at stretches l (B, N); ``across`` (N,) is l2 where it was measured."""
 
+    def newton(self, quantity: str, thickness: float) -> float:
+        return self.width * thickness if quantity == STRESS else 1.0
+
     def from_columns(self, found: Mapping[str, Array], thickness: float) -> dict[str, Array]:
-        rest = {k: v for k, v in found.items() if k not in ("stretch", "nominal_stress")}
+        rest = {k: v for k, v in found.items() if k not in self.columns and k not in self.noise}
         deflection = self.length * (found["stretch"] - 1.0)
-        return {**rest, "deflection": deflection, "force": found["nominal_stress"] * self.width * thickness}
+        out = {**rest, "deflection": deflection, "force": found["nominal_stress"] * self.width * thickness}
+        return out | self.stated(found, thickness)
+
+    def stated(self, found: Mapping[str, Array], thickness: float) -> dict[str, Array]:
+        """``force_sd`` (N,) N, if a column states it in whatever quantity; raises `DataError` if two do."""
+        names = [k for k in self.noise if k in found]
+        if len(names) > 1:
+            raise DataError(f"the columns {' and '.join(names)} both give the noise", remedy="remove one of them")
+        if not names:
+            return {}
+        return {"force_sd": found[names[0]] * self.newton(self.noise[names[0]], thickness)}
 
     def to_columns(self, arrays: Mapping[str, Array], thickness: float) -> dict[str, Array]:
         out = {"time_s": arrays["time"]} if "time" in arrays else {}

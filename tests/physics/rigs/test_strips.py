@@ -11,6 +11,7 @@ from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.mechanics.solution import Note
 from bayesmembrane.physics.mechanics.strip_law import StripLaw
 from bayesmembrane.physics.rigs.base import Strip
 from bayesmembrane.physics.rigs.biaxial import Biaxial
@@ -169,3 +170,240 @@ def test_beyond_all_numbers_there_is_no_force_and_no_warning(kind: str) -> None:
     assert np.isfinite(force).tolist() == [[True, True, False]]
     assert np.isfinite(slope).tolist() == [[True, True, False]]
     assert np.isnan(force[0, 2])
+
+
+# ---- films held across -----------------------------------------------------------------------------------------------
+
+
+def biaxial(l1: np.ndarray, l2: np.ndarray, p1: np.ndarray, p2: np.ndarray) -> Measurement:
+    """Both stretches, and both nominal stresses in Pa of a film 1 mm thick."""
+    rig = Biaxial()
+    found = rig.from_columns(dict(zip(rig.columns, (l1, l2, p1, p2), strict=True)), 1e-3)
+    return Measurement(found["deflection"], found["force"], rig, Specimen("rubber", 1e-3), across=found["across"])
+
+
+def stresses(m: Measurement, material: str) -> np.ndarray:
+    """(2, n) nominal stress in Pa along both directions."""
+    force = Forward(hypothesis(material), m, m.deflection).film_force(np.array([FILMS[material]]))[0]
+    return force.reshape(2, -1) / (m.rig.lengths["width"] * 1e-3)
+
+
+@pytest.mark.parametrize("material", FILMS)
+def test_a_film_held_across_is_taut_below_rest(material: str) -> None:
+    """Down to l2 = l1^-1/2 both stresses are the slopes of the energy, though l2 is below 1."""
+    l1 = np.array([1.3, 1.3, 2.0, 2.0, 3.0])
+    l2 = np.array([0.99, 0.89, 0.95, 0.72, 0.6])
+    film = materials()[material](*FILMS[material])
+    tension = np.array(film.tension(l1, l2))
+    assert np.all(tension > 0)
+    found = stresses(biaxial(l1, l2, 1e6 + 0 * l1, 1e5 + 0 * l1), material)
+    assert found == pytest.approx(tension / 1e-3, rel=1e-12)
+    swapped = stresses(biaxial(l2, l1, 1e5 + 0 * l1, 1e6 + 0 * l1), material)
+    assert swapped[::-1] == pytest.approx(found, rel=1e-12)
+
+
+@pytest.mark.parametrize("material", FILMS)
+def test_a_film_narrower_than_a_free_strip_wrinkles(material: str) -> None:
+    """Across nothing, along the stress of a strip with free sides; below rest both ways nothing at all."""
+    l1 = np.array([1.3, 2.0, 2.0, 0.99, 0.8])
+    l2 = np.array([0.8, 0.6, 0.2, 0.99, 0.95])
+    m = biaxial(l1, l2, 1e6 + 0 * l1, 0 * l1)
+    found = stresses(m, material)
+    film = materials()[material](*FILMS[material])
+    free = np.asarray(film.tension(l1[:3], l1[:3] ** -0.5))[0] / 1e-3
+    assert found[0, :3] == pytest.approx(free, rel=1e-12)
+    assert np.all(found[0, 3:] == 0)
+    assert np.all(found[1] == 0)
+    curves = Forward(hypothesis(material), m, m.deflection).curves(np.array([FILMS[material]]), m.deflection, True)
+    assert curves.note[0].tolist() == 2 * [*(3 * [Note.WRINKLED]), Note.SLACK, Note.SLACK]
+    assert np.all(curves.sensitivity[0, 5:] == 0)
+    assert np.all(curves.ok)
+
+
+@pytest.mark.parametrize("material", FILMS)
+def test_stress_is_continuous_and_its_slope_right_where_a_film_becomes_taut(material: str) -> None:
+    stretch = np.linspace(0.5, 1.5, 401)
+    for across in (0.7, 1.0, 1.5):
+        law = StripLaw(materials()[material], np.array([FILMS[material]]), Biaxial(), across=np.full(401, across))
+        force, slope = law(law.rig.length * (stretch - 1)[None])
+        assert np.all(force >= 0)
+        assert np.max(np.abs(np.diff(force))) < 0.05 * np.max(force)
+        numeric = np.gradient(force[0], law.rig.length * stretch)
+        smooth = np.abs(stretch - max(across, 1.0) ** -0.5) > 0.01
+        smooth &= np.abs(stretch - across**-2.0) > 0.01
+        assert slope[0][smooth] == pytest.approx(numeric[smooth], rel=2e-2, abs=2e-3 * np.max(slope))
+
+
+def test_a_block_pushes_back_in_a_biaxial_test_too_and_noise_about_zero_is_no_push() -> None:
+    l1, l2 = np.array([2.0, 1.5]), np.array([0.6, 0.7])
+    film = materials()["neo_hookean"](*FILMS["neo_hookean"])
+    p1, p2 = np.asarray(film.tension(l1, l2)) / 1e-3
+    assert np.all(p2 < 0)
+    assert stresses(biaxial(l1, l2, p1, p2), "neo_hookean") == pytest.approx(np.array([p1, p2]), rel=1e-12)
+    assert np.all(stresses(biaxial(l1, l2, p1, -1e-3 * p1), "neo_hookean")[1] == 0)
+
+
+@needs_data
+def test_every_taut_reading_of_kawabata_is_computed() -> None:
+    """All his readings lie on the taut side, up to the rounding of the stretches; Ogden fits them to 10 kPa."""
+    l1, l2, p1, p2 = np.genfromtxt(DATA / "Kawabata_1981_biaxial_full.csv", delimiter=",", skip_header=1).T
+    m = biaxial(l1, l2, 1e6 * p1, 1e6 * p2)
+    for material in FILMS:
+        found = stresses(m, material)
+        assert np.all(found[0] > 0)
+        pulled = p2 > 0
+        assert np.all(found[1][pulled] > 0)
+        assert np.count_nonzero(pulled & (l2 < 1)) == 22
+        film = materials()[material](*FILMS[material])
+        direct = np.asarray(film.tension(l1, l2)) / 1e-3
+        taut = l2 > l1**-0.5
+        assert found[:, taut] == pytest.approx(direct[:, taut], rel=1e-12)
+    ogden = fit(m, hypothesis("ogden", convexity="none"))
+    assert ogden.rmse_N / (m.rig.lengths["width"] * 1e-3) < 1e4
+
+
+# ---- noise and signs in files ----------------------------------------------------------------------------------------
+
+
+class Files:
+    """A curve and a specimen file of a strip 5 mm wide and 0.2 mm thick: 1 MPa is 1 N."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def read(self, curve: str, kind: str = "uniaxial", noise: str = "") -> Measurement:
+        (self.folder / "c.csv").write_text(curve)
+        rig = f'[specimen]\nthickness_um = 200\n[rig]\nkind = "{kind}"\nwidth_mm = 5\n'
+        (self.folder / "c.toml").write_text(rig + (f"[measurement]\n{noise}\n" if noise else ""))
+        return read_measurement(self.folder / "c.csv", self.folder / "c.toml")
+
+    def fault(self, *arguments: str) -> str:
+        with pytest.raises(DataError) as caught:
+            self.read(*arguments)
+        return str(caught.value).replace(f"{self.folder}/", "")
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Files:
+    return Files(tmp_path)
+
+
+PULLED = "stretch,nominal_stress_MPa\n1.1,0.2\n1.2,0.3\n1.4,0.5\n"
+BOTH = "stretch_1,stretch_2,nominal_stress_1_MPa,nominal_stress_2_MPa"
+
+
+def with_column(name: str, values: tuple[float, ...] = (1, 2, 3)) -> str:
+    head, *rows = PULLED.splitlines()
+    return "\n".join([f"{head},{name}", *(f"{r},{v}" for r, v in zip(rows, values, strict=True))]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "scale"),
+    [("nominal_stress_sd_MPa", 1.0), ("nominal_stress_sd_kPa", 1e-3), ("nominal_stress_sd_psi", 6894.757e-6)],
+)
+@pytest.mark.parametrize("kind", STRIPS)
+def test_noise_may_be_stated_in_stress(files: Files, kind: str, name: str, scale: float) -> None:
+    column = files.read(with_column(name), kind)
+    assert column.force_sd == pytest.approx(scale * np.array([1, 2, 3]), rel=1e-6)
+    assert column.provenance.notes == ()
+    single = files.read(PULLED, kind, f"{name} = 4")
+    assert single.force_sd == pytest.approx(4 * scale * np.ones(3), rel=1e-6)
+    newton = files.read(with_column("force_sd_mN"), kind)
+    assert newton.force_sd == pytest.approx([1e-3, 2e-3, 3e-3], rel=1e-9)
+
+
+def test_noise_of_a_biaxial_test_is_stated_for_both_directions_or_for_each(files: Files) -> None:
+    rows = ("1.1,1,0.2,0.1", "1.3,1.1,0.3,0.2")
+    each = f"{BOTH},nominal_stress_1_sd_MPa,nominal_stress_2_sd_kPa\n{rows[0]},0.01,20\n{rows[1]},0.03,40\n"
+    m = files.read(each, "biaxial")
+    assert m.force_sd == pytest.approx([0.01, 0.03, 0.02, 0.04])
+    write_measurement(m, files.folder / "d.csv", files.folder / "d.toml")
+    assert read_measurement(files.folder / "d.csv", files.folder / "d.toml").force_sd == pytest.approx(m.force_sd)
+    one = files.read(f"{BOTH},nominal_stress_sd_MPa\n{rows[0]},0.01\n{rows[1]},0.03\n", "biaxial")
+    assert one.force_sd == pytest.approx([0.01, 0.03, 0.01, 0.03])
+    single = files.read(f"{BOTH}\n{rows[0]}\n{rows[1]}\n", "biaxial", "nominal_stress_sd_kPa = 5")
+    assert single.force_sd == pytest.approx(4 * [0.005])
+    half = f"{BOTH},nominal_stress_2_sd_kPa\n{rows[0]},20\n{rows[1]},40\n"
+    assert "nominal_stress_2_sd states the noise of one direction alone" in files.fault(half, "biaxial")
+    three = each.replace("sd_kPa\n", "sd_kPa,force_sd_N\n").replace(",20\n", ",20,1\n").replace(",40\n", ",40,1\n")
+    assert "both give the noise" in files.fault(three, "biaxial")
+
+
+@pytest.mark.parametrize(
+    ("curve", "noise", "said"),
+    [
+        (with_column("nominal_stress_sd_N"), "", '"N" is a unit of force, not of stress'),
+        (with_column("nominal_stress_sd"), "", 'the column "nominal_stress_sd" names no unit'),
+        (with_column("nominal_stress_sd_MPa", (1, 0, 1)), "", "line 3: the standard deviation of the force must be"),
+        (with_column("nominal_stress_sd_MPa"), "nominal_stress_sd_MPa = 1", "both give the noise"),
+        (with_column("nominal_stress_sd_MPa,force_sd_N").replace(",1\n", ",1,1\n").replace(",2\n", ",2,2\n")
+         .replace(",3\n", ",3,3\n"), "", "both give the noise"),
+        (PULLED, "nominal_stress_sd_MPa = 1\nforce_sd_N = 1", "both give the noise"),
+        (PULLED, "nominal_stress_sd_MPa = 0", "must be positive"),
+        (PULLED, "nominal_stress_sd_N = 1", '"N" is a unit of force, not of stress'),
+    ],
+)  # fmt: skip
+def test_a_fault_of_the_stated_noise_is_one_sentence(files: Files, curve: str, noise: str, said: str) -> None:
+    assert said in files.fault(curve, "uniaxial", noise)
+
+
+def test_readings_of_a_wrinkled_film_are_noted(files: Files) -> None:
+    """Those below l2 = l1^-1/2, and no others: neither taut ones below 1 nor what rounding puts on the border."""
+    rows = "1.5,0.9,0.2,0.1\n1.5,0.816,0.2,0\n1.5,0.7,0.2,0\n0.99,0.98,0,0\n"
+    m = files.read(f"{BOTH}\n{rows}", "biaxial")
+    assert m.provenance.notes == ("3 of 8 readings lie where a film is slack or wrinkled, and carries nothing",)
+    assert files.read(f"{BOTH}\n1.5,0.9,0.2,0.1\n1.2,1.2,0.2,0.1\n", "biaxial").provenance.notes == ()
+
+
+def test_a_column_that_nobody_reads_is_noted(files: Files) -> None:
+    m = files.read(with_column("nominal_stress_std_MPa"))
+    assert m.force_sd is None
+    assert m.provenance.notes == ("ignored columns: nominal_stress_std_MPa",)
+
+
+def compressed(stretch: np.ndarray, sign: float = 1.0) -> str:
+    stress = sign * 0.4 * (stretch - stretch**-2.0)
+    rows = "".join(f"{x:.6g},{s:.6g}\n" for x, s in zip(stretch, stress, strict=True))
+    return "stretch,nominal_stress_MPa\n" + rows
+
+
+def test_compression_alone_is_refused_and_no_sign_is_to_be_changed(files: Files) -> None:
+    said = files.fault(compressed(np.linspace(0.5, 0.98, 9)))
+    assert "a test in compression alone cannot be calibrated" in said
+    assert "change the sign" not in said
+    assert "keep the signs as they are" in said
+
+
+@pytest.mark.parametrize(
+    ("kind", "low", "high"), [("uniaxial", 0.5, 1.2), ("uniaxial", 0.7, 2.0), ("planar", 0.6, 1.1)]
+)
+def test_a_block_that_was_pushed_and_pulled_is_fitted_as_it_is(
+    files: Files, kind: str, low: float, high: float
+) -> None:
+    """Though most readings push: the modulus comes from both sides."""
+    m = files.read(compressed(np.linspace(low, high, 21)), kind)
+    found = fit(m, hypothesis("neo_hookean"))
+    if kind == "uniaxial":
+        assert found.parameters["neo_hookean.c1"].value == pytest.approx(0.2e6 * 200e-6, rel=1e-5)
+        assert found.rmse_N < 1e-5 * np.max(m.force)
+    assert np.all(Forward(found.hypothesis, m, m.deflection)(found.coordinates).force[0][:5] < 0)
+
+
+def test_signs_that_contradict_each_other_are_refused(files: Files) -> None:
+    for stretch in (np.linspace(1.05, 2, 9), np.linspace(0.5, 0.95, 9), np.linspace(0.5, 1.3, 9)):
+        said = files.fault(compressed(stretch, -1.0))
+        assert "the stress is negative above a stretch of 1 or positive below it" in said
+    rows = "1.2,1.1,-0.2,-0.1\n1.3,1.1,-0.3,-0.2\n"
+    assert "the stress is negative above a stretch of 1" in files.fault(f"{BOTH}\n{rows}", "biaxial")
+
+
+@needs_data
+def test_a_published_test_in_both_directions_is_read(files: Files) -> None:
+    stress, stretch = np.loadtxt(DATA / "Meunier_2008_UT.txt").T
+    rows = "".join(f"{x},{s}\n" for x, s in zip(stretch, stress, strict=True))
+    m = files.read("stretch,nominal_stress_MPa\n" + rows)
+    found = fit(m, hypothesis("yeoh", convexity="none"))
+    assert found.rmse_N < 0.1 * np.max(m.force)
+    part = m.select(m.deflection < 0)
+    force = Forward(found.hypothesis, part, part.deflection)(found.coordinates).force[0]
+    assert np.corrcoef(force, part.force)[0, 1] > 0.99
