@@ -30,7 +30,7 @@ from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement, read_measurement
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.data.shipped import shipped
-from bayesmembrane.diagnosis.loop import Loop, loop
+from bayesmembrane.diagnosis.loop import Loop, LoopSettings, loop
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.cache import CachedSolver, Tally
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -38,6 +38,7 @@ from bayesmembrane.reconstruction.reconstruct import reconstruct
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.report.page import write_report
 from bayesmembrane.valleys.follow import Valleys, valleys_of
+from bayesmembrane.words.loop import sentence
 
 RANGES = ("OP1", "OP2")
 # The slowest first, two materials at a time: the others fill the gaps, and no solver is compiled twice.
@@ -123,7 +124,7 @@ def demo(out: Path, chains: Path, seed: int = 0, ess: float = 1000.0) -> dict[st
     page = write_report([*shown, read_published_table(), *loops], out, TITLE)
     return {
         "report": str(page),
-        "verdicts": [{"verdict": c.rounds[0].diagnosis.verdict, "sentence": c.sentence} for c in loops],
+        "verdicts": [{"verdict": c.rounds[0].diagnosis.verdict, "sentence": sentence(c)} for c in loops],
         "runs": [str(d.run) for d in ordered],
         "suspect_rows": found.to_json_dict()["suspect_rows"],
         "seconds": time.perf_counter() - began,
@@ -174,7 +175,7 @@ def _in_worker(name: str, range_name: str, chains: Path, seed: int, ess: float, 
 def _loop_in_worker(name: str, stem: str, chains: Path, seed: int, ess: float, queue: Any) -> Loop:
     queue.put((f"loop, {stem}", None))
     measurement = read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
-    found = loop(measurement, hypothesis(name), seed=seed, out=chains, ess=ess, adapt_noise=True)
+    found = loop(measurement, hypothesis(name), LoopSettings(seed, chains, ess, adapt_noise=True))
     queue.put((f"loop, {stem}", FINISHED))
     return found
 

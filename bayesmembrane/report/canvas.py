@@ -75,7 +75,7 @@ def encoded(figure: Figure, kind: str) -> Picture:
     out = io.BytesIO()
     metadata = {"Date": None} if kind == "svg" else {"Software": None}
     with style():
-        extra = {"pil_kwargs": {"optimize": True}} if kind == "png" else {}
+        extra: dict[str, Any] = {"pil_kwargs": {"optimize": True}} if kind == "png" else {}
         figure.savefig(out, format=kind, dpi=DPI, metadata=metadata, **extra)
     data = out.getvalue()
     return Picture(_PATH.sub(_rounded, data) if kind == "svg" else data, kind)
