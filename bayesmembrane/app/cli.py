@@ -299,7 +299,8 @@ def valleys(
 
     With --effects also the valley without them, and how far the two lie apart.
     """
-    from bayesmembrane.report.sections.valleys.section import valley_table, write_valleys
+    from bayesmembrane.report.sections.valleys import write_valleys
+    from bayesmembrane.report.sections.valleys.tables import valley_table
     from bayesmembrane.valleys.beside import Beside, valleys_beside
     from bayesmembrane.valleys.follow import valleys as run
 
@@ -360,7 +361,7 @@ def compare(
 ) -> None:
     """Which materials the data support, by two estimators of the evidence, with prediction beside it."""
     from bayesmembrane.comparison.compare import claimed, compare_ranges, ranges_of
-    from bayesmembrane.report.sections.comparison.section import evidence_table
+    from bayesmembrane.report.sections.evidence.tables import evidence_table
     from bayesmembrane.words.sampling import with_notes
 
     claims = claimed(materials, effects, noise, convexity)
@@ -454,7 +455,7 @@ def loop(
         log.print(f"Interrupted; the runs are stored in {out_folder}. The same command resumes: {_command()}")
         raise typer.Exit(130) from None
     runs = list({str(s.run.path): s.run for r in found.rounds for s in (r.before, r.after)}.values())
-    page = write_report([r.path for r in runs if r.path is not None], report_folder, loops=[found])
+    page = write_report([*runs, found], report_folder)
     document: dict[str, Any] = {**words(found), "report": str(page)}
 
     def show() -> None:
@@ -507,7 +508,7 @@ def report(
 
     found = [path for folder in folders for path in run_folders(folder)]
     runs = [load_run(path) for path in found]
-    page = write_report(runs, out_folder, title=title)
+    page = write_report(runs, out_folder, title)
     document = {"report": str(page), "runs": [str(path) for path in found]}
     answer(document, as_json, lambda: out.print(f"The report lies in {page}"))
 

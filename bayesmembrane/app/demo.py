@@ -119,18 +119,9 @@ def demo(out: Path, chains: Path, seed: int = 0, ess: float = 1000.0) -> dict[st
     with lines() as tell:
         comparison = compare(chains, seed, ess, tell)
     ordered = [done[name, range_name] for name in materials() for range_name in RANGES if (name, range_name) in done]
-    page = write_report(
-        [d.run for d in ordered],
-        out,
-        reconstruction=found,
-        fits=[c for d in ordered for c in d.compared],
-        title=TITLE,
-        cache=_sum([d.tally for d in ordered]),
-        valleys=valleys,
-        comparison=comparison,
-        paper=paper_losses(),
-        loops=loops,
-    )
+    compared = [c for d in ordered for c in d.compared]
+    shown = [*(d.run for d in ordered), found, *compared, _sum([d.tally for d in ordered]), *valleys, comparison]
+    page = write_report([*shown, read_published_table(), *loops], out, TITLE)
     return {
         "report": str(page),
         "verdicts": [{"verdict": c.rounds[0].diagnosis.verdict, "sentence": sentence(c)} for c in loops],
@@ -160,15 +151,6 @@ def shipped_ranges() -> dict[str, Range]:
         "OP1": Range(short, both.select(used | (both.deflection > end * (1 + 1e-9)))),
         "OP2": Range(long),
         "OP1 and OP2": Range(both),
-    }
-
-
-def paper_losses() -> dict[str, dict[str, float]]:
-    """Losses of the paper's optima over the range that they were fitted to, N, by range and material."""
-    table = read_published_table()
-    return {
-        name: {row.material: float(row.loss[i]) for row in table.rows if row.column == name}
-        for i, name in enumerate(table.ranges)
     }
 
 
