@@ -24,10 +24,10 @@ from bayesmembrane.comparison.compare import Range, compare_ranges
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.published import read_published_table
-from bayesmembrane.diagnosis.diagnose import Diagnosis
 from bayesmembrane.diagnosis.diagnose import diagnose as run_diagnose
-from bayesmembrane.diagnosis.loop import Loop
+from bayesmembrane.diagnosis.loop import Loop, LoopSettings
 from bayesmembrane.diagnosis.loop import loop as run_loop
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.forward import Solve
@@ -178,11 +178,10 @@ def loop(
     runs: Path | None = None,
 ) -> Answer[Loop]:
     """Diagnose, add what is missing, calibrate again; its runs lie in ``runs``, or where the answers do."""
-    options: dict[str, Any] = {"seed": work.seed, "ess": work.ess, "adapt_noise": adapt_noise}
-    found = run_loop(
-        measurement, claim, out=runs or work.out, tell=lambda text: work.tell(claim.label(), text), **options
-    )
-    what = asked("loop", run_loop, [measurement], [claim], options)
+    how = LoopSettings(work.seed, runs or work.out, work.ess, adapt_noise)
+    found = run_loop(measurement, claim, how, tell=lambda text: work.tell(claim.label(), text))
+    settings = {"seed": work.seed, "ess": work.ess, "adapt_noise": adapt_noise}
+    what = asked("loop", run_loop, [measurement], [claim], settings)
     return kept("loop", found, document(found), what, work.out)
 
 

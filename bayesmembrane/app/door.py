@@ -16,8 +16,8 @@ from bayesmembrane.calibration.run import Run
 from bayesmembrane.comparison.compare import Range
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement, read_measurement
-from bayesmembrane.diagnosis.diagnose import Diagnosis
 from bayesmembrane.diagnosis.loop import Loop
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.physics import hypothesis as hypotheses
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.reconstruction.result import Reconstruction

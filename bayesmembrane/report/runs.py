@@ -201,7 +201,7 @@ def in_order(shown: Sequence[Shown]) -> list[Shown]:
 
 # ---- from the run ----------------------------------------------------------------------------------------------------
 
-MOST_TRACED, MOST_REPLICAS = 600, 1000  # draws of an ensemble in a trace, new readings of each point
+MOST_TRACED, MOST_REPLICAS = 300, 1000  # draws of an ensemble in a trace, new readings of each point
 _SHOWN_APART = ("hypothesis", "sampling", "data", "code", "versions", "seed", "fingerprint")
 
 

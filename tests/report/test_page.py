@@ -247,7 +247,9 @@ def test_the_general_table_comes_first_and_has_a_row_for_every_answer(whole: Pat
     rows = json.loads((whole.parent / TWIN).read_text(encoding="utf-8"))["tables"]["glance"]
     assert sorted(r["what"] for r in rows) == ["calibration", "calibration", "reconstruction"]
     assert next(r["found"] for r in rows if "neo-Hookean" in r["about"]).endswith("misses something; step limit")
-    assert page.text.index("Contents") < page.text.index("one row for each answer") < page.text.index("Curves and res")
+    assert (
+        page.text.index("Contents") < page.text.index("one row for each answer") < page.text.index("Force (N) against")
+    )
 
 
 def test_a_reconstruction_stands_alone(tmp_path: Path) -> None:

@@ -30,10 +30,12 @@ def verb(curve: Curve, material: Material, beside: Beside, used: Range, stored: 
 
 def say_thinning(measurement: Measurement) -> None:
     """On stderr, before the work: that not all readings will be used."""
-    from bayesmembrane.data.thinning import thinned, thinning_sentence
+    from bayesmembrane.data.thinning import thinned
+    from bayesmembrane.diagnosis.result import thinning
+    from bayesmembrane.words.diagnosis import thinning_sentence
 
-    if sentence := thinning_sentence(measurement, thinned(measurement)):
-        note(sentence.replace("were diagnosed", "are diagnosed"))
+    if (found := thinning(measurement, thinned(measurement))) is not None:
+        note(thinning_sentence(found).replace("were diagnosed", "are diagnosed"))
 
 
 def show(document: dict[str, Any], measurement: Measurement) -> None:

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from bayesmembrane.diagnosis.saturated import reference_basis
-from bayesmembrane.diagnosis.whitening import decorrelated, own_noise
+from bayesmembrane.diagnosis.reference.inferred import own_noise
+from bayesmembrane.diagnosis.reference.noise import decorrelated
+from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from tests.diagnosis.curves import SD, correlated, measured, triangle
 
 N, SEEDS = 300, 16
@@ -16,7 +17,7 @@ def test_restricted_likelihood_recovers_deviation_and_correlation(rho) -> None:
     found = []
     for _ in range(SEEDS):
         m = measured(SMOOTH + correlated(rng, TIME, rho))
-        found.append(own_noise(m, reference_basis(m)))
+        found.append(own_noise(m, smooth_reference(m)))
     sd, rhos = np.array([f.sd for f in found]), np.array([f.rho for f in found])
     errors = np.array([f.rho_sd for f in found])
     # Four standard errors of the mean; at zero the estimate is cut off from below.
@@ -30,7 +31,7 @@ def test_a_curve_that_the_reference_cannot_follow_looks_like_noise_that_remember
     m = measured(SMOOTH + correlated(np.random.default_rng(2), TIME, 0.0))
     poor = own_noise(m, np.ones((N, 1)))
     assert poor.rho > 0.9
-    assert own_noise(m, reference_basis(m)).rho < 0.3
+    assert own_noise(m, smooth_reference(m)).rho < 0.3
 
 
 def test_decorrelated_noise_is_white_also_between_uneven_points() -> None:
@@ -43,7 +44,7 @@ def test_decorrelated_noise_is_white_also_between_uneven_points() -> None:
 
 def test_inferred_noise_whitens_what_it_was_inferred_from() -> None:
     m = measured(SMOOTH + correlated(np.random.default_rng(4), TIME, 0.6))
-    noise = own_noise(m, reference_basis(m))
+    noise = own_noise(m, smooth_reference(m))
     w = noise.white(m.force - SMOOTH)
     assert abs(np.corrcoef(w[1:], w[:-1])[0, 1]) < 3 / np.sqrt(N)
     assert w.std() == pytest.approx(1.0, abs=0.15)
@@ -67,7 +68,7 @@ def test_stated_noise_is_used_as_stated() -> None:
 
 def test_stated_deviations_are_believed_unless_the_readings_contradict() -> None:
     stated = SD * np.linspace(1, 3, N)
-    basis = reference_basis(measured(SMOOTH))
+    basis = smooth_reference(measured(SMOOTH))
     believed = 0
     for seed in range(SEEDS):
         e = np.random.default_rng(seed).standard_normal(N)
@@ -107,7 +108,7 @@ def test_noise_that_forgets_by_time_or_by_reading_is_told_apart_at_two_speeds(cl
     for seed in range(6):
         noise = correlated(np.random.default_rng(seed), time if clock == "time" else TIME, 0.5)
         m = measured(SMOOTH + noise, time=time)
-        found = own_noise(m, reference_basis(m))
+        found = own_noise(m, smooth_reference(m))
         hits += found.clock == clock
         half = m.select(np.arange(N) < N // 2)
         assert found.part(half, np.arange(N) < N // 2).gaps.size == N // 2 - 1

@@ -2,15 +2,22 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from bayesmembrane.diagnosis.saturated import LackOfFit, lack_of_fit, reference_basis
-from bayesmembrane.diagnosis.whitening import orthonormal, own_noise
+from bayesmembrane.diagnosis.detection import lack_of_fit as of
+from bayesmembrane.diagnosis.detection.lack_of_fit import LackOfFit
+from bayesmembrane.diagnosis.reference.inferred import own_noise
+from bayesmembrane.diagnosis.reference.noise import orthonormal, whitened
+from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from tests.diagnosis.curves import SD, correlated, measured, triangle, white_noise, without
 
 N, SEEDS = 240, 150
 D = triangle(N)
 CURVE = measured(np.zeros(N))
 SLOPES = np.vander(D / 0.04, 3)
-BASIS = reference_basis(CURVE)
+BASIS = smooth_reference(CURVE)
+
+
+def lack_of_fit(residual, slopes, basis, noise) -> LackOfFit:
+    return of.lack_of_fit(whitened(residual, slopes, basis, noise))
 
 
 def test_an_adequate_model_has_ratios_around_one_and_uniform_probabilities() -> None:
@@ -77,8 +84,8 @@ def test_what_may_be_left_of_a_misfit_is_judged_as_chance_would_have_it() -> Non
 
 @pytest.mark.parametrize("points", [5, 12, 30, 90, 240])
 def test_the_reference_leaves_points_to_judge_by(points) -> None:
-    loading = reference_basis(measured(np.zeros(points), np.linspace(0.001, 0.04, points)))
+    loading = smooth_reference(measured(np.zeros(points), np.linspace(0.001, 0.04, points)))
     assert orthonormal(loading).shape[1] <= max(points // 3, 1)
-    cyclic = reference_basis(measured(np.zeros(points)))
+    cyclic = smooth_reference(measured(np.zeros(points)))
     assert np.all(np.isfinite(cyclic))
     assert orthonormal(cyclic).shape[1] < points

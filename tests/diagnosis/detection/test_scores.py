@@ -1,16 +1,17 @@
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from bayesmembrane.diagnosis.candidates import Search, available
-from bayesmembrane.diagnosis.saturated import reference_basis
-from bayesmembrane.diagnosis.scores import Signature, angle, score_test, signatures, smallest_sizes
-from bayesmembrane.diagnosis.whitening import own_noise
+from bayesmembrane.diagnosis.candidates.candidate import available
+from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.candidates.signatures import signatures
+from bayesmembrane.diagnosis.detection import scores
+from bayesmembrane.diagnosis.detection.scores import ScoreTest, Signature, angle, smallest_sizes
+from bayesmembrane.diagnosis.reference.inferred import own_noise
+from bayesmembrane.diagnosis.reference.noise import whitened
+from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.neo_hookean import NeoHookean
-from bayesmembrane.physics.mechanics import api
 from tests.diagnosis.curves import RIG, SD, SPECIMEN, measured, triangle, white_noise, without
 from tests.generator.datasets import generate
 
@@ -27,13 +28,16 @@ SHAPES = {
 }
 
 
+def score_test(residual, found, noise, rng) -> ScoreTest:
+    return scores.score_test(whitened(residual, SLOPES, np.empty((N, 0)), noise), found, rng)
+
+
 def made() -> list[Signature]:
     out = []
     for name, (shape, side) in SHAPES.items():
         left = without(shape / SD, SLOPES)
         length = float(np.linalg.norm(left))
-        effect = SimpleNamespace(name=name)
-        out.append(Signature(effect, side, left, length, length / float(np.linalg.norm(shape / SD))))
+        out.append(Signature(name, side, left, length, length / float(np.linalg.norm(shape / SD))))
     return out
 
 
@@ -53,7 +57,7 @@ def test_probabilities_are_uniform_if_nothing_is_missing(dof) -> None:
 def test_a_signature_of_ten_deviations_is_found_under_its_name_and_only_on_its_side(name) -> None:
     rng = np.random.default_rng(10)
     found = made()
-    one = next(f for f in found if f.effect.name == name)
+    one = next(f for f in found if f.effect == name)
     noise = without(SD * rng.standard_normal(N), SLOPES)
     for sign in (1, -1):
         test = score_test(noise + 10 * sign * SD * one.direction, found, white_noise(CURVE), rng)
@@ -68,7 +72,7 @@ def test_a_signature_of_ten_deviations_is_found_under_its_name_and_only_on_its_s
 
 def test_the_smallest_size_that_shows_does_so_nine_times_out_of_ten() -> None:
     rng = np.random.default_rng(11)
-    found = [f for f in made() if f.effect.name == "drift"]
+    found = [f for f in made() if f.effect == "drift"]
     null = score_test(np.zeros(N), found, white_noise(CURVE), rng)
     size = smallest_sizes(found, null.critical)["drift"]
     hits = 0
@@ -92,11 +96,11 @@ def test_signatures_are_free_of_what_the_material_absorbs_and_those_without_a_tr
     m = measured(data.force_N, 1e-3 * data.deflection_mm, data.time_s)
     assert (m.rig, m.specimen) == (RIG, SPECIMEN)
     hypothesis = Hypothesis(NeoHookean)
-    noise = own_noise(m, reference_basis(m))
+    noise = own_noise(m, smooth_reference(m))
     search = Search(m, noise)
-    model = search.fit(hypothesis, search.sane(hypothesis))
-    found = signatures(m, model, available(m, hypothesis), noise, api.solve)
-    names = {f.effect.name for f in found}
+    model = search.fit(hypothesis, search.material_starts(hypothesis))
+    found = signatures(search, model, available(m, hypothesis))
+    names = {f.effect for f in found}
     assert {"prestretch", "force_offset", "zero_offset"} <= names
     assert "mullins" not in names  # a film that is pulled for the first time has not softened yet
     slopes = noise.white(model.slopes)

@@ -1,15 +1,23 @@
 import numpy as np
 import pytest
 
-from bayesmembrane.diagnosis.detection import Detection, Periodicity, periodicity
-from bayesmembrane.diagnosis.saturated import LackOfFit, reference_basis
-from bayesmembrane.diagnosis.scores import ScoreTest
+from bayesmembrane.diagnosis.detection import periodicity as waves_of
+from bayesmembrane.diagnosis.detection.detect import Detection
+from bayesmembrane.diagnosis.detection.lack_of_fit import LackOfFit
+from bayesmembrane.diagnosis.detection.periodicity import Periodicity
+from bayesmembrane.diagnosis.detection.scores import ScoreTest
+from bayesmembrane.diagnosis.reference.noise import whitened
+from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from tests.diagnosis.curves import SD, measured, triangle, white_noise
 
 N = 400
 D = triangle(N)
 CURVE = measured(np.zeros(N))
-BASIS = reference_basis(CURVE)
+BASIS = smooth_reference(CURVE)
+
+
+def periodicity(measurement, residual, basis, noise) -> Periodicity | None:
+    return waves_of.periodicity(measurement, whitened(residual, np.empty((residual.size, 0)), basis, noise))
 
 
 @pytest.mark.parametrize(
@@ -42,7 +50,7 @@ def test_a_slow_wave_is_left_to_the_smooth_reference() -> None:
 
 def test_short_curves_are_not_asked_for_waves() -> None:
     m = measured(np.zeros(40))
-    assert periodicity(m, np.ones(40), reference_basis(m), white_noise(m)) is None
+    assert periodicity(m, np.ones(40), smooth_reference(m), white_noise(m)) is None
 
 
 def test_the_smallest_probability_counts_and_pays_for_the_number_of_tests() -> None:

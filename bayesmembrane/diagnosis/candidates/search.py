@@ -1,19 +1,20 @@
-"""What could explain the curve: a material with some effects, refitted, with its evidence."""
+"""Fits hypotheses to one measurement, with their evidence."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 
 from bayesmembrane.calibration.descent import descend
 from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.diagnosis.whitening import OwnNoise
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.reference.noise import OwnNoise
+from bayesmembrane.diagnosis.thresholds import SEARCH
 from bayesmembrane.ground.parameters import Array, HalfNormal, Parameter
-from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect, EffectParameter
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -21,59 +22,12 @@ from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.request import Request
 from bayesmembrane.physics.mechanics.solution import Curves
 
-ITERATIONS, SANE = 40, 3
-SIZES = (0.1, 0.6)  # of the expected size of an effect: where searches for it start
-BEHIND = 4.0  # times the least sum of squares: a search as far off as that is not waited for
-NEAR_BOUND = 1e-3  # of the expected size, or of the width of the bounds
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """One hypothesis at its most probable parameters, under the measurement's own noise.
-
-    hypothesis : material and effects
-    x : (k,) coordinates
-    residual : (N,) N, measured less fitted
-    slopes : (N, k) dF/dx there
-    log_evidence : Laplace approximation of ln Z, up to a constant that all candidates share
-    at_bound : names of coordinates at a bound
-    """
-
-    hypothesis: Hypothesis
-    x: Array
-    residual: Array
-    slopes: Array
-    log_evidence: float
-    at_bound: tuple[str, ...]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Its effects."""
-        return tuple(e.name for e in self.hypothesis.effects)
-
-    @property
-    def label(self) -> str:
-        return self.hypothesis.label()
-
-    def slopes_of(self, names: Collection[str]) -> Array:
-        """(N, m) the slopes of the coordinates of these effects."""
-        sizes = [len(e.coordinates) for e in self.hypothesis.effects]
-        owner = np.repeat(self.names, sizes) if sizes else np.empty(0, dtype=str)
-        start = self.hypothesis.material_size
-        return self.slopes[:, start : start + owner.size][:, np.isin(owner, list(names))]
-
-    @cached_property
-    def parameters(self) -> dict[str, float]:
-        """Effect parameters by full name, SI."""
-        n = self.hypothesis.material_size
-        names = self.hypothesis.names[n : self.hypothesis.curve_size]
-        return {name: float(v) for name, v in zip(names, self.x[n:], strict=True)}
-
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Fits hypotheses to one measurement under one noise; ``weight`` is the part of the points that count on their own
-    where correlation is left over, n_eff / N = (1 - r1) / (1 + r1).
+    """Fits hypotheses to one measurement under one noise.
+
+    weight : part of the points that count on their own where correlation is left over, `effective_weight`
     """
 
     measurement: Measurement
@@ -82,7 +36,7 @@ class Search:
     solve: Solve = api.solve
     weight: float = 1.0
 
-    def sane(self, hypothesis: Hypothesis) -> list[Array]:
+    def material_starts(self, hypothesis: Hypothesis) -> list[Array]:
         """Starts (k,) from draws of the material's prior brought to their best modulus, without any effect.
 
         The plain model bends the material until it imitates what is missing: searches must not only start there.
@@ -91,7 +45,7 @@ class Search:
         objective = Objective(plain, self.measurement, "euclidean", self.solve)
         pool, _ = objective.pool(np.random.default_rng(self.seed))
         nothing = np.concatenate([np.empty(0), *(e.null for e in hypothesis.effects)])
-        return [np.concatenate([x, nothing]) for x in separated(pool, objective.spread, SANE)]
+        return [np.concatenate([x, nothing]) for x in separated(pool, objective.spread, SEARCH.material_starts)]
 
     def fit(self, hypothesis: Hypothesis, starts: Sequence[Array]) -> Candidate | None:
         """The best of the searches from ``starts`` (k,); None if no film of this hypothesis reaches the data.
@@ -124,7 +78,8 @@ class Search:
                 np.concatenate([root * j, pull], axis=1),
             )
 
-        return descend(residuals, starts, (objective.low, objective.high), ITERATIONS, behind=BEHIND)
+        bounds = (objective.low, objective.high)
+        return descend(residuals, starts, bounds, SEARCH.iterations, behind=SEARCH.given_up)
 
     def _white(self, objective: Objective, x: Array) -> tuple[Array, Array]:
         """Whitened residuals (B, N) and slopes (B, N, k); a start without a curve is nan, and only that one."""
@@ -161,38 +116,16 @@ def starts_with(bases: Sequence[Array], effect: Effect) -> list[Array]:
     small one, and both signs where both are allowed.
     """
     signs = (1.0,) if effect.size.one_sided else (1.0, -1.0)
+    small, middling = SEARCH.small_share, SEARCH.middling_share
     out = []
     for i, base in enumerate(bases):
         for sign in signs:
-            for share in SIZES if i == 0 else SIZES[:1]:
-                for shape in [{}, *effect.starts] if share == SIZES[0] and i == 0 else [{}]:
+            for share in (small, middling) if i == 0 else (small,):
+                for shape in [{}, *effect.starts] if share == small and i == 0 else [{}]:
                     theta = np.array([shape.get(p.name, p.typical) for p in effect.coordinates])
                     theta[0] = (effect.size.null or 0.0) + sign * share * effect.size.scale
                     out.append(np.concatenate([base, effect.within_bounds(theta)]))
     return out
-
-
-def with_effects(hypothesis: Hypothesis, effects: Sequence[Effect]) -> Hypothesis:
-    """The hypothesis with more effects."""
-    return replace(hypothesis, effects=(*hypothesis.effects, *effects))
-
-
-def available(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
-    """Effects of the library that can be seen in this test, can be told from the material, and are not there yet."""
-    found: list[Effect] = [cls() for cls in components("effects").values()]
-    have = {e.name for e in hypothesis.effects}
-    rig, path = measurement.rig.name, measurement.path
-    thin = measurement.specimen.thickness
-    told = [e for e in found if e.name not in have and not e.absorbed]
-    return [e for e in told if not e.unavailable(rig, path) and not e.negligible(thin)]
-
-
-def absorbed(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
-    """Effects that the material absorbs without trace."""
-    have = {e.name for e in hypothesis.effects}
-    found: list[Effect] = [cls() for cls in components("effects").values()]
-    rig, path = measurement.rig.name, measurement.path
-    return [e for e in found if e.name not in have and e.absorbed and not e.unavailable(rig, path)]
 
 
 def prior_moments(hypothesis: Hypothesis) -> tuple[Array, Array]:
@@ -230,9 +163,19 @@ def _at_bound(objective: Objective, x: Array) -> tuple[str, ...]:
         low, high = p.bounds
         # Bounds that are decades apart are near in the logarithm.
         by = np.log if low > 0 else np.asarray
-        tolerance = NEAR_BOUND * float(by(high) - by(low))
+        tolerance = SEARCH.at_bound * float(by(high) - by(low))
         ends = {getattr(p, "null", None), *map(float, p.prior.distribution().support())}
         for bound in (low, high):
             if abs(float(by(x[i]) - by(bound))) <= tolerance and bound not in ends:
                 out.append(p.name)
     return tuple(out)
+
+
+def effective_weight(residual_white: Array) -> float:
+    """n_eff / N = (1 - r1) / (1 + r1) of whitened residuals (N,), at most 1: what correlation is left."""
+    if residual_white.size < 3:
+        return 1.0
+    r = residual_white - residual_white.mean()
+    scale = float(r @ r)
+    r1 = float(r[1:] @ r[:-1]) / scale if scale > 0 else 0.0
+    return float(np.clip((1 - r1) / (1 + r1), SEARCH.least_weight, 1.0))
