@@ -9,6 +9,7 @@ from typing import Any
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.valleys.follow import RISE, between, valleys
@@ -19,8 +20,8 @@ from bayesmembrane.valleys.surface import unaided
 SAME = 1e-4  # of the least loss: a change smaller than this is none
 
 
-@dataclass(frozen=True, eq=False)
-class Beside:
+@dataclass(frozen=True, eq=False, repr=False)
+class Beside(Showable):
     """Valleys ``without`` effects and ``added`` with them; ``pairs`` has the closest approach of both in each range.
 
     The approach is that of the floors seen along the effects: in the material's parameters alone.
