@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, together
-from bayesmembrane.comparison.evidence.target import Estimate
+from bayesmembrane.comparison.evidence.target import EvidenceEstimate
 from bayesmembrane.comparison.leave_out.score import LeaveOneOut
-from bayesmembrane.comparison.prior_widths import Widened
+from bayesmembrane.comparison.prior_widths import Unknown, Widened
 from bayesmembrane.comparison.result import Comparison, Row, ranked
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.sections.comparison.figures import comparison_picture
@@ -25,16 +25,16 @@ from bayesmembrane.report.sections.comparison.section import (
 def row(material: str, z: float, elpd: float, off: float = 0.0) -> Row:
     points = elpd / 10 + 0.02 * np.sin(np.arange(10) + len(material))
     loo = LeaveOneOut(float(points.sum()), 1.0, 0.01, points, np.zeros(10), (3,))
-    pair = {NESTED: Estimate(z + off, 0.1, 1, 1.0), BRIDGE: Estimate(z, 0.02, 1, 1.0)}
+    pair = {NESTED: EvidenceEstimate(z + off, 0.1, 1, 1.0), BRIDGE: EvidenceEstimate(z, 0.02, 1, 1.0)}
     widths = (
-        Widened(f"{material}.ln_gd", 0.5, 0.6, 0.05, 900.0, ""),
-        Widened(f"{material}.ln_gd", 2.0, float("nan"), float("nan"), 3.0, "too few"),
+        Widened(f"{material}.ln_gd", 0.5, 0.6, 0.05, 900.0, 0.1, None),
+        Widened(f"{material}.ln_gd", 2.0, float("nan"), float("nan"), 3.0, 0.1, Unknown.FEW),
     )
     return Row(material, hypothesis(material), together(pair), loo, None, None, None, widths, (), None, 1, 1.0, (), "")
 
 
 def compared(off: float = 0.0) -> dict[str, Comparison]:
-    lost = replace(row("ogden", 0, 0), evidence=None, loo=None, reason="it cannot be fitted")
+    lost = replace(row("ogden", 0, 0), evidence=None, loo=None, failure="it cannot be fitted")
     return {"OP1": ranked([row("neo_hookean", 4, 20), row("gent", 2.9, 19), row("yeoh", 10, 30, off), lost])}
 
 

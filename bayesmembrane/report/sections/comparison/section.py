@@ -12,6 +12,7 @@ from bayesmembrane.physics.convexity import MODES
 from bayesmembrane.report.sentences import listed
 from bayesmembrane.report.style import title
 from bayesmembrane.report.tables import Column, Table, Value
+from bayesmembrane.words.comparison import remark, sentences
 
 Paper = Mapping[str, Mapping[str, float]]
 """By range and material: the loss of the paper's optimum, N."""
@@ -62,7 +63,7 @@ def _evidence(name: str, row: Row) -> tuple[Value, ...]:
         len(loo.refitted) if loo else None,
         row.rest.rmse_N if row.rest else None,
         row.prior_mass.value if row.prior_mass else None,
-        row.reason or (e.reason if e else "") or "-",
+        remark(row) or "-",
     )
 
 
@@ -152,7 +153,7 @@ def comparison_sentences(found: Mapping[str, Comparison], paper: Paper) -> list[
     told = []
     for name, c in found.items():
         start = f"{name}: "
-        told += [start + s for s in (c.reason, c.sentence, c.survival) if s]
+        told += [start + s for s in sentences(c)]
         told += [start + s for s in _differences(c, paper.get(name, {}))]
     return told
 
