@@ -361,8 +361,9 @@ def compare(
 ) -> None:
     """Which materials the data support, by two estimators of the evidence, with prediction beside it."""
     from bayesmembrane.comparison.compare import claimed, compare_ranges, ranges_of
+    from bayesmembrane.comparison.jobs import Judging
     from bayesmembrane.report.sections.evidence.tables import evidence_table
-    from bayesmembrane.words.sampling import with_notes
+    from bayesmembrane.words.comparison import document_of_ranges, remark, sentences
 
     claims = claimed(materials, effects, noise, convexity)
     if ranges_mm and max_deflection_mm is not None:
@@ -371,12 +372,11 @@ def compare(
     ranges = ranges_of(_measurement(curve, specimen), [1e-3 * end for end in ends])
     try:
         with lines() as tell:
-            found = compare_ranges(ranges, claims, seed, out=out_folder, ess=ess, progress=tell)
+            found = compare_ranges(ranges, claims, Judging(seed, ess, out=out_folder), progress=tell)
     except KeyboardInterrupt:
         log.print(f"Interrupted; what is finished is stored in {out_folder}. The same command resumes it: {_command()}")
         raise typer.Exit(130) from None
-    answers = {name: with_notes(c) for name, c in found.items()}
-    document = {**list(answers.values())[-1], "ranges": [{"range": n, **a} for n, a in answers.items()]}
+    document = document_of_ranges(found)
 
     def show() -> None:
         for name, comparison in found.items():
@@ -386,11 +386,10 @@ def compare(
                 rows = [[row[i] for i in columns] for row in shown.cells()]
                 table(f"{name}: {text}", [shown.columns[i].head for i in columns], rows)
             for row in comparison.rows:
-                if row.reason:
-                    out.print(f"{row.label}: {row.reason}")
-            for sentence in (comparison.reason, comparison.sentence, comparison.survival):
-                if sentence:
-                    out.print(sentence)
+                if not row.fitted:
+                    out.print(f"{row.label}: {remark(row)}")
+            for sentence in sentences(comparison):
+                out.print(sentence)
 
     answer(document, as_json, show)
 

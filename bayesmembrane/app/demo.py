@@ -25,12 +25,13 @@ from bayesmembrane.calibration.predictions import Wanted
 from bayesmembrane.calibration.run import load_run, predictions_of, sample
 from bayesmembrane.calibration.sampling.walk import Progress
 from bayesmembrane.comparison.compare import Range, compare_ranges
-from bayesmembrane.comparison.jobs import Tell
+from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement, read_measurement
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.diagnosis.loop import Loop, LoopSettings, loop
+from bayesmembrane.ground.jobs import Tell, silent
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.cache import CachedSolver, Tally
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -131,14 +132,14 @@ def demo(out: Path, chains: Path, seed: int = 0, ess: float = 1000.0) -> dict[st
     }
 
 
-def compare(chains: Path, seed: int = 0, ess: float = 1000.0, progress: Tell | None = None) -> dict[str, Comparison]:
+def compare(chains: Path, seed: int = 0, ess: float = 1000.0, progress: Tell = silent) -> dict[str, Comparison]:
     """The five materials on each range of the paper, from runs of the demo where there are any.
 
     Raises `StorageError` if ``chains`` cannot be written; Ctrl-C stores what is finished.
     """
     claims = [hypothesis(name) for name in materials()]
     ranges = {name: shipped_ranges()[name] for name in RANGES}
-    return compare_ranges(ranges, claims, seed, out=chains, ess=ess, progress=progress)
+    return compare_ranges(ranges, claims, Judging(seed, ess, out=chains), progress=progress)
 
 
 def shipped_ranges() -> dict[str, Range]:
