@@ -299,7 +299,8 @@ def valleys(
 
     With --effects also the valley without them, and how far the two lie apart.
     """
-    from bayesmembrane.report.sections.valleys.section import valley_table, write_valleys
+    from bayesmembrane.report.sections.valleys import write_valleys
+    from bayesmembrane.report.sections.valleys.tables import valley_table
     from bayesmembrane.valleys.beside import Beside, valleys_beside
     from bayesmembrane.valleys.follow import valleys as run
 
@@ -360,8 +361,9 @@ def compare(
 ) -> None:
     """Which materials the data support, by two estimators of the evidence, with prediction beside it."""
     from bayesmembrane.comparison.compare import claimed, compare_ranges, ranges_of
-    from bayesmembrane.report.sections.comparison.section import evidence_table
-    from bayesmembrane.words.sampling import with_notes
+    from bayesmembrane.comparison.jobs import Judging
+    from bayesmembrane.report.sections.evidence.tables import evidence_table
+    from bayesmembrane.words.comparison import document_of_ranges, remark, sentences
 
     claims = claimed(materials, effects, noise, convexity)
     if ranges_mm and max_deflection_mm is not None:
@@ -370,12 +372,11 @@ def compare(
     ranges = ranges_of(_measurement(curve, specimen), [1e-3 * end for end in ends])
     try:
         with lines() as tell:
-            found = compare_ranges(ranges, claims, seed, out=out_folder, ess=ess, progress=tell)
+            found = compare_ranges(ranges, claims, Judging(seed, ess, out=out_folder), progress=tell)
     except KeyboardInterrupt:
         log.print(f"Interrupted; what is finished is stored in {out_folder}. The same command resumes it: {_command()}")
         raise typer.Exit(130) from None
-    answers = {name: with_notes(c) for name, c in found.items()}
-    document = {**list(answers.values())[-1], "ranges": [{"range": n, **a} for n, a in answers.items()]}
+    document = document_of_ranges(found)
 
     def show() -> None:
         for name, comparison in found.items():
@@ -385,11 +386,10 @@ def compare(
                 rows = [[row[i] for i in columns] for row in shown.cells()]
                 table(f"{name}: {text}", [shown.columns[i].head for i in columns], rows)
             for row in comparison.rows:
-                if row.reason:
-                    out.print(f"{row.label}: {row.reason}")
-            for sentence in (comparison.reason, comparison.sentence, comparison.survival):
-                if sentence:
-                    out.print(sentence)
+                if not row.fitted:
+                    out.print(f"{row.label}: {remark(row)}")
+            for sentence in sentences(comparison):
+                out.print(sentence)
 
     answer(document, as_json, show)
 
@@ -454,7 +454,7 @@ def loop(
         log.print(f"Interrupted; the runs are stored in {out_folder}. The same command resumes: {_command()}")
         raise typer.Exit(130) from None
     runs = list({str(s.run.path): s.run for r in found.rounds for s in (r.before, r.after)}.values())
-    page = write_report([r.path for r in runs if r.path is not None], report_folder, loops=[found])
+    page = write_report([*runs, found], report_folder)
     document: dict[str, Any] = {**words(found), "report": str(page)}
 
     def show() -> None:
@@ -507,7 +507,7 @@ def report(
 
     found = [path for folder in folders for path in run_folders(folder)]
     runs = [load_run(path) for path in found]
-    page = write_report(runs, out_folder, title=title)
+    page = write_report(runs, out_folder, title)
     document = {"report": str(page), "runs": [str(path) for path in found]}
     answer(document, as_json, lambda: out.print(f"The report lies in {page}"))
 

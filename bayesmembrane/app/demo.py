@@ -25,12 +25,13 @@ from bayesmembrane.calibration.predictions import Wanted
 from bayesmembrane.calibration.run import load_run, predictions_of, sample
 from bayesmembrane.calibration.sampling.walk import Progress
 from bayesmembrane.comparison.compare import Range, compare_ranges
-from bayesmembrane.comparison.jobs import Tell
+from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement, read_measurement
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.diagnosis.loop import Loop, LoopSettings, loop
+from bayesmembrane.ground.jobs import Tell, silent
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.cache import CachedSolver, Tally
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -119,18 +120,9 @@ def demo(out: Path, chains: Path, seed: int = 0, ess: float = 1000.0) -> dict[st
     with lines() as tell:
         comparison = compare(chains, seed, ess, tell)
     ordered = [done[name, range_name] for name in materials() for range_name in RANGES if (name, range_name) in done]
-    page = write_report(
-        [d.run for d in ordered],
-        out,
-        reconstruction=found,
-        fits=[c for d in ordered for c in d.compared],
-        title=TITLE,
-        cache=_sum([d.tally for d in ordered]),
-        valleys=valleys,
-        comparison=comparison,
-        paper=paper_losses(),
-        loops=loops,
-    )
+    compared = [c for d in ordered for c in d.compared]
+    shown = [*(d.run for d in ordered), found, *compared, _sum([d.tally for d in ordered]), *valleys, comparison]
+    page = write_report([*shown, read_published_table(), *loops], out, TITLE)
     return {
         "report": str(page),
         "verdicts": [{"verdict": c.rounds[0].diagnosis.verdict, "sentence": sentence(c)} for c in loops],
@@ -140,14 +132,14 @@ def demo(out: Path, chains: Path, seed: int = 0, ess: float = 1000.0) -> dict[st
     }
 
 
-def compare(chains: Path, seed: int = 0, ess: float = 1000.0, progress: Tell | None = None) -> dict[str, Comparison]:
+def compare(chains: Path, seed: int = 0, ess: float = 1000.0, progress: Tell = silent) -> dict[str, Comparison]:
     """The five materials on each range of the paper, from runs of the demo where there are any.
 
     Raises `StorageError` if ``chains`` cannot be written; Ctrl-C stores what is finished.
     """
     claims = [hypothesis(name) for name in materials()]
     ranges = {name: shipped_ranges()[name] for name in RANGES}
-    return compare_ranges(ranges, claims, seed, out=chains, ess=ess, progress=progress)
+    return compare_ranges(ranges, claims, Judging(seed, ess, out=chains), progress=progress)
 
 
 def shipped_ranges() -> dict[str, Range]:
@@ -160,15 +152,6 @@ def shipped_ranges() -> dict[str, Range]:
         "OP1": Range(short, both.select(used | (both.deflection > end * (1 + 1e-9)))),
         "OP2": Range(long),
         "OP1 and OP2": Range(both),
-    }
-
-
-def paper_losses() -> dict[str, dict[str, float]]:
-    """Losses of the paper's optima over the range that they were fitted to, N, by range and material."""
-    table = read_published_table()
-    return {
-        name: {row.material: float(row.loss[i]) for row in table.rows if row.column == name}
-        for i, name in enumerate(table.ranges)
     }
 
 

@@ -15,6 +15,8 @@ from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.diagnosis.thresholds import EXPLANATION, WORDS
 from bayesmembrane.ground.registry import components
+from bayesmembrane.words.hypothesis import spoken, title
+from bayesmembrane.words.language import listed
 from bayesmembrane.words.shape import shape_in_words
 
 Units = Mapping[str, tuple[float, str]]
@@ -203,9 +205,8 @@ _ANSWERS = {
 def _form(found: Diagnosis, left: float) -> str:
     """Of a model that is adequate but for the form of its effects."""
     h = found.null.hypothesis
-    have = " and ".join(e.title for e in h.effects)
     return (
-        f"{h.material.title} with {have} leaves {100 * left:.1f} % of the misfit that {h.material.title} alone has "
+        f"{spoken(h)} leaves {100 * left:.1f} % of the misfit that {h.material.title} alone has "
         f"(p {_p(found)}): no more than a machine leaves that differs a little from the textbook's form. "
         "Nothing beyond that is seen to be missing."
     )
@@ -220,7 +221,7 @@ def _units(found: Diagnosis) -> Units:
 
 def _model(candidate: Candidate) -> str:
     h = candidate.hypothesis
-    return h.material.title + (" with " + " and ".join(e.title for e in h.effects) if h.effects else "")
+    return spoken(h)
 
 
 def _misses(found: Diagnosis) -> str:
@@ -292,7 +293,7 @@ def _better_energy(found: Diagnosis) -> str:
         return ""
     h = found.better.candidate.hypothesis
     return (
-        f" The energy matters here: with {h.material.title} and {' and '.join(e.title for e in h.effects)} "
+        f" The energy matters here: with {title(h.material)} and {listed(map(title, h.effects))} "
         f"the curve is more probable still, by {found.better.gain - found.members[0].gain:.3g} in ln K."
     )
 
