@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import effective_weight, starts_with
-from bayesmembrane.diagnosis.explanation.case import OpenCase, Judged, judged
+from bayesmembrane.diagnosis.explanation.case import Judged, OpenCase, judged
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.noise import orthonormal
 from bayesmembrane.diagnosis.thresholds import EXPLANATION, SEARCH

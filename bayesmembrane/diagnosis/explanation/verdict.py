@@ -10,7 +10,7 @@ import numpy as np
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.sudden import SuddenChange, sudden_change
 from bayesmembrane.diagnosis.detection.scores import angle
-from bayesmembrane.diagnosis.explanation.case import OpenCase, Judged, judged, leaves_little, reopened
+from bayesmembrane.diagnosis.explanation.case import Judged, OpenCase, judged, leaves_little, reopened
 from bayesmembrane.diagnosis.explanation.refits import (
     again,
     better_null,

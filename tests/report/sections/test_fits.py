@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bayesmembrane.calibration.fit import Fit, FittedParameter
+from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.page import TWIN, write_report
 from bayesmembrane.words.calibration import fit_sentence
@@ -58,3 +59,10 @@ def test_a_fit_that_found_nothing_says_why(tmp_path: Path) -> None:
     page = write_report([lost], tmp_path).read_text()
     assert "Yeoh up to 35 mm: no film reaches the data." in page
     assert "nan" not in page.split("<main>")[1].split("base64")[0]
+
+
+def test_a_stored_fit_gives_the_same_page(tmp_path: Path) -> None:
+    store(tmp_path / "answers" / "fit", "fit", fitted(), {})
+    assert write_report([tmp_path / "answers"], tmp_path / "a").read_text() == (
+        write_report([fitted()], tmp_path / "b").read_text()
+    )
