@@ -15,7 +15,7 @@ from bayesmembrane.ground.plain import plain
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
-from bayesmembrane.words import diagnosis, loop, sampling
+from bayesmembrane.words import comparison, diagnosis, loop, sampling
 
 
 def document(result: Any) -> dict[str, Any]:
@@ -30,7 +30,7 @@ def _document(result: Any) -> Mapping[str, Any]:
         case Run():
             return sampling.document(result)
         case Comparison():
-            return sampling.with_notes(result)
+            return comparison.document(result)
         case Reconstruction():
             return result.to_json_dict()
         case Loop():
@@ -38,6 +38,5 @@ def _document(result: Any) -> Mapping[str, Any]:
         case Diagnosis():
             return diagnosis.document(result)
         case Mapping() if result and all(isinstance(c, Comparison) for c in result.values()):
-            answers = {name: sampling.with_notes(c) for name, c in result.items()}
-            return {**list(answers.values())[-1], "ranges": [{"range": n, **a} for n, a in answers.items()]}
+            return comparison.document_of_ranges(result)
     raise SettingsError(f"a {type(result).__name__} is no result of a verb", remedy="give what fit or sample returned")
