@@ -67,20 +67,13 @@ def force(
     import numpy as np
 
     from bayesmembrane.ground.registry import material as named
-    from bayesmembrane.physics.mechanics import Note, Status, solve
+    from bayesmembrane.physics.mechanics import Note, Status, request, solve
 
     kind = named(material)
     film = kind.from_vector(numbers(parameters, "--parameters"))
     where = numbers(deflection_mm, "--deflection-mm")
-    curves = solve(
-        kind,
-        film.vector,
-        np.array(where) * 1e-3,
-        inner_radius=inner_radius_mm * 1e-3,
-        outer_radius=outer_radius_mm * 1e-3,
-        prestretch=prestretch,
-        solver=solver,
-    )
+    radii = inner_radius_mm * 1e-3, outer_radius_mm * 1e-3
+    curves = solve(request(kind, film.vector, np.array(where) * 1e-3, *radii, prestretch=prestretch, solver=solver))
     states = [Status(int(s)) for s in curves.status[0]]
     notes = [(Note(int(n)).name or "").lower() if n else "" for n in curves.note[0]]
     document = {

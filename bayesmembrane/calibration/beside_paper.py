@@ -17,6 +17,7 @@ from bayesmembrane.ground.registry import material
 from bayesmembrane.ground.units import FORCE, LENGTH, SPEED
 from bayesmembrane.physics.forward import Solve, annulus
 from bayesmembrane.physics.mechanics import api
+from bayesmembrane.physics.mechanics.request import request
 
 
 @dataclass(frozen=True)
@@ -96,8 +97,8 @@ def _short(found: Fit) -> dict[str, float]:
 def _loss(measurement: Measurement, row: Row, solve: Solve) -> float | None:
     """|F - y| of a published parameter set on our curve, N; None where the film has no curve."""
     rig = annulus(measurement)
-    radii = {"inner_radius": rig.inner_radius, "outer_radius": rig.outer_radius}
-    force = solve(material(row.material), np.array(row.values), measurement.deflection, **radii).force[0]
+    radii = rig.inner_radius, rig.outer_radius
+    force = solve(request(material(row.material), row.values, measurement.deflection, *radii)).force[0]
     loss = float(np.linalg.norm(force - measurement.force))
     return loss if np.isfinite(loss) else None
 

@@ -66,11 +66,8 @@ def _constrained_search(objective: Objective, start: Array) -> Array:
 
 def _margins(objective: Objective, x: Array) -> Array:
     """Convexity margins (B, M) of x (B, k), one for each deflection or one for the box; 1 where there is no state."""
-    prediction, mode = objective.forward(x), objective.hypothesis.convexity
-    if mode == "box":
-        values = prediction.margin(mode, objective.hypothesis)[:, None]
-    else:
-        values = prediction.convexity_at if mode == "reached" else prediction.ellipticity_at
+    h = objective.hypothesis
+    values = h.convexity.margins_at(objective.forward(x), h.material)
     return np.where(np.isnan(values), 1.0, np.clip(values, -1e3, 1e3))
 
 

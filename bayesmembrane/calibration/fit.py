@@ -15,8 +15,9 @@ from bayesmembrane.calibration.objective import Objective, apart
 from bayesmembrane.calibration.posterior import enough_points
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.convexity import REACHED, RESTRICTING
 from bayesmembrane.physics.forward import Solve
-from bayesmembrane.physics.hypothesis import CONVEXITY, Hypothesis
+from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 
 STARTED, POLISHED = 12, 2
@@ -75,10 +76,10 @@ class Fit:
 
     @property
     def convex(self) -> bool:
-        """True if the hypothesis' convexity prior holds; for the mode "none", that of "reached"."""
-        mode = self.hypothesis.convexity
-        margin = self.margins["reached" if mode == "none" else mode]
-        return margin > 0 if mode == "elliptic" else margin >= 0
+        """True if the hypothesis' convexity prior holds; if it asks for nothing, that of the states reached."""
+        own = self.hypothesis.convexity
+        mode = own if own.restricts else REACHED
+        return bool(mode.holds(self.margins[mode.name]))
 
     def summary(self) -> dict[str, Any]:
         """Plain values for the JSON answer of ``fit``; parameters under their short names."""
@@ -129,7 +130,7 @@ def fit(
     pool, size = objective.pool(rng)
     x, status = _global(objective, pool[size < HOPEFUL * size[0]], [np.asarray(s, dtype=float) for s in starts])
     free = _result(objective, x, status)
-    if hypothesis.convexity == "none" or free.convex:
+    if not hypothesis.convexity.restricts or free.convex:
         return replace(free, constrained=free)
     y = constrained_optimum(objective, pool, free.coordinates)
     held = None if y is None else _result(objective, y, "converged")
@@ -181,7 +182,7 @@ def _result(objective: Objective, x: Array, status: str) -> Fit:
         rmse_N=float(np.sqrt(np.mean(misfit**2))),
         max_N=float(np.max(np.abs(misfit))),
         objective=float(np.linalg.norm(r)),
-        margins={m: float(prediction.margin(m, objective.hypothesis)[0]) for m in CONVEXITY[:3]},
+        margins={m.name: float(m.margin(prediction, objective.hypothesis.material)[0]) for m in RESTRICTING},
         at_bound=tuple(p.name for p, b in zip(objective.parameters, bound, strict=True) if b),
         status=status,
     )

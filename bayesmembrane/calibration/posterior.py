@@ -103,8 +103,7 @@ class Posterior:
         """Prior, likelihood, force and outcome of x (B, k), from one batched solution."""
         x = np.atleast_2d(np.asarray(x, dtype=float))
         mode = self.hypothesis.convexity
-        only = {"reached": "convex", "elliptic": "elliptic"}.get(mode, "all")
-        prediction = self.forward(x, reached=mode in ("reached", "elliptic"), only=only)
+        prediction = self.forward(x, reached=mode.looks_beyond, spare=mode.spare)
         inside = self.prior.inside(prediction)
         ok = prediction.ok
         log_likelihood = np.full(len(x), -np.inf)

@@ -24,8 +24,9 @@ from bayesmembrane.calibration.run import Run
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.convexity import RESTRICTING
 from bayesmembrane.physics.forward import Forward, Solve, annulus
-from bayesmembrane.physics.hypothesis import CONVEXITY, Hypothesis
+from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.convexity import least_eigenvalue
@@ -254,7 +255,7 @@ def digest_draws(
         rest_residual=_band(unused.force - rest_force),
         curves_at=_band(here.force),
         film=films[chosen],
-        convex={m: float(np.mean(_meets(here.margin(m, hypothesis), m))) for m in CONVEXITY if m != "none"},
+        convex={m.name: float(np.mean(m.holds(m.margin(here, hypothesis.material)))) for m in RESTRICTING},
         shape_at=shape_at,
         state_1=states[2],
         state_2=states[3],
@@ -340,10 +341,6 @@ def _total_sd(hypothesis: Hypothesis, measurement: Measurement, x: Array, given:
     if "noise.sd" in names:
         inferred = hypothesis.natural(x, measurement)[:, names.index("noise.sd")]
     return np.sqrt(given**2 + inferred[:, None] ** 2)
-
-
-def _meets(margin: Array, mode: str) -> NDArray[np.bool_]:
-    return np.asarray(margin > 0 if mode == "elliptic" else margin >= 0)
 
 
 def _profiles(film: Material, at: Array, measurement: Measurement) -> Array:

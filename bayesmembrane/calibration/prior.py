@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.convexity import MODES, ConvexityMode
 from bayesmembrane.physics.forward import Forward, Prediction, Solve
-from bayesmembrane.physics.hypothesis import CONVEXITY, Hypothesis
+from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 
 DRAWS = 2048
@@ -45,11 +46,10 @@ class JointPrior:
         columns = [p.prior.quantile(u[..., i]) for i, p in enumerate(self.hypothesis.parameters)]
         return np.stack(columns, axis=-1)
 
-    def inside(self, prediction: Prediction, mode: str | None = None) -> NDArray[np.bool_]:
-        """(B,) True where the convexity prior holds; strictly above zero for ``elliptic``."""
+    def inside(self, prediction: Prediction, mode: ConvexityMode | None = None) -> NDArray[np.bool_]:
+        """(B,) True where the convexity prior holds, or another mode."""
         mode = mode or self.hypothesis.convexity
-        margin = prediction.margin(mode, self.hypothesis)
-        return np.asarray(margin > 0 if mode == "elliptic" else margin >= 0)
+        return mode.holds(mode.margin(prediction, self.hypothesis.material))
 
     def survey(
         self, measurement: Measurement, seed: int = 0, draws: int = DRAWS, solve: Solve = api.solve
@@ -61,7 +61,7 @@ class JointPrior:
         """
         x = self.draw(np.random.default_rng(seed), draws)
         prediction = Forward(self.hypothesis, measurement, measurement.deflection, solve)(x)
-        masses = {mode: _mass(int(np.sum(self.inside(prediction, mode))), draws) for mode in CONVEXITY}
+        masses = {n: _mass(int(np.sum(self.inside(prediction, m))), draws) for n, m in MODES.items()}
         return masses, x[self.inside(prediction)]
 
     def masses(

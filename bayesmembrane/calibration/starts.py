@@ -45,7 +45,7 @@ def starting_points(
     x, lp = x[good], lp[good]
     if len(x) < wanted:
         mode = posterior.hypothesis.convexity
-        limit = "" if mode == "none" else f' that meet the convexity prior "{mode}"'
+        limit = "" if not mode.restricts else f' that meet the convexity prior "{mode}"'
         raise SettingsError(
             f"next to no {posterior.hypothesis.label()} films{limit} reach "
             f"{1e3 * np.max(posterior.measurement.deflection):g} mm",

@@ -16,7 +16,7 @@ from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
 from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.hypothesis import CONVEXITY
+from bayesmembrane.physics.convexity import FREE, MODES
 
 ROUNDS, EACH, LAST = 3, 600, 2000
 KNOWN, STARTS = 1000, 64  # draws of the own mode, and starts without one, that the first proposal is fitted to
@@ -30,7 +30,7 @@ class ByMode:
 
     Attributes
     ----------
-    mode : `CONVEXITY`
+    mode : its name
     log_evidence, sd : with the prior renormalised by its mass; None where it cannot be said
     mass, mass_sd : part of the prior that meets it
     ess : how many draws the weights are worth
@@ -62,17 +62,17 @@ def by_convexity(
     left with few. What g has not found does not count: weights that rest on few draws give a reason and no number.
     """
     rng = np.random.default_rng([seed, 6])
-    free = replace(posterior, hypothesis=replace(posterior.hypothesis, convexity="none"))
+    free = replace(posterior, hypothesis=replace(posterior.hypothesis, convexity=FREE))
     first = draws[rng.choice(len(draws), min(KNOWN, len(draws)), replace=False)]
     try:
         starts = starting_points(free, rng, 2, STARTS, Counter()).reshape(-1, free.size)
     except SettingsError:
         starts = first[:0]
-    found = _adapted(free, around(np.concatenate([first, starts]), rng), "none", ROUNDS, rng)
+    found = _adapted(free, around(np.concatenate([first, starts]), rng), FREE.name, ROUNDS, rng)
     rows = []
-    for mode in CONVEXITY:
+    for mode in MODES:
         part = found if found.ess(mode) >= LEAST_ESS else _again(free, found, mode, rng)
-        rows.append(_row(posterior.hypothesis.convexity, mode, found, part, log_evidence, sd, masses[mode]))
+        rows.append(_row(posterior.hypothesis.convexity.name, mode, found, part, log_evidence, sd, masses[mode]))
     return tuple(rows)
 
 
@@ -121,7 +121,7 @@ def _weigh(free: Posterior, g: Mixture, count: int, rng: np.random.Generator) ->
         with np.errstate(over="ignore", invalid="ignore"):
             log_likelihood[ok] = free.noise.log_likelihood(free.measurement.force - prediction.force[ok], noise)
     log_weight = free.prior.log_density(x) + log_likelihood - g.log_density(x)
-    inside = {mode: free.prior.inside(prediction, mode) for mode in CONVEXITY}
+    inside = {n: free.prior.inside(prediction, m) for n, m in MODES.items()}
     return _Weighted(x, np.where(np.isnan(log_weight), -np.inf, log_weight), inside)
 
 

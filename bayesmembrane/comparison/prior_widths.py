@@ -139,16 +139,15 @@ def _index_sd(k: float, effective: float) -> float:
 
 def _masses(hypothesis: Hypothesis, measurement: Measurement, widest: float, seed: int, solve: Solve) -> Ratio:
     """(i, factor) -> ln(mass with the i-th prior scaled / mass as it is) and its error."""
-    if hypothesis.convexity == "none":
+    if not hypothesis.convexity.restricts:
         return lambda i, factor: (0.0, 0.0)
     priors = [p.prior for p in hypothesis.parameters[: hypothesis.curve_size]]
     wide = [scaled(p, widest) or p for p in priors]
     rng = np.random.default_rng([seed, 3])
     x = np.stack([p.draw(rng, SURVEYED) for p in wide], axis=1)
-    only = {"reached": "convex", "elliptic": "elliptic"}.get(hypothesis.convexity, "all")
-    prediction = Forward(hypothesis, measurement, measurement.deflection, solve)(x, only=only)
-    margin = prediction.margin(hypothesis.convexity, hypothesis)
-    inside = margin > 0 if hypothesis.convexity == "elliptic" else margin >= 0
+    mode = hypothesis.convexity
+    prediction = Forward(hypothesis, measurement, measurement.deflection, solve)(x, spare=mode.spare)
+    inside = mode.holds(mode.margin(prediction, hypothesis.material))
     base = np.stack([p.log_density(x[:, j]) for j, p in enumerate(priors)], axis=1)
     source = sum(p.log_density(x[:, j]) for j, p in enumerate(wide))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from bayesmembrane.physics.effects.base import Effect, EffectParameter
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
+from bayesmembrane.physics.mechanics.request import Request
+from bayesmembrane.physics.mechanics.solution import Curves
 
 ITERATIONS, SANE = 40, 3
 SIZES = (0.1, 0.6)  # of the expected size of an effect: where searches for it start
@@ -96,7 +98,10 @@ class Search:
 
         Films that only shooting resolves cost a hundred times as much: they are left to the end of the best search.
         """
-        quick = partial(self.solve, solver="ritz_alone")
+
+        def quick(asked: Request) -> Curves:
+            return self.solve(replace(asked, solver="ritz_alone"))
+
         exact = Objective(hypothesis, self.measurement, "euclidean", self.solve)
         x, size = self._descended(Objective(hypothesis, self.measurement, "euclidean", quick), np.array(starts))
         if np.any(np.isfinite(size)):

@@ -190,7 +190,7 @@ def _stage(run: Run, solve: Solve, seed: int) -> Stage:
     posterior = Posterior(run.hypothesis, run.measurement, solve)
     draws = run.draws()
     z = bridge(PosteriorTarget(posterior), draws, seed=seed, effective=float(run.status["ess_bulk"]))
-    mode = run.status["prior_mass"][run.hypothesis.convexity]
+    mode = run.status["prior_mass"][run.hypothesis.convexity.name]
     mass = Mass(mode["value"], mode["sd"])
     loo = leave_one_out(posterior, run.data, seed)
     return Stage(

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
 import time
-import zipfile
 from collections import OrderedDict
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
@@ -13,13 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.curve_shelf import CurveShelf, DamagedError, Entry
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics import api
-from bayesmembrane.physics.mechanics.problem import Problem, problem
+from bayesmembrane.physics.mechanics.request import Request, Spared
 from bayesmembrane.physics.mechanics.solution import Curves
 
 # Powers of (G d, R1) that each field of `Curves` carries; the others are pure numbers.
@@ -27,9 +24,6 @@ POWERS = {"deflection": (0, 1), "force": (1, 1), "slope": (1, 0), "energy": (1, 
 MOST_IN_MEMORY = 2048
 # Batches beyond this of a material with shape parameters are draws that never repeat.
 SMALL_BATCH = 4
-_DAMAGED = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
-
-Entry = dict[str, Array]
 
 
 @dataclass
@@ -80,42 +74,29 @@ class CachedSolver:
     Parameters and deflections that agree to 12 digits count as equal.
 
     Large batches of a material with shape parameters go straight to the solver, since their draws never repeat; the
-    tally says how many. ``folder`` (None: memory only) keeps the entries of small batches on disk, one file each,
-    written under a temporary name and renamed, so that several processes may share it; a file that cannot be read, or
-    holds another key, is rebuilt.
+    tally says how many. ``folder`` (None: memory only) keeps the entries of small batches on disk, in one file that
+    several processes share (`curve_shelf`); what cannot be read there is solved again.
     """
 
     folder: Path | None = None
     tally: Tally = field(default_factory=Tally)
     _memory: OrderedDict[bytes, Entry] = field(default_factory=OrderedDict)
 
-    def __call__(
-        self,
-        material: type[Material],
-        parameters: ArrayLike,
-        deflection: ArrayLike,
-        *,
-        inner_radius: float,
-        outer_radius: float,
-        prestretch: ArrayLike = 1.0,
-        sensitivities: bool = False,
-        solver: str = "ritz",
-        only: str = "all",
-        exact_up_to: float = np.inf,
-    ) -> Curves:
+    def __call__(self, asked: Request) -> Curves:
         """As `mechanics.solve`; raises what that raises, and `StorageError` if the folder cannot be written."""
-        asked = problem(material, parameters, deflection, inner_radius, outer_radius, prestretch)
+        material = asked.material
         gd = np.broadcast_to(np.asarray(material.shear_modulus(asked.parameters.T), float), asked.prestretch.shape)
         shapes = len(material.field_names()) > 1
         if (shapes and gd.size > SMALL_BATCH) or not np.all(gd > 0):
             self.tally.bypassed += gd.size
-            return _direct(asked, sensitivities, solver, only, exact_up_to)
+            return api.solve(asked)
         begun = time.perf_counter()
-        keys = _keys(asked, gd, sensitivities, solver)
+        asked = replace(asked, spare=Spared.NONE, exact_up_to=np.inf)  # what is kept serves everybody
+        keys = _keys(asked, gd)
         entries = {key: self._find(key) for key in dict.fromkeys(keys)}
         missing = [key for key, entry in entries.items() if entry is None]
         looked = time.perf_counter()
-        solved = {key: self._solve(asked, keys.index(key), gd, sensitivities, solver, key) for key in missing}
+        solved = {key: self._solve(asked, keys.index(key), gd, key) for key in missing}
         done = time.perf_counter()
         found = {key: entry for key, entry in entries.items() if entry is not None} | solved
         place = {key: i for i, key in enumerate(found)}
@@ -127,14 +108,9 @@ class CachedSolver:
         self.tally.seconds_solving += done - looked
         return curves
 
-    def _solve(self, asked: Problem, film: int, gd: Array, sensitivities: bool, solver: str, key: bytes) -> Entry:
-        one = replace(
-            asked,
-            parameters=asked.parameters[film : film + 1],
-            deflection=asked.deflection[film : film + 1],
-            prestretch=asked.prestretch[film : film + 1],
-        )
-        entry = _scaled(_direct(one, sensitivities, solver), one, float(gd[film]))
+    def _solve(self, asked: Request, film: int, gd: Array, key: bytes) -> Entry:
+        one = asked.of(slice(film, film + 1))
+        entry = _scaled(api.solve(one), one, float(gd[film]))
         self._keep(key, entry)
         self._write(key, entry)
         return entry
@@ -154,64 +130,30 @@ class CachedSolver:
         if len(self._memory) > MOST_IN_MEMORY:
             self._memory.popitem(last=False)
 
-    def _path(self, key: bytes) -> Path | None:
-        return None if self.folder is None else self.folder / f"{hashlib.sha256(key).hexdigest()[:40]}.npz"
-
     def _read(self, key: bytes) -> Entry | None:
-        path = self._path(key)
-        if path is None or not path.exists():
+        if self.folder is None:
             return None
         try:
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-                entry = {name: stored[name] for name in stored.files}
-            if entry.pop("key").tobytes() == key and entry.keys() >= _FIELDS:
-                return entry
-        except _DAMAGED:
-            pass
-        self.tally.rebuilt += 1
-        return None
+            entry = CurveShelf(self.folder).read(key)
+        except DamagedError:
+            entry = None
+            self.tally.rebuilt += 1
+        return entry if entry is not None and entry.keys() >= _FIELDS else None
 
     def _write(self, key: bytes, entry: Entry) -> None:
-        path = self._path(key)
-        if path is None:
+        if self.folder is None:
             return
-        part = None
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
-                part = Path(file.name)
-                arrays: dict[str, Any] = {"key": np.frombuffer(key, np.uint8), **entry}
-                np.savez(file, **arrays)
-            part.replace(path)
-        except OSError as error:
-            if part is not None:
-                part.unlink(missing_ok=True)
-            raise StorageError(
-                f"the curve cache cannot be written ({error.strerror})",
-                where=str(path.parent),
-                remedy="free some space, make the folder writable, or choose another one with --out",
-            ) from None
+            CurveShelf(self.folder).write(key, entry)
+        except DamagedError:
+            self.tally.rebuilt += 1
+            CurveShelf(self.folder).write(key, entry)
 
 
 _FIELDS = {f.name for f in fields(Curves)} - {"deflection", "sensitivity"}
 
 
-def _direct(asked: Problem, sensitivities: bool, solver: str, only: str = "all", exact_up_to: float = np.inf) -> Curves:
-    return api.solve(
-        asked.material,
-        asked.parameters,
-        asked.deflection,
-        inner_radius=asked.inner_radius,
-        outer_radius=asked.outer_radius,
-        prestretch=asked.prestretch,
-        sensitivities=sensitivities,
-        solver=solver,
-        only=only,
-        exact_up_to=exact_up_to,
-    )
-
-
-def _keys(asked: Problem, gd: Array, sensitivities: bool, solver: str) -> list[bytes]:
+def _keys(asked: Request, gd: Array) -> list[bytes]:
     """One key per film: a header, then the scaled numbers rounded to 40 bits."""
     scales = np.asarray(asked.material.scales) == 1
     scaled = np.where(scales, asked.parameters / gd[:, None], asked.parameters)
@@ -219,7 +161,7 @@ def _keys(asked: Problem, gd: Array, sensitivities: bool, solver: str) -> list[b
     numbers = np.hstack([ratio, asked.prestretch[:, None], scaled, asked.deflection / asked.inner_radius])
     mantissa, exponent = np.frexp(numbers)
     numbers = np.ascontiguousarray(np.ldexp(np.round(mantissa * 2.0**40), exponent - 40) + 0.0)
-    header = f"{_source(asked.material)} {solver} {sensitivities} ".encode()
+    header = f"{_source(asked.material)} {asked.solver} {asked.sensitivities} ".encode()
     return [header + row.tobytes() for row in numbers]
 
 
@@ -231,18 +173,18 @@ def _source(material: type[Material]) -> str:
     return f"{material.name} {hashlib.sha256(b''.join(texts)).hexdigest()[:16]}"
 
 
-def _factor(name: str, asked: Problem, gd: Array) -> Array:
+def _factor(name: str, asked: Request, gd: Array) -> Array:
     stiffness, length = POWERS.get(name, (0, 0))
     return np.asarray(gd[:, None] ** stiffness * asked.inner_radius**length)
 
 
-def _field_factor(asked: Problem, gd: Array) -> Array:
+def _field_factor(asked: Request, gd: Array) -> Array:
     """dF/dp_i in units of R1 for moduli, of G d R1 for pure numbers: shape (B, 1, n)."""
     scales = np.asarray(asked.material.scales) == 1
     return np.where(scales, 1.0, gd[:, None])[:, None, :] * asked.inner_radius
 
 
-def _scaled(curves: Curves, asked: Problem, gd: float) -> Entry:
+def _scaled(curves: Curves, asked: Request, gd: float) -> Entry:
     unit = np.array([gd])
     entry = {name: np.asarray(getattr(curves, name) / _factor(name, asked, unit))[0] for name in _FIELDS}
     if curves.sensitivity is not None:
@@ -250,7 +192,7 @@ def _scaled(curves: Curves, asked: Problem, gd: float) -> Entry:
     return entry
 
 
-def _rescale(asked: Problem, gd: Array, entries: list[Entry], place: list[int]) -> Curves:
+def _rescale(asked: Request, gd: Array, entries: list[Entry], place: list[int]) -> Curves:
     """Curves of films with scaled entries[place[i]], i = 0..B-1."""
 
     def films(name: str) -> Array:

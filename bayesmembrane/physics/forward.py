@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import pairwise
@@ -18,17 +17,17 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.composition import Composition, differences
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
-from bayesmembrane.physics.mechanics.convexity import box_margins, reached_convexity, reached_ellipticity
-from bayesmembrane.physics.mechanics.film_law import Gap, film_law
+from bayesmembrane.physics.mechanics.convexity import reached_convexity, reached_ellipticity
+from bayesmembrane.physics.mechanics.film_law import film_law
+from bayesmembrane.physics.mechanics.request import Request, Spared, request
 from bayesmembrane.physics.mechanics.solution import Curves, Status
 from bayesmembrane.physics.mechanics.strip_law import StripLaw, strip_curves
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.base import Strip
 
-Solve = Callable[..., Curves]
-"""`mechanics.api.solve`, or a cache with its signature."""
+Solve = api.Solve
+"""`mechanics.api.solve`, or something in front of it, as a cache."""
 
-BOX = (1.0, 8.0)
 GAPS = 10
 """Between two deflections at which convexity is asked for lies at most this fraction of the whole measured range."""
 
@@ -72,19 +71,6 @@ class Prediction:
         """(B,) True where the whole curve can be used."""
         return np.asarray(np.all(self.status == Status.OK, axis=1))
 
-    def margin(self, mode: str, hypothesis: Hypothesis) -> Array:
-        """(B,) by how much the convexity prior ``mode`` is met: inside means >= 0 (`elliptic`: > 0).
-
-        A film of which nothing is known (no state at all) is inside: its likelihood tells.
-        """
-        if mode == "none":
-            return np.full(len(self.films), np.inf)
-        if mode == "box":
-            values = box_margins(hypothesis.material, self.films, *BOX)
-        else:
-            values = self.convexity if mode == "reached" else self.ellipticity
-        return np.where(np.isnan(values), np.inf, values)
-
 
 @dataclass(frozen=True, eq=False)
 class Forward:
@@ -117,21 +103,21 @@ class Forward:
         sensitivities: bool = False,
         reached: bool = True,
         solver: str = "ritz",
-        only: str = "all",
+        spare: Spared = Spared.NONE,
     ) -> Prediction:
         """Curves of x (B, k); k may leave out the noise.
 
-        ``only`` "convex" or "elliptic" saves effort on films that turn out not to be so, and leaves them unexplained.
+        Films of the kind ``spare`` get no more effort once they turn out to be such, and stay unexplained.
         ``reached`` False saves the solutions beyond ``deflection``, and the margins are those up to there.
         """
         x = np.atleast_2d(np.asarray(coordinates, dtype=float))
         if self.composes:
-            return self._composed(x, sensitivities, reached, only)
+            return self._composed(x, sensitivities, reached, spare)
         films = self.hypothesis.films(x)
         if self.hypothesis.material.scales == (1,) and solver == "ritz":
             curves = _scaled(self._unit[int(reached)], films)
         else:
-            curves = self.curves(films, self._all if reached else self.deflection, sensitivities, solver, only)
+            curves = self.curves(films, self._all if reached else self.deflection, sensitivities, solver, spare)
         n, chained = self.deflection.size, None
         if sensitivities and curves.sensitivity is not None:
             chained = np.einsum("bni,bik->bnk", curves.sensitivity[:, :n], self.jacobian(x))
@@ -176,11 +162,11 @@ class Forward:
     def _beyond(self) -> Array:
         return beyond(self.deflection, self.measurement.full_range)
 
-    def _composed(self, x: Array, sensitivities: bool, reached: bool, only: str) -> Prediction:
+    def _composed(self, x: Array, sensitivities: bool, reached: bool, spare: Spared) -> Prediction:
         """As `__call__`, in batches that fit into memory."""
         count = self.hypothesis.curve_size + 1 if sensitivities else 1
         rows = max(1, AT_ONCE // (count * self.path.deflection.size))
-        parts = [self._batch(x[i : i + rows], sensitivities, reached, only) for i in range(0, len(x), rows)]
+        parts = [self._batch(x[i : i + rows], sensitivities, reached, spare) for i in range(0, len(x), rows)]
         if len(parts) == 1:
             return parts[0]
         names = [f.name for f in fields(Prediction) if f.name != "deflection"]
@@ -188,10 +174,10 @@ class Forward:
         joined: dict[str, Any] = {n: None if v[0] is None else np.concatenate(v) for n, v in whole.items()}
         return Prediction(self.deflection, **joined)
 
-    def _batch(self, x: Array, sensitivities: bool, reached: bool, only: str) -> Prediction:
+    def _batch(self, x: Array, sensitivities: bool, reached: bool, spare: Spared) -> Prediction:
         films = self.hypothesis.films(x)
         theta = x[:, self.hypothesis.material_size : self.hypothesis.curve_size]
-        law, at = self.law(films, theta, sensitivities, reached, only)
+        law, at = self.law(films, theta, sensitivities, reached, spare)
         slopes = None
         if sensitivities:
             jacobian = self.jacobian(x)[:, :, : self.hypothesis.material_size]
@@ -206,7 +192,12 @@ class Forward:
         return Prediction(self.deflection, force[:, here], status[:, here], films, slopes, *least, *at)
 
     def law(
-        self, films: Array, theta: Array, sensitivities: bool = False, reached: bool = False, only: str = "all"
+        self,
+        films: Array,
+        theta: Array,
+        sensitivities: bool = False,
+        reached: bool = False,
+        spare: Spared = Spared.NONE,
     ) -> tuple[Any, tuple[Array, Array]]:
         """The law of ``films`` (B, n) with effect parameters ``theta`` (B, k), and margins (B, M) of its states.
 
@@ -220,12 +211,17 @@ class Forward:
             return strip, (shown.convexity, shown.ellipticity)
         composition = self.composition
         end = np.maximum(composition.end(theta), 1e-3 * self.measurement.full_range)
-        options: dict[str, Any] = {"sensitivities": sensitivities, "only": only}
-        if only != "all":
-            options["exact_up_to"] = float(np.max(end))
-        law, curves = film_law(
-            material, films, self._gap, composition.prestretch(theta), end, extra, self.solve, **options
+        asked = Request(
+            material,
+            films,
+            np.broadcast_to(extra, (len(films), extra.size)),
+            composition.prestretch(theta),
+            *self._radii,
+            sensitivities=sensitivities,
+            spare=spare,
+            exact_up_to=np.inf if spare is Spared.NONE else float(np.max(end)),
         )
+        law, curves = film_law(asked, end, self.solve)
         indefinite, bent = (curves.status == s for s in (Status.INDEFINITE, Status.NOT_ELLIPTIC))
         convexity, ellipticity = (
             np.where(indefinite | (bent & np.isnan(m)), -np.inf, m) for m in (curves.convexity, curves.ellipticity)
@@ -257,9 +253,9 @@ class Forward:
         return self.measurement.on_path if self._measured else slice(None)
 
     @cached_property
-    def _gap(self) -> Gap:
+    def _radii(self) -> tuple[float, float]:
         rig = annulus(self.measurement)
-        return Gap(rig.inner_radius, rig.outer_radius)
+        return rig.inner_radius, rig.outer_radius
 
     @cached_property
     def _pushes(self) -> bool:
@@ -270,7 +266,12 @@ class Forward:
         return bool(np.any((m.deflection < -0.01 * m.full_range) & (m.force < 0)))
 
     def curves(
-        self, films: Array, deflection: Array, sensitivities: bool = False, solver: str = "ritz", only: str = "all"
+        self,
+        films: Array,
+        deflection: Array,
+        sensitivities: bool = False,
+        solver: str = "ritz",
+        spare: Spared = Spared.NONE,
     ) -> Curves:
         """Curves of ``films`` (B, n) without effects at ``deflection`` (N,) m on the rig of the measurement."""
         if isinstance(self.measurement.rig, Strip):
@@ -279,20 +280,10 @@ class Forward:
                 across = self.measurement.across
             strip = StripLaw(self.hypothesis.material, films, self.measurement.rig, self._pushes, across)
             return strip_curves(strip, deflection, sensitivities)
-        rig = annulus(self.measurement)
         # What lies beyond is solved to see whether the film stays convex there.
-        exact = float(np.max(self.deflection)) if only != "all" else np.inf
-        options: dict[str, Any] = {"inner_radius": rig.inner_radius, "outer_radius": rig.outer_radius}
-        return self.solve(
-            self.hypothesis.material,
-            films,
-            deflection,
-            sensitivities=sensitivities,
-            solver=solver,
-            only=only,
-            exact_up_to=exact,
-            **options,
-        )
+        exact = np.inf if spare is Spared.NONE else float(np.max(self.deflection))
+        asked = request(self.hypothesis.material, films, deflection, *self._radii)
+        return self.solve(replace(asked, sensitivities=sensitivities, solver=solver, spare=spare, exact_up_to=exact))
 
     def jacobian(self, x: Array) -> Array:
         """d films / d coordinates, (B, n, k), by central differences of fourth order: exact to 1e-12 or so."""

@@ -11,17 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.ground.errors import SettingsError, unknown_name
+from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array, Parameter
 from bayesmembrane.ground.registry import component, material
+from bayesmembrane.physics.convexity import REACHED, ConvexityMode, mode
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.noise.base import Noise, force_scale
 from bayesmembrane.physics.noise.white import White
-
-CONVEXITY = ("reached", "box", "elliptic", "none")
-"""Where the prior asks the energy to be convex: on the states that the film reaches over the whole measured range, on
-the box [1, 8]^2, nowhere but P11 > 0 and P22 > 0 on the reached states, or not at all."""
 
 
 @dataclass(frozen=True)
@@ -31,21 +28,19 @@ class Hypothesis:
     material : class of the strain energy
     effects : what the plain film on an ideal rig lacks; their parameters join the vector
     noise : noise model
-    convexity : one of `CONVEXITY`
+    convexity : where the prior asks the energy to be convex
 
     The vector x holds the material's coordinates, those of the effects, and those of the noise, in this order. Their
-    names carry the component: ``yeoh.ln_gd``, ``clamp_slip.length``, ``noise.ln_sd``. Raises `SettingsError` for an
-    unknown convexity mode and for an effect that is named twice.
+    names carry the component: ``yeoh.ln_gd``, ``clamp_slip.length``, ``noise.ln_sd``. Raises `SettingsError` for
+    an effect that is named twice.
     """
 
     material: type[Material]
     effects: tuple[Effect, ...] = ()
     noise: Noise = field(default_factory=White)
-    convexity: str = "reached"
+    convexity: ConvexityMode = REACHED
 
     def __post_init__(self) -> None:
-        if self.convexity not in CONVEXITY:
-            raise unknown_name("convexity prior", self.convexity, CONVEXITY)
         names = [e.name for e in self.effects]
         if repeated := sorted({n for n in names if names.count(n) > 1}):
             raise SettingsError(f'the effect "{repeated[0]}" is named twice', remedy="name every effect once")
@@ -113,7 +108,7 @@ class Hypothesis:
             "effects": [e.name for e in self.effects],
             "noise": self.noise.name,
             "extra_noise": getattr(self.noise, "extra", True),
-            "convexity": self.convexity,
+            "convexity": self.convexity.name,
         }
 
 
@@ -121,7 +116,7 @@ def hypothesis(
     material_name: str,
     effects: Iterable[str] = (),
     noise: str = "white",
-    convexity: str = "reached",
+    convexity: str = REACHED.name,
     extra_noise: bool = True,
 ) -> Hypothesis:
     """The hypothesis made of components by name; raises `SettingsError` for a name that nobody declared.
@@ -134,7 +129,9 @@ def hypothesis(
             f'the noise model "{noise}" always infers a part of the noise', remedy='use "white" to do without'
         )
     instance = model() if extra_noise else model(extra=False)
-    return Hypothesis(material(material_name), tuple(component("effects", e)() for e in effects), instance, convexity)
+    return Hypothesis(
+        material(material_name), tuple(component("effects", e)() for e in effects), instance, mode(convexity)
+    )
 
 
 def from_settings(settings: Mapping[str, Any]) -> Hypothesis:

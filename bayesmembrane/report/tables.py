@@ -13,6 +13,7 @@ from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.calibration.posterior import Outcome
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.cache import Tally
+from bayesmembrane.physics.convexity import RESTRICTING
 from bayesmembrane.report.sentences import percent
 from bayesmembrane.report.style import spoken, title
 from bayesmembrane.report.view import Shown
@@ -304,16 +305,16 @@ def masses_table(shown: Sequence[Shown]) -> Table:
         Column("run", "material"),
         Column("end_mm", "fitted up to (mm)"),
         Column("mode", "prior used"),
-        *(Column(f"mass_{m}", f"prior mass, {m}", "%") for m in ("reached", "box", "elliptic")),
-        *(Column(f"draws_{m}", f"posterior draws, {m}", "%") for m in ("reached", "box", "elliptic")),
+        *(Column(f"mass_{m}", f"prior mass, {m}", "%") for m in [m.name for m in RESTRICTING]),
+        *(Column(f"draws_{m}", f"posterior draws, {m}", "%") for m in [m.name for m in RESTRICTING]),
     )
     rows = tuple(
         (
             s.name,
             1e3 * s.digest.end,
-            s.hypothesis.convexity,
-            *(_number(s.masses.get(m, (None, None))[0]) for m in ("reached", "box", "elliptic")),
-            *(s.digest.convex.get(m) for m in ("reached", "box", "elliptic")),
+            s.hypothesis.convexity.name,
+            *(_number(s.masses.get(m, (None, None))[0]) for m in [m.name for m in RESTRICTING]),
+            *(s.digest.convex.get(m) for m in [m.name for m in RESTRICTING]),
         )
         for s in shown
     )

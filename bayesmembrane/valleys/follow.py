@@ -16,8 +16,9 @@ from bayesmembrane.data.published import read_published_table
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import materials
+from bayesmembrane.physics.convexity import FREE, MODES
 from bayesmembrane.physics.forward import Solve
-from bayesmembrane.physics.hypothesis import CONVEXITY, Hypothesis
+from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.valleys.between import closest_approach
 from bayesmembrane.valleys.next_tests import rank
 from bayesmembrane.valleys.posterior import (
@@ -100,7 +101,7 @@ def _valley(surface: Surface, rise: float, seed: int, draws: Array | None) -> Va
     h, m, chart = surface.hypothesis, surface.measurement, surface.chart
     published = _published(h, m)
     starts = [p for _, p in published]
-    fitted = fit(m, replace(h, convexity="none"), seed=seed, starts=starts)
+    fitted = fit(m, replace(h, convexity=FREE), seed=seed, starts=starts)
     best, least, lines = _lines(surface, chart.from_coordinates(fitted.coordinates)[0], rise)
     metric = metric_of(chart)
     spectra = tuple(_spectrum(surface, best, s) for s in _metrics(metric))
@@ -130,7 +131,7 @@ def _valley(surface: Surface, rise: float, seed: int, draws: Array | None) -> Va
         floor=chart.natural(floor_z),
         floor_z=floor_z,
         floor_loss=floor_loss,
-        kept={mode: posterior_margin(surface, floor_z, mode) for mode in CONVEXITY},
+        kept={n: posterior_margin(surface, floor_z, m) for n, m in MODES.items()},
         spectra=spectra,
         profiles=tuple(lines),
         maps=maps,
@@ -238,7 +239,7 @@ def _spread(surface: Surface, normal: Normal, band: Grid | None, along: int, dra
     if draws is not None and len(draws):
         return spread_of_draws(surface, draws)
     if band is not None:
-        found = spread_of_grid(band, _cells(band, along), "none", seed)
+        found = spread_of_grid(band, _cells(band, along), FREE, seed)
         if np.all(np.isfinite(found.covariance)) and np.all(np.diag(found.covariance) > 0):
             return found
     return normal.spread(seed)
@@ -262,7 +263,7 @@ def _limit(surface: Surface, line: Profile, seed: int) -> str:
     for name, kind in materials().items():
         if len(kind.field_names()) >= surface.chart.size or name == surface.hypothesis.material.name:
             continue
-        simple = fit(surface.measurement, replace(surface.hypothesis, material=kind, convexity="none"), seed=seed)
+        simple = fit(surface.measurement, replace(surface.hypothesis, material=kind, convexity=FREE), seed=seed)
         if abs(simple.loss_N - ends[-1].loss) <= SAME * ends[-1].loss:
             return kind.title
     return ""

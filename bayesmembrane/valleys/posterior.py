@@ -13,7 +13,7 @@ from bayesmembrane.calibration.descent import descend
 from bayesmembrane.calibration.objective import Objective
 from bayesmembrane.calibration.prior import JointPrior
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.hypothesis import CONVEXITY
+from bayesmembrane.physics.convexity import RESTRICTING, ConvexityMode
 from bayesmembrane.physics.noise.base import NoiseLikelihood, force_scale
 from bayesmembrane.valleys.surface import Surface
 
@@ -39,12 +39,10 @@ class Grid:
     log_posterior: Array
     margins: dict[str, Array]
 
-    def convex(self, mode: str) -> NDArray[np.bool_]:
+    def convex(self, mode: ConvexityMode) -> NDArray[np.bool_]:
         """S, True where the convexity mode is met."""
-        if mode == "none":
-            return np.isfinite(self.loss)
-        m = self.margins[mode]
-        return np.isfinite(self.loss) & ((m > 0) if mode == "elliptic" else (m >= 0))
+        known = np.isfinite(self.loss)
+        return known & mode.holds(self.margins[mode.name]) if mode.restricts else known
 
 
 def grid(surface: Surface, z: Array) -> Grid:
@@ -54,12 +52,12 @@ def grid(surface: Surface, z: Array) -> Grid:
     x = surface.chart.coordinates(flat)
     good = np.flatnonzero(np.all(np.isfinite(x), axis=1))
     loss, density = np.full(len(flat), np.inf), np.full(len(flat), -np.inf)
-    margins = {m: np.full(len(flat), -np.inf) for m in CONVEXITY[:3]}
+    margins = {m.name: np.full(len(flat), -np.inf) for m in RESTRICTING}
     if good.size:
         prediction = surface.objective.forward(x[good])
         loss[good] = surface.objective.many(prediction)
-        for mode, values in margins.items():
-            values[good] = prediction.margin(mode, h)
+        for mode in RESTRICTING:
+            margins[mode.name][good] = mode.margin(prediction, h.material)
         ok = np.isfinite(loss[good])
         part = good[ok]
         likelihood = _integrated(h.noise.bind(surface.measurement), surface, y - prediction.force[ok])
@@ -119,7 +117,7 @@ def spread_of_draws(surface: Surface, x: Array) -> Spread:
     return Spread(np.mean(z, axis=0), np.atleast_2d(np.cov(z.T)), z, "draws")
 
 
-def spread_of_grid(found: Grid, cells: Array, mode: str, seed: int = 0, size: int = 2000) -> Spread:
+def spread_of_grid(found: Grid, cells: Array, mode: ConvexityMode, seed: int = 0, size: int = 2000) -> Spread:
     """From a grid (*S, k) whose cells have the volumes ``cells`` S in natural parameters, under a convexity mode."""
     keep = found.convex(mode)
     with np.errstate(divide="ignore"):
@@ -218,7 +216,7 @@ class Normal:
         return Spread(self.z, covariance, draws, "normal")
 
 
-def posterior_margin(surface: Surface, z: Array, mode: str) -> NDArray[np.bool_]:
+def posterior_margin(surface: Surface, z: Array, mode: ConvexityMode) -> NDArray[np.bool_]:
     """(B,) True where the films z (B, k) meet the convexity mode and reach the data."""
     out = np.zeros(len(z), dtype=bool)
     x = surface.chart.coordinates(z)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.hypothesis import CONVEXITY, Hypothesis
+from bayesmembrane.physics.convexity import MODES, RESTRICTING
+from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.valleys.between import Approach, arc_length
 from bayesmembrane.valleys.next_tests import ASSUMPTION, NextTest
 from bayesmembrane.valleys.posterior import Grid, Spread
@@ -176,7 +177,7 @@ class Valley:
                 {
                     **dict(zip(names, p, strict=True)),
                     "loss_N": loss,
-                    **{mode: bool(self.kept[mode][i]) for mode in CONVEXITY[:3]},
+                    **{m.name: bool(self.kept[m.name][i]) for m in RESTRICTING},
                 }
                 for i, (p, loss) in enumerate(zip(self.floor, self.floor_loss, strict=True))
             ],
@@ -197,7 +198,7 @@ class Valley:
             "open_end": self.open_end,
             "limit": self.limit,
             "other_basins": [{**dict(zip(names, p, strict=True)), "loss_N": loss} for p, loss in self.basins],
-            "kept_by_convexity": {mode: self.share(mode) for mode in CONVEXITY},
+            "kept_by_convexity": {mode: self.share(mode) for mode in MODES},
             "profiles": {names[p.index]: self._profile(p) for p in self.profiles},
             "maps": [self._map(m, names) for m in self.maps],
             "not_reached": self.unreached,
@@ -242,7 +243,7 @@ class Valley:
                 "natural": np.moveaxis(g.natural, -1, 0),
                 "loss_N": g.loss,
                 "log_posterior": g.log_posterior,
-                "convex": {mode: g.convex(mode) for mode in CONVEXITY[:3]},
+                "convex": {m.name: g.convex(m) for m in RESTRICTING},
             }
             for name, g in parts.items()
         }
@@ -290,7 +291,7 @@ class Valleys:
         every = [b.summary() for b in self.between]
         return {
             "material": self.hypothesis.material.name,
-            "convexity": self.hypothesis.convexity,
+            "convexity": self.hypothesis.convexity.name,
             "ranges": [v.summary() for v in self.ranges],
             "closest_approach": every[0] if every else None,
             "approaches": every,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.convexity import RESTRICTING
 from bayesmembrane.valleys.profile import End
 from bayesmembrane.valleys.result import Valley
 
@@ -143,7 +144,7 @@ def _nothing_needed(v: Valley) -> list[str]:
 
 
 def _modes(v: Valley) -> list[str]:
-    parts = [f"{mode} leaves {100 * v.share(mode):.3g} %" for mode in ("reached", "box", "elliptic")]
+    parts = [f"{m.name} leaves {100 * v.share(m.name):.3g} %" for m in RESTRICTING]
     return [f"{_range(v)}, of the floor's length the convexity prior {parts[0]}, {parts[1]}, {parts[2]}."]
 
 

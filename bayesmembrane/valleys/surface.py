@@ -16,8 +16,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
-from bayesmembrane.physics.materials.base import Material
-from bayesmembrane.physics.mechanics.problem import problem
+from bayesmembrane.physics.mechanics.request import Request
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
 from bayesmembrane.physics.mechanics.solution import Curves
 
@@ -29,25 +28,12 @@ SECANTS = 12
 PROBE, NOT_HIGHER = 1e-4, 1e-7  # first step of the secant method, and how much higher a root's loss may be, relative
 
 
-def unaided(
-    material: type[Material],
-    parameters: ArrayLike,
-    deflection: ArrayLike,
-    *,
-    inner_radius: float,
-    outer_radius: float,
-    prestretch: ArrayLike = 1.0,
-    sensitivities: bool = False,
-    solver: str = "ritz",
-    only: str = "all",
-    exact_up_to: float = np.inf,
-) -> Curves:
+def unaided(asked: Request) -> Curves:
     """`mechanics.api.solve` by the Ritz method alone: a film that it cannot resolve to 1e-6 stays without a force.
 
     A map asks for many films that are no sensible ones, and shooting at each of them takes a thousand times longer.
     """
-    asked = problem(material, parameters, deflection, inner_radius, outer_radius, prestretch)
-    return ritz.solve(asked, sensitivities, only, exact_up_to)
+    return ritz.solve(asked)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import pytest
 from bayesmembrane.app.cli import main
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.ground.registry import material
-from bayesmembrane.physics.mechanics import solve
+from bayesmembrane.physics.mechanics import request, solve
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -35,7 +35,7 @@ def test_force_answers_what_the_solver_answers(run: Run) -> None:
         "force", "--material", "yeoh", "--parameters", "8.84,-0.63,0.056", "--deflection-mm", "1,10,35.1", "--json"
     )
     answer = json.loads(out)
-    direct = solve(material("yeoh"), [8.84, -0.63, 0.056], [1e-3, 0.01, 0.0351], inner_radius=0.01, outer_radius=0.035)
+    direct = solve(request(material("yeoh"), [8.84, -0.63, 0.056], [1e-3, 0.01, 0.0351], 0.01, 0.035))
     assert code == 0
     assert answer["status"] == ["ok"] * 3
     np.testing.assert_allclose(answer["force_N"], direct.force[0], rtol=1e-12)
@@ -142,7 +142,7 @@ def test_fit_finds_effects_in_a_curve_of_the_other_solver(run: Run, tmp_path: Pa
     """The curve is shot, and the shift and the frame are put in by hand, point by point."""
     film, shift, compliance = [8.0, -0.2, 0.03], 6e-4, 4e-4
     knots = np.linspace(1e-3, 0.07, 60)
-    shot = solve(material("yeoh"), film, knots, inner_radius=0.01, outer_radius=0.035, solver="shooting").force[0]
+    shot = solve(request(material("yeoh"), film, knots, 0.01, 0.035, solver="shooting")).force[0]
     deflection = knots + compliance * shot + shift
     force = shot + 1e-3 * np.random.default_rng(4).standard_normal(knots.size)
     rows = "".join(f"{1e3 * d!r},{f!r}\n" for d, f in zip(deflection.tolist(), force.tolist(), strict=True))

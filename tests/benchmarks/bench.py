@@ -25,9 +25,9 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.materials.base import Material
-from bayesmembrane.physics.mechanics import fallback, reference, solve
+from bayesmembrane.physics.mechanics import fallback, reference, request, solve
 from bayesmembrane.physics.mechanics.convexity import reached_convexity
-from bayesmembrane.physics.mechanics.problem import Problem, problem
+from bayesmembrane.physics.mechanics.request import Request
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
 from bayesmembrane.physics.mechanics.shooting import solver as shooting
 
@@ -66,7 +66,7 @@ def admissible(material: type[Material], count: int, rng: np.random.Generator) -
     while sum(map(len, kept)) < count:
         x = np.stack([c.prior.draw(rng, 2 * count) for c in material.coordinates])
         p = material.from_coordinates(x).T
-        curves = fallback.solve(problem(material, p, GRIDS[15], *RADII.values()))
+        curves = fallback.solve(request(material, p, GRIDS[15], *RADII.values()))
         kept.append(p[np.all(curves.ok, axis=1) & (reached_convexity(curves) >= 0)])
     return np.concatenate(kept)[:count]
 
@@ -86,8 +86,8 @@ def error(forces: Array, exact: Array) -> float:
     return float(np.max(np.where(np.isfinite(forces), np.abs(forces / exact - 1), np.inf)))
 
 
-def asked(material: type[Material], films: Array, points: int) -> Problem:
-    return problem(material, films, GRIDS[points], *RADII.values())
+def asked(material: type[Material], films: Array, points: int) -> Request:
+    return request(material, films, GRIDS[points], *RADII.values())
 
 
 def baseline(films: list[Material], exact: Array) -> Row:
@@ -158,7 +158,7 @@ def cached(material: type[Material], films: Array) -> Row:
     for n in (15, 366):
         remembered(material, films[0], GRIDS[n], **RADII)
         times.append(microseconds(lambda n=n: remembered(material, films[0], GRIDS[n], **RADII), 50))
-    direct = solve(material, films[0], GRIDS[15], **RADII).force
+    direct = solve(request(material, films[0], GRIDS[15], **RADII)).force
     hit = remembered(material, films[0], GRIDS[15], **RADII).force
     return Row(material.name, "cache, a hit", *times, error(hit, direct))
 

@@ -8,7 +8,7 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.physics.mechanics import solve
+from bayesmembrane.physics.mechanics import Request, solve
 from bayesmembrane.physics.mechanics.solution import Curves
 from bayesmembrane.physics.rigs.biaxial import Biaxial
 
@@ -34,16 +34,16 @@ def test_the_solvers_agree(film, name: str) -> None:  # type: ignore[no-untyped-
 
 
 def test_a_disagreement_is_found(film) -> None:  # type: ignore[no-untyped-def]
-    def wrong(*args: object, solver: str = "ritz", **options: object) -> Curves:
-        curves = solve(*args, solver=solver, **options)  # type: ignore[arg-type]
+    def wrong(asked: Request) -> Curves:
+        curves = solve(asked)
         force = curves.force.copy()
-        if solver == "shooting":
+        if asked.solver == "shooting":
             force[:, 3] *= 1.01
         return replace(curves, force=force)
 
     curve = film("gent", (5.3, 30.0))
     x = np.tile(material("gent").to_coordinates([5.3, 30.0]), (4, 1))
-    found = crosscheck(Forward(hypothesis("gent"), curve, curve.deflection, wrong), x)  # type: ignore[arg-type]
+    found = crosscheck(Forward(hypothesis("gent"), curve, curve.deflection, wrong), x)
     assert found.largest == pytest.approx(0.01, rel=1e-4)
     assert found.at_mm == pytest.approx(1e3 * curve.deflection[3])
     assert found.draws == 4

@@ -9,7 +9,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.forward import predict
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.physics.mechanics import solve
+from bayesmembrane.physics.mechanics import request, solve
 
 FILMS = {
     "neo_hookean": (7.5,),
@@ -46,7 +46,7 @@ def test_an_ogden_curve_comes_back_if_not_its_six_parameters(film) -> None:  # t
 def test_a_linear_fit_is_the_closed_form(film) -> None:  # type: ignore[no-untyped-def]
     """F = c1 F(1): c1 = <F, y> / <F, F> with variance s^2 / <F, F>, weighted or not."""
     curve = film("neo_hookean", (7.5,), noise=0.02, seed=3, stated=True)
-    unit = solve(material("neo_hookean"), [1.0], curve.deflection, inner_radius=0.01, outer_radius=0.035).force[0]
+    unit = solve(request(material("neo_hookean"), [1.0], curve.deflection, 0.01, 0.035)).force[0]
     c1 = unit @ curve.force / (unit @ unit)
     r = curve.force - c1 * unit
     for loss in ("euclidean", "weighted"):
@@ -72,7 +72,7 @@ def test_no_loss_lies_above_a_published_start(film) -> None:  # type: ignore[no-
     for name in ("mooney_rivlin", "gent", "yeoh"):
         rows = [r.split(",") for r in shipped("paper_parameters.csv").read_text().splitlines()]
         films = [[float(r[3]) for r in rows if r[:2] == [name, column]] for column in ("INI", "OP1", "OP2")]
-        force = solve(material(name), films, curve.deflection, inner_radius=0.01, outer_radius=0.035).force
+        force = solve(request(material(name), films, curve.deflection, 0.01, 0.035)).force
         published = np.linalg.norm(force - curve.force, axis=1)
         found = fit(curve, hypothesis(name), starts=films)
         assert found.loss_N <= np.nanmin(published) * (1 + 1e-9)

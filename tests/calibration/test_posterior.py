@@ -11,7 +11,7 @@ from bayesmembrane.calibration.posterior import Outcome, Posterior, failure_sent
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.physics.mechanics import Status, solve
+from bayesmembrane.physics.mechanics import Request, Status, solve
 from bayesmembrane.physics.mechanics.solution import Curves
 
 
@@ -51,14 +51,14 @@ def test_what_cannot_be_has_a_reason(film) -> None:  # type: ignore[no-untyped-d
 
 
 def test_a_numerical_failure_is_counted_and_not_taken_for_physics(film) -> None:  # type: ignore[no-untyped-def]
-    def failing(*args: object, **options: object) -> Curves:
-        curves = solve(*args, **options)  # type: ignore[arg-type]
+    def failing(asked: Request) -> Curves:
+        curves = solve(asked)
         status = curves.status.copy()
         status[0, -1] = Status.UNRESOLVED
         return replace(curves, status=status, force=np.where(status == Status.OK, curves.force, np.nan))
 
     curve = film("neo_hookean", (7.5,))
-    p = Posterior(hypothesis("gent"), curve, failing)  # type: ignore[arg-type]
+    p = Posterior(hypothesis("gent"), curve, failing)
     e = p.evaluate(at("gent", [[7.5, 50.0], [7.5, 60.0]]))
     assert list(e.outcome) == [Outcome.UNRESOLVED, Outcome.OK]
     assert e.log_likelihood[0] == -np.inf

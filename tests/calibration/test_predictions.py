@@ -13,7 +13,7 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.materials.gent import Gent
-from bayesmembrane.physics.mechanics import solve
+from bayesmembrane.physics.mechanics import request, solve
 from bayesmembrane.physics.mechanics.api import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
 
@@ -50,7 +50,7 @@ def test_bands_hold_the_truth_and_widen_beyond_the_fit() -> None:
     """A film that is shot, fitted over two thirds of the range by the other solver."""
 
     def shot(at: np.ndarray) -> np.ndarray:
-        return solve(Gent, [5.3, 14.0], at, inner_radius=0.010, outer_radius=0.035, solver="shooting").force[0]
+        return solve(request(Gent, [5.3, 14.0], at, 0.010, 0.035, solver="shooting")).force[0]
 
     at = np.linspace(5e-3, 0.09, 14)
     force = shot(at) + 0.02 * np.random.default_rng(8).standard_normal(at.size)

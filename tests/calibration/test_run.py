@@ -16,14 +16,14 @@ from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.forward import predict
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.physics.mechanics import solve
+from bayesmembrane.physics.mechanics import request, solve
 
 
 def test_a_linear_posterior_is_exact(film) -> None:  # type: ignore[no-untyped-def]
     """F = c1 F(1) with a known noise: c1 ~ N(c, s^2 / <F, F>), times a prior that is flat on that scale."""
     noise = 0.02
     curve = film("neo_hookean", (7.5,), noise=noise, seed=21, stated=True)
-    unit = solve(material("neo_hookean"), [1.0], curve.deflection, inner_radius=0.01, outer_radius=0.035).force[0]
+    unit = solve(request(material("neo_hookean"), [1.0], curve.deflection, 0.01, 0.035)).force[0]
     mean, sd = unit @ curve.force / (unit @ unit), noise / np.sqrt(unit @ unit)
     run = sample(curve, hypothesis("neo_hookean", extra_noise=False), seed=1)
     answer = run.summary()["posterior"]["c1"]
@@ -58,7 +58,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Run:
     from bayesmembrane.physics.rigs.annulus import Annulus
 
     d = np.linspace(5e-3, 50e-3, 10)
-    force = solve(material("gent"), [5.3, 30.0], d, inner_radius=0.01, outer_radius=0.035).force[0]
+    force = solve(request(material("gent"), [5.3, 30.0], d, 0.01, 0.035)).force[0]
     force += 0.01 * np.random.default_rng(4).standard_normal(10)
     a = np.random.default_rng(5).standard_normal((10, 10))
     curve = Measurement(

@@ -26,7 +26,7 @@ from bayesmembrane.physics.rigs.annulus import Annulus
 def film(name: str = "gent", parameters: tuple[float, ...] = (7.0, 20.0), end: float = 0.06) -> Measurement:
     deflection = np.linspace(end / 10, end, 10)
     kind = material(name)
-    force = api.solve(kind, np.array([parameters]), deflection, inner_radius=0.01, outer_radius=0.035).force[0]
+    force = api.solve(api.request(kind, np.array([parameters]), deflection, 0.01, 0.035)).force[0]
     noise = 0.005 * np.max(force) * np.random.default_rng(401).standard_normal(10)
     return Measurement(deflection, force + noise, Annulus(0.01, 0.035), Specimen("film", 5e-5))
 

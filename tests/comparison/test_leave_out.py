@@ -25,7 +25,7 @@ def measured(noise: str = "correlated") -> Measurement:
     rng = np.random.default_rng(SEED)
     deflection = np.linspace(4e-3, 48e-3, 12)
     kind = material("yeoh")
-    force = api.solve(kind, np.array([[8.0, -0.3, 0.02]]), deflection, inner_radius=0.01, outer_radius=0.035).force[0]
+    force = api.solve(api.request(kind, np.array([[8.0, -0.3, 0.02]]), deflection, 0.01, 0.035)).force[0]
     place = np.arange(12)
     covariance = 0.02**2 * (0.8 ** np.abs(place[:, None] - place) + 0.3 * np.eye(12))
     if noise == "none":

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +15,13 @@ import pytest
 
 import bayesmembrane
 from bayesmembrane.ground.errors import StorageError
-from bayesmembrane.physics import cache
+from bayesmembrane.physics import cache, curve_shelf
 from bayesmembrane.physics.cache import SMALL_BATCH, CachedSolver
+from bayesmembrane.physics.curve_shelf import FILE, CurveShelf
 from bayesmembrane.physics.materials.gent import Gent
 from bayesmembrane.physics.materials.neo_hookean import NeoHookean
 from bayesmembrane.physics.materials.ogden import Ogden
-from bayesmembrane.physics.mechanics import solve
+from bayesmembrane.physics.mechanics import request, solve
 from bayesmembrane.physics.mechanics.solution import Curves
 from tests.physics.mechanics.films import FIFTEEN, INNER, MM, OUTER, RADII, every_material, prior_draws, silicone
 
@@ -41,14 +44,14 @@ def assert_same(one, other, rtol=1e-11):
 def test_cached_equals_direct(material, solver, tmp_path):
     question = {"prestretch": 1.02, "sensitivities": True, "solver": solver, **RADII}
     d = FIFTEEN[::4] * np.array([1, -1, 1, 1])
-    direct = solve(material, silicone(material), d, **question)
+    direct = solve(request(material, silicone(material), d, **question))
     for folder in (None, tmp_path):
         remembered = CachedSolver(folder)
-        assert_same(remembered(material, silicone(material), d, **question), direct)
-        assert_same(remembered(material, silicone(material), d, **question), direct)
+        assert_same(remembered(request(material, silicone(material), d, **question)), direct)
+        assert_same(remembered(request(material, silicone(material), d, **question)), direct)
         assert (remembered.tally.misses, remembered.tally.hits) == (1, 1)
     from_disk = CachedSolver(tmp_path)
-    assert_same(from_disk(material, silicone(material), d, **question), direct)
+    assert_same(from_disk(request(material, silicone(material), d, **question)), direct)
     assert (from_disk.tally.misses, from_disk.tally.from_disk) == (0, 1)
 
 
@@ -57,12 +60,12 @@ def test_modulus_thickness_and_size_are_hits_and_rescaled(material):
     p, scales = silicone(material), np.array(material.scales)
     thicker = np.where(scales == 1, 2 * p, p)
     remembered = CachedSolver()
-    remembered(material, p, FIFTEEN, sensitivities=True, **RADII)
+    remembered(request(material, p, FIFTEEN, sensitivities=True, **RADII))
     for films, size in ((thicker, 1.0), (p, 2.5), (thicker, 0.3)):
         question = {"inner_radius": size * INNER, "outer_radius": size * OUTER, "sensitivities": True}
         assert_same(
-            remembered(material, films, size * FIFTEEN, **question),
-            solve(material, films, size * FIFTEEN, **question),
+            remembered(request(material, films, size * FIFTEEN, **question)),
+            solve(request(material, films, size * FIFTEEN, **question)),
             rtol=1e-9,
         )
     assert (remembered.tally.misses, remembered.tally.hits) == (1, 3)
@@ -81,24 +84,30 @@ def test_everything_else_is_a_miss():
         (p, FIFTEEN, {**RADII, "sensitivities": True}),
     ]
     for films, deflection, options in questions:
-        assert_same(remembered(Gent, films, deflection, **options), solve(Gent, films, deflection, **options))
+        assert_same(
+            remembered(request(Gent, films, deflection, **options)), solve(request(Gent, films, deflection, **options))
+        )
     assert (remembered.tally.misses, remembered.tally.hits) == (len(questions), 0)
-    assert CachedSolver()(NeoHookean, [7.5], FIFTEEN, **RADII).ok.all(), "materials are told apart"
+    assert CachedSolver()(request(NeoHookean, [7.5], FIFTEEN, **RADII)).ok.all(), "materials are told apart"
 
 
 def test_a_posterior_of_one_modulus_solves_once():
     films = np.random.default_rng(0).uniform(1, 20, (300, 1))
     remembered = CachedSolver()
-    assert_same(remembered(NeoHookean, films, FIFTEEN, **RADII), solve(NeoHookean, films, FIFTEEN, **RADII), 1e-9)
+    assert_same(
+        remembered(request(NeoHookean, films, FIFTEEN, **RADII)),
+        solve(request(NeoHookean, films, FIFTEEN, **RADII)),
+        1e-9,
+    )
     assert (remembered.tally.misses, remembered.tally.hits, remembered.tally.bypassed) == (1, 299, 0)
 
 
 def test_the_tally_counts_what_was_done_since():
     remembered = CachedSolver()
-    remembered(NeoHookean, [7.5], FIFTEEN, **RADII)
+    remembered(request(NeoHookean, [7.5], FIFTEEN, **RADII))
     before = dataclasses.replace(remembered.tally)
-    remembered(NeoHookean, [[7.5], [8.5]], FIFTEEN, **RADII)
-    remembered(NeoHookean, [7.5], 0.5 * FIFTEEN, **RADII)
+    remembered(request(NeoHookean, [[7.5], [8.5]], FIFTEEN, **RADII))
+    remembered(request(NeoHookean, [7.5], 0.5 * FIFTEEN, **RADII))
     done = remembered.tally.since(before)
     assert (done.hits, done.misses, done.spared) == (2, 1, 1)
     cost = remembered.tally.seconds_solving / 2
@@ -109,58 +118,72 @@ def test_the_tally_counts_what_was_done_since():
 def test_draws_that_never_repeat_pass_by(tmp_path):
     films = prior_draws(Ogden, SMALL_BATCH + 1, seed=501)
     remembered = CachedSolver(tmp_path)
-    assert_same(remembered(Ogden, films, FIFTEEN, **RADII), solve(Ogden, films, FIFTEEN, **RADII))
+    assert_same(remembered(request(Ogden, films, FIFTEEN, **RADII)), solve(request(Ogden, films, FIFTEEN, **RADII)))
     assert (remembered.tally.misses, remembered.tally.bypassed) == (0, SMALL_BATCH + 1)
     assert not any(tmp_path.iterdir())
 
 
 def test_films_without_a_modulus_pass_by():
     remembered = CachedSolver()
-    assert not remembered(NeoHookean, [-1.0], FIFTEEN, **RADII).ok.any()
+    assert not remembered(request(NeoHookean, [-1.0], FIFTEEN, **RADII)).ok.any()
     assert remembered.tally.bypassed == 1
 
 
-@pytest.mark.parametrize("damage", [b"", b"PK\x03\x04 nonsense", None])
-def test_a_damaged_entry_is_rebuilt(damage, tmp_path):
-    direct = CachedSolver(tmp_path)(NeoHookean, [7.5], FIFTEEN, **RADII)
-    (entry,) = tmp_path.iterdir()
-    entry.write_bytes(entry.read_bytes()[: entry.stat().st_size // 2] if damage is None else damage)
+@pytest.mark.parametrize("damage", [b"PK\x03\x04 nonsense", None])
+def test_a_damaged_file_is_rebuilt(damage, tmp_path):
+    asked = request(NeoHookean, [7.5], FIFTEEN, **RADII)
+    direct = CachedSolver(tmp_path)(asked)
+    file = tmp_path / FILE
+    file.write_bytes(b"x" * 3000 + file.read_bytes()[3000:] if damage is None else damage)
     again = CachedSolver(tmp_path)
-    assert_same(again(NeoHookean, [7.5], FIFTEEN, **RADII), direct)
-    assert (again.tally.rebuilt, again.tally.misses) == (1, 1)
+    assert_same(again(asked), direct)
+    assert (again.tally.rebuilt > 0, again.tally.misses) == (True, 1)
     healthy = CachedSolver(tmp_path)
-    healthy(NeoHookean, [7.5], FIFTEEN, **RADII)
+    healthy(asked)
     assert (healthy.tally.rebuilt, healthy.tally.from_disk) == (0, 1)
 
 
-def test_an_entry_under_the_wrong_name_is_not_believed(tmp_path):
-    CachedSolver(tmp_path)(NeoHookean, [7.5], FIFTEEN, **RADII)
-    (one,) = tmp_path.iterdir()
-    CachedSolver(tmp_path)(NeoHookean, [7.5], FIFTEEN / 2, **RADII)
-    (other,) = set(tmp_path.iterdir()) - {one}
-    other.write_bytes(one.read_bytes())
-    again = CachedSolver(tmp_path)(NeoHookean, [7.5], FIFTEEN / 2, **RADII)
-    assert_same(again, solve(NeoHookean, [7.5], FIFTEEN / 2, **RADII))
+def test_a_damaged_entry_is_rebuilt(tmp_path):
+    asked = request(NeoHookean, [7.5], FIFTEEN, **RADII)
+    direct = CachedSolver(tmp_path)(asked)
+    with closing(sqlite3.connect(tmp_path / FILE)) as file, file:
+        file.execute("UPDATE curves SET entry = substr(entry, 1, 300)")
+    again = CachedSolver(tmp_path)
+    assert_same(again(asked), direct)
+    assert (again.tally.rebuilt, again.tally.misses) == (1, 1)
+
+
+def test_the_file_is_bounded_and_the_oldest_go(tmp_path):
+    shelf = CurveShelf(tmp_path, most_bytes=400_000)
+    entry = {"force": np.random.default_rng(0).standard_normal(2000)}
+    for i in range(60):
+        shelf.write(f"{i}".encode(), entry)
+        assert shelf.read(b"0") is not None, "what is asked for again and again stays"
+    assert shelf.path.stat().st_size < 450_000
+    assert shelf.read(b"1") is None
+    assert shelf.read(b"59") is not None
 
 
 def test_another_text_of_the_solver_is_a_miss(tmp_path, monkeypatch):
-    CachedSolver(tmp_path)(NeoHookean, [7.5], FIFTEEN, **RADII)
+    CachedSolver(tmp_path)(request(NeoHookean, [7.5], FIFTEEN, **RADII))
     monkeypatch.setattr(cache, "_source", lambda material: f"{material.name} of tomorrow")
     later = CachedSolver(tmp_path)
-    later(NeoHookean, [7.5], FIFTEEN, **RADII)
+    later(request(NeoHookean, [7.5], FIFTEEN, **RADII))
     assert later.tally.misses == 1
 
 
 WRITER = """
 import sys
+from contextlib import closing
 from pathlib import Path
 import numpy as np
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.materials.neo_hookean import NeoHookean
+from bayesmembrane.physics.mechanics import request
 cached = CachedSolver(Path(sys.argv[1]))
 for round in range(3):
     for i in range(1, 9):
-        cached(NeoHookean, [7.5], np.linspace(1e-3, 1e-3 * i, 5), inner_radius=0.01, outer_radius=0.035)
+        cached(request(NeoHookean, [7.5], np.linspace(1e-3, 1e-3 * i, 5), 0.01, 0.035))
 print(cached.tally.rebuilt, cached.tally.misses + cached.tally.hits)
 """
 
@@ -174,12 +197,11 @@ def test_several_processes_share_a_folder(tmp_path):
         out, fault = writer.communicate(timeout=120)
         assert (writer.returncode, fault) == (0, "")
         assert out.split() == ["0", "24"], "nothing was found half written"
-    assert len(list(tmp_path.glob("*.npz"))) == 8
-    assert not list(tmp_path.glob("*.part"))
+    assert [p.name for p in tmp_path.iterdir()] == [FILE]
     reader = CachedSolver(tmp_path)
     for i in range(1, 9):
         d = np.linspace(MM, i * MM, 5)
-        assert_same(reader(NeoHookean, [7.5], d, **RADII), solve(NeoHookean, [7.5], d, **RADII))
+        assert_same(reader(request(NeoHookean, [7.5], d, **RADII)), solve(request(NeoHookean, [7.5], d, **RADII)))
     assert (reader.tally.from_disk, reader.tally.misses) == (8, 0)
 
 
@@ -187,36 +209,45 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path):
     in_the_way = tmp_path / "curves"
     in_the_way.write_text("a file")
     with pytest.raises(StorageError) as fault:
-        CachedSolver(in_the_way / "deeper")(NeoHookean, [7.5], FIFTEEN, **RADII)
+        CachedSolver(in_the_way / "deeper")(request(NeoHookean, [7.5], FIFTEEN, **RADII))
     assert "curve cache cannot be written" in str(fault.value)
     assert str(in_the_way) in str(fault.value)
     assert str(fault.value).endswith(".")
 
 
-def test_a_full_disk_leaves_no_parts_behind(tmp_path, monkeypatch):
-    def full(*_, **__):
-        raise OSError(28, "No space left on device")
+def test_a_full_disk_is_a_sentence(tmp_path, monkeypatch):
+    class Full:
+        def __enter__(self):
+            return self
 
-    monkeypatch.setattr(cache.np, "savez", full)
-    with pytest.raises(StorageError, match="No space left"):
-        CachedSolver(tmp_path)(NeoHookean, [7.5], FIFTEEN, **RADII)
-    assert not list(tmp_path.iterdir())
+        def __exit__(self, *_):
+            return False
+
+        def close(self):
+            pass
+
+        def executescript(self, *_):
+            raise sqlite3.OperationalError("database or disk is full")
+
+    monkeypatch.setattr(curve_shelf.sqlite3, "connect", lambda *_, **__: Full())
+    with pytest.raises(StorageError, match="disk is full"):
+        CachedSolver(tmp_path)(request(NeoHookean, [7.5], FIFTEEN, **RADII))
 
 
 def test_memory_is_bounded(monkeypatch):
     monkeypatch.setattr(cache, "MOST_IN_MEMORY", 3)
     remembered = CachedSolver()
     for i in range(1, 6):
-        remembered(NeoHookean, [7.5], i * MM, **RADII)
-    remembered(NeoHookean, [7.5], 5 * MM, **RADII)
-    remembered(NeoHookean, [7.5], 1 * MM, **RADII)
+        remembered(request(NeoHookean, [7.5], i * MM, **RADII))
+    remembered(request(NeoHookean, [7.5], 5 * MM, **RADII))
+    remembered(request(NeoHookean, [7.5], 1 * MM, **RADII))
     assert (remembered.tally.hits, remembered.tally.misses) == (1, 6)
 
 
 def test_the_tally_tells_what_was_gained():
     remembered = CachedSolver()
     for _ in range(20):
-        remembered(Gent, silicone(Gent), FIFTEEN, **RADII)
+        remembered(request(Gent, silicone(Gent), FIFTEEN, **RADII))
     tally = remembered.tally
     assert (tally.hits, tally.misses) == (19, 1)
     assert tally.seconds_saved == pytest.approx(19 * tally.seconds_solving - tally.seconds_looking)
@@ -225,5 +256,5 @@ def test_the_tally_tells_what_was_gained():
 def test_a_hit_costs_less_than_a_solution():
     remembered = CachedSolver()
     for _ in range(300):
-        remembered(Ogden, silicone(Ogden), FIFTEEN, solver="shooting", **RADII)
+        remembered(request(Ogden, silicone(Ogden), FIFTEEN, solver="shooting", **RADII))
     assert remembered.tally.seconds_saved > 0

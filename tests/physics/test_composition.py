@@ -10,7 +10,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.physics.mechanics import Status, solve
+from bayesmembrane.physics.mechanics import Status, request, solve
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.physics.effects.protocols import FILMS, RIG, force, measured, path, staircase, timeless, two_speeds, vector
 
@@ -18,7 +18,7 @@ RADII = {"inner_radius": RIG.inner_radius, "outer_radius": RIG.outer_radius}
 
 
 def direct(material: str, d: np.ndarray, **options: float) -> np.ndarray:
-    return solve(materials()[material], FILMS[material], d, **RADII, **options).force[0]
+    return solve(request(materials()[material], FILMS[material], d, **RADII, **options)).force[0]
 
 
 @pytest.mark.parametrize("material", FILMS)
@@ -28,7 +28,7 @@ def test_without_effects_it_is_the_solver(material: str) -> None:
     f = Forward(h, m, m.deflection)
     assert f.composes
     p = f(vector(h), sensitivities=True)
-    curves = solve(materials()[material], FILMS[material], m.deflection, sensitivities=True, **RADII)
+    curves = solve(request(materials()[material], FILMS[material], m.deflection, sensitivities=True, **RADII))
     assert p.force == pytest.approx(curves.force, rel=1e-6)
     chained = np.einsum("bni,bik->bnk", curves.sensitivity, f.jacobian(vector(h)[None]))
     assert np.max(np.abs(p.sensitivity - chained) / np.max(np.abs(chained), axis=1, keepdims=True)) < 2e-4
@@ -196,14 +196,14 @@ def test_a_frame_that_yields_keeps_a_film_from_locking() -> None:
     m = measured(staircase((0.02, 0.04)))
     h = hypothesis("gent", ["machine_compliance"])
     limits = np.linspace(0.5, 4.0, 101)
-    every = solve(materials()["gent"], np.stack([np.full(101, 5.3), limits], 1), [0.04], **RADII)
+    every = solve(request(materials()["gent"], np.stack([np.full(101, 5.3), limits], 1), [0.04], **RADII))
     limit = limits[np.argmax(every.ok[:, 0]) - 1]
     film = materials()["gent"].to_coordinates([5.3, limit])
     stiff, soft = (Forward(h, m, m.deflection)(np.append(film, c)) for c in (0.0, 2e-4))
     assert not stiff.ok[0]
     assert soft.ok[0]
     delta = m.deflection - 2e-4 * soft.force[0]
-    alone = solve(materials()["gent"], [5.3, limit], delta, **RADII).force[0]
+    alone = solve(request(materials()["gent"], [5.3, limit], delta, **RADII)).force[0]
     assert soft.force[0] == pytest.approx(alone, rel=1e-5)
 
 

@@ -6,9 +6,10 @@ import pytest
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import materials
+from bayesmembrane.physics.convexity import MODES
 from bayesmembrane.physics.forward import GAPS, Forward, beyond, predict
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.physics.mechanics import solve
+from bayesmembrane.physics.mechanics import Curves, Request, request, solve
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 
@@ -45,7 +46,7 @@ def test_slopes_are_those_of_the_force(name: str) -> None:
 @pytest.mark.parametrize("name", materials())
 def test_forward_is_the_solver(name: str) -> None:
     p = predict(hypothesis(name), coordinates(name), CURVE)
-    direct = solve(materials()[name], FILMS[name], CURVE.deflection, inner_radius=0.012, outer_radius=0.030)
+    direct = solve(request(materials()[name], FILMS[name], CURVE.deflection, inner_radius=0.012, outer_radius=0.030))
     assert p.force == pytest.approx(direct.force, rel=1e-9)
     assert np.all(p.ok)
 
@@ -53,16 +54,16 @@ def test_forward_is_the_solver(name: str) -> None:
 def test_one_modulus_is_solved_once() -> None:
     calls = []
 
-    def counting(*args: object, **options: object) -> object:
-        calls.append(args)
-        return solve(*args, **options)  # type: ignore[arg-type]
+    def counting(asked: Request) -> Curves:
+        calls.append(asked)
+        return solve(asked)
 
-    forward = Forward(hypothesis("neo_hookean"), CURVE, CURVE.deflection, counting)  # type: ignore[arg-type]
+    forward = Forward(hypothesis("neo_hookean"), CURVE, CURVE.deflection, counting)
     x = np.linspace(1.0, 4.0, 50)[:, None]
     force = np.concatenate([forward(x).force, forward(x[::-1], sensitivities=True).force[::-1]])
     assert len(calls) <= 2
     direct = solve(
-        materials()["neo_hookean"], 0.5 * np.exp(x), CURVE.deflection, inner_radius=0.012, outer_radius=0.030
+        request(materials()["neo_hookean"], 0.5 * np.exp(x), CURVE.deflection, inner_radius=0.012, outer_radius=0.030)
     ).force
     assert force == pytest.approx(np.concatenate([direct, direct]), rel=1e-9)
 
@@ -99,9 +100,10 @@ def test_locked_films_say_so() -> None:
 def test_every_mode_has_a_margin() -> None:
     h = hypothesis("yeoh")
     p = predict(h, coordinates("yeoh"), CURVE)
-    assert p.margin("none", h)[0] == np.inf
-    assert p.margin("reached", h)[0] <= p.margin("elliptic", h)[0] + 1e-12
-    assert np.isfinite(p.margin("box", h)[0])
+    margin = {n: m.margin(p, h.material)[0] for n, m in MODES.items()}
+    assert margin["none"] == np.inf
+    assert margin["reached"] <= margin["elliptic"] + 1e-12
+    assert np.isfinite(margin["box"])
 
 
 def test_another_rig_is_refused() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bayesmembrane.ground.registry import material
-from bayesmembrane.physics.mechanics import SOLVERS, force_curve, solve
+from bayesmembrane.physics.mechanics import SOLVERS, force_curve, request, solve
 
 DEFLECTIONS = np.array([0.5, 2.0, 5.0, 10.0, 20.0, 35.1, 60.0, 91.5]) * 1e-3
 # N, as printed (six digits, trailing zeros left out); parameters in N/m, exponents and Gent's limit dimensionless.
@@ -47,13 +47,15 @@ def half_a_unit(printed: str) -> float:
 @pytest.mark.parametrize(("name", "parameters", "prestretch", "printed"), TABLE, ids=IDS)
 def test_forces_round_to_the_printed_ones(name, parameters, prestretch, printed, solver):
     curves = solve(
-        material(name),
-        parameters,
-        DEFLECTIONS,
-        inner_radius=0.010,
-        outer_radius=0.035,
-        prestretch=prestretch,
-        solver=solver,
+        request(
+            material(name),
+            parameters,
+            DEFLECTIONS,
+            inner_radius=0.010,
+            outer_radius=0.035,
+            prestretch=prestretch,
+            solver=solver,
+        )
     )
     assert curves.ok.all()
     for force, text in zip(curves.force[0], printed.split(), strict=True):

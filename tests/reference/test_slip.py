@@ -6,7 +6,8 @@ from scipy.integrate import solve_bvp
 from scipy.optimize import minimize_scalar
 
 from bayesmembrane.ground.registry import material
-from bayesmembrane.physics.mechanics.film_law import Gap, film_law
+from bayesmembrane.physics.mechanics import request
+from bayesmembrane.physics.mechanics.film_law import film_law
 
 R1, R2 = 0.010, 0.035
 YEOH, FILM = material("yeoh"), np.array([8.0, -0.2, 0.03])
@@ -46,7 +47,7 @@ def slipped(slip: float) -> np.ndarray:
 
 def test_excess_length_stands_for_slip_to_a_tenth_of_its_effect() -> None:
     one = np.ones(1)
-    law, _ = film_law(YEOH, FILM[None], Gap(R1, R2), one, 0.08 * one, np.empty(0))
+    law, _ = film_law(request(YEOH, FILM, [0.08], R1, R2), 0.08 * one)
     at_rest = slipped(0.0)
     assert at_rest == pytest.approx(law(D[None])[0][0], rel=1e-6)
     for slip in (2.5e-4, 1e-3):

@@ -14,8 +14,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.materials.yeoh import Yeoh
-from bayesmembrane.physics.mechanics import Status, fallback
-from bayesmembrane.physics.mechanics.problem import Problem
+from bayesmembrane.physics.mechanics import Request, Status, fallback
 from bayesmembrane.physics.mechanics.ritz import kernels as ritz_kernels
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
 from bayesmembrane.physics.mechanics.shooting import solver as shooting
@@ -61,7 +60,7 @@ class Line:
     off: tuple[Off, ...]
 
 
-def admissible(material: type[Material]) -> tuple[Problem, Curves, int]:
+def admissible(material: type[Material]) -> tuple[Request, Curves, int]:
     """The first `DRAWS` draws from the prior of which no state shows P11 <= 0, P22 <= 0 or a loss of stability."""
     parameters, found, drawn = np.empty((0, len(material.field_names()))), [], 0
     while len(parameters) < DRAWS:
@@ -86,7 +85,7 @@ def _joined(parts: Sequence[Curves]) -> Curves:
     return replace(first, **{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
 
 
-def finest(question: Problem, films: NDArray[np.intp]) -> Array:
+def finest(question: Request, films: NDArray[np.intp]) -> Array:
     """Forces (K, N) of ``films`` with the finest basis alone, followed from the flat film; nan where it is lost."""
     part = asked(question.material, question.parameters[films], AT)
     result, _ = ritz.follow(part, part.scaled, FINEST)
@@ -120,7 +119,7 @@ def examine(material: type[Material]) -> Line:
     )
 
 
-def _off(question: Problem, curves: Curves, tight: Curves, error: Array) -> list[Off]:
+def _off(question: Request, curves: Curves, tight: Curves, error: Array) -> list[Off]:
     films = np.flatnonzero(np.any(error > EXACT, axis=1))
     if not films.size:
         return []

@@ -32,7 +32,7 @@ def covered(found: Diagnosis, candidate: Candidate, measurement: Measurement, da
             out[name] = _within(values, data.truth["parameters"][name])
     at = np.array(PLACES) * data.path.largest
     radii = {"inner_radius": data.film.inner, "outer_radius": data.film.outer}
-    forces = api.solve(material, films, at, **radii).force
+    forces = api.solve(api.request(material, films, at, **radii)).force
     for name, values, truth in zip(("force at half", "force at the end"), forces.T, data.film.force(at), strict=True):
         out[name] = _within(values, float(truth))
     return out

@@ -41,7 +41,14 @@ def other_loss(m: Measurement, c1: float, c2: float) -> float:
     """|F - y| by shooting."""
     p = np.array([c1, c2])
     force = api.solve(
-        hypothesis("mooney_rivlin").material, p, m.deflection, inner_radius=0.010, outer_radius=0.035, solver="shooting"
+        api.request(
+            hypothesis("mooney_rivlin").material,
+            p,
+            m.deflection,
+            inner_radius=0.010,
+            outer_radius=0.035,
+            solver="shooting",
+        )
     ).force[0]
     return float(np.linalg.norm(force - m.force))
 
@@ -187,7 +194,7 @@ def test_valleys_with_and_without_an_effect_lie_beside_each_other(film: Film, tm
     """A film of one modulus, measured from a zero that is off: only with the offset is its modulus found."""
     plain = film("neo_hookean", (7.0,), end=0.03, points=8, noise=0.001)
     at = plain.deflection + 1e-3
-    force = api.solve(material("neo_hookean"), [7.0], at, inner_radius=0.01, outer_radius=0.035).force[0]
+    force = api.solve(api.request(material("neo_hookean"), [7.0], at, 0.01, 0.035)).force[0]
     moved = replace(plain, force=force * (1 + 1e-3 * (-1.0) ** np.arange(8)))
     found = valleys_beside(moved, hypothesis("neo_hookean", ["zero_offset"], convexity="none"))
     (with_,), (without,), (pair,) = found.added.ranges, found.without.ranges, found.pairs

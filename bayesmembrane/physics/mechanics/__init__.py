@@ -1,6 +1,18 @@
 """Forces of a clamped annular membrane, by two independent principles."""
 
-from bayesmembrane.physics.mechanics.api import SOLVERS, force_curve, profile, solve
+from bayesmembrane.physics.mechanics.api import SOLVERS, Request, Spared, force_curve, profile, request, solve
 from bayesmembrane.physics.mechanics.solution import Curves, Note, Profile, Status
 
-__all__ = ["SOLVERS", "Curves", "Note", "Profile", "Status", "force_curve", "profile", "solve"]
+__all__ = [
+    "SOLVERS",
+    "Curves",
+    "Note",
+    "Profile",
+    "Request",
+    "Spared",
+    "Status",
+    "force_curve",
+    "profile",
+    "request",
+    "solve",
+]

@@ -9,7 +9,7 @@ that meets value, slope (from the solver) and second derivative (from neighbours
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any
@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.materials.neo_hookean import NeoHookean
-from bayesmembrane.physics.mechanics.api import solve
+from bayesmembrane.physics.mechanics.api import Request, Solve, request, solve
 from bayesmembrane.physics.mechanics.solution import Curves, Status
 
 WIDTH = 1.6  # of the gap: knots are dense below, and logarithmic above
@@ -33,9 +32,6 @@ TOLERANCE = 1e-6
 GAIN = 100.0
 WORST = 1e-4
 SMALL = 1e-3  # of the largest force: smaller ones are known to that part of the tolerance
-
-
-Solver = Callable[..., Curves]
 
 
 @dataclass(frozen=True)
@@ -53,7 +49,7 @@ class Gap:
         and 2 G d delta^3 / L^3, both times its width.
         """
         small = np.array([1e-2 * self.inner_radius])
-        curve = solve(NeoHookean, [0.5], small, inner_radius=self.inner_radius, outer_radius=self.outer_radius)
+        curve = solve(request(NeoHookean, [0.5], small, self.inner_radius, self.outer_radius))
         cubic = float(curve.force[0, 0] / small[0] ** 3)
         return float(2 * np.pi / np.log(self.outer_radius / self.inner_radius) * 2 / (cubic * self.length**2))
 
@@ -124,28 +120,20 @@ class FilmLaw:
         return replace(self, **wide)
 
 
-def film_law(
-    material: type[Material],
-    parameters: Array,
-    gap: Gap,
-    prestretch: Array,
-    end: Array,
-    extra: Array,
-    solver: Solver = solve,
-    **options: Any,
-) -> tuple[FilmLaw, Curves]:
-    """The law of films (B, n) up to deflections ``end`` (B,) m, with as many knots as 1e-6 asks for.
+def film_law(asked: Request, end: Array, solver: Solve = solve) -> tuple[FilmLaw, Curves]:
+    """The law of the B films of ``asked`` up to deflections ``end`` (B,) m, with as many knots as 1e-6 asks for.
 
-    The curves are those at the first knots and at deflections ``extra`` (E,), which show whether the films are convex.
-    ``options`` go to the solver. A film that no number of knots describes to `WORST` has no force from there on.
+    The curves are those at the first knots and at the deflections of ``asked``, none or more, which show whether the
+    films are convex. A film that no number of knots describes to `WORST` has no force from there on.
     """
-    radii = {"inner_radius": gap.inner_radius, "outer_radius": gap.outer_radius}
-    rows = np.arange(len(parameters))
+    gap = Gap(asked.inner_radius, asked.outer_radius)
+    rows = np.arange(len(asked.parameters))
     found = shown = None
     for level, count in enumerate(KNOTS):
-        at, l0 = knots(gap, end[rows], count), prestretch[rows]
-        every = np.hstack([at, np.broadcast_to(extra, (len(at), extra.size))]) if shown is None else at
-        curves = solver(material, parameters[rows], every, prestretch=l0, **radii, **options)
+        some = asked.of(rows)
+        at, l0 = knots(gap, end[rows], count), some.prestretch
+        every = np.hstack([at, some.deflection]) if shown is None else at
+        curves = solver(replace(some, deflection=every))
         shown = curves if shown is None else shown
         force, slope = curves.force[:, :count], curves.slope[:, :count]
         part = _tested(law(gap, l0, at, force, slope, curves.status[:, :count]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayesmembrane.physics.materials.base import Material
-from bayesmembrane.physics.mechanics.problem import problem
+from bayesmembrane.physics.mechanics.request import request
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
 from bayesmembrane.physics.mechanics.solution import Profile, Status
 
@@ -25,7 +25,7 @@ def profile(
     and tensions from their derivatives. All arrays are nan, and ``status`` says why, where the film has no solution.
     Raises `SettingsError` for radii or pre-stretches that make no sense.
     """
-    asked = problem(type(material), material.vector, abs(deflection), inner_radius, outer_radius, prestretch)
+    asked = request(type(material), material.vector, abs(deflection), inner_radius, outer_radius, prestretch=prestretch)
     curves = ritz.solve(asked)
     status = Status(int(curves.status[0, 0]))
     t = np.linspace(0.0, np.log(asked.ratio), points)

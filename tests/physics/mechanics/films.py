@@ -8,7 +8,7 @@ import pytest
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.materials.base import Material
-from bayesmembrane.physics.mechanics.problem import Problem, problem
+from bayesmembrane.physics.mechanics.request import Request, request
 
 INNER, OUTER = 0.010, 0.035
 RADII = {"inner_radius": INNER, "outer_radius": OUTER}
@@ -39,5 +39,5 @@ def prior_draws(material: type[Material], count: int, seed: int) -> Array:
     return material.from_coordinates(x).T
 
 
-def asked(material: type[Material], parameters, deflection, prestretch=1.0, ratio=3.5) -> Problem:
-    return problem(material, parameters, deflection, INNER, ratio * INNER, prestretch)
+def asked(material: type[Material], parameters, deflection, prestretch=1.0, ratio=3.5) -> Request:
+    return request(material, parameters, deflection, INNER, ratio * INNER, prestretch=prestretch)

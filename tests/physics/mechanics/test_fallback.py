@@ -9,7 +9,7 @@ import pytest
 
 from bayesmembrane.physics.materials.ogden import Ogden
 from bayesmembrane.physics.materials.yeoh import Yeoh
-from bayesmembrane.physics.mechanics import Status, fallback, solve
+from bayesmembrane.physics.mechanics import Status, fallback, request, solve
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
 from bayesmembrane.physics.mechanics.shooting import solver as shooting
 from tests.physics.mechanics.films import FIFTEEN, RADII, asked, every_material, prior_draws, silicone
@@ -19,21 +19,21 @@ FAILED = (Status.UNRESOLVED, Status.ITERATION_LIMIT)
 
 @every_material
 def test_nothing_changes_where_ritz_is_content(material):
-    question = asked(material, silicone(material), FIFTEEN)
-    one, other = fallback.solve(question, True), ritz.solve(question, True)
+    question = replace(asked(material, silicone(material), FIFTEEN), sensitivities=True)
+    one, other = fallback.solve(question), ritz.solve(question)
     for name in ("force", "sensitivity", "status", "slope"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
 @pytest.mark.parametrize("material", [Ogden, Yeoh])
 def test_only_failed_deflections_are_replaced_and_by_the_forces_of_shooting(material, monkeypatch):
-    question = asked(material, prior_draws(material, 8, seed=401), FIFTEEN)
-    honest = ritz.solve(question, True)
+    question = replace(asked(material, prior_draws(material, 8, seed=401), FIFTEEN), sensitivities=True)
+    honest = ritz.solve(question)
     spoilt = honest.status.copy()
     spoilt[2, 3], spoilt[5, 10:] = Status.UNRESOLVED, Status.ITERATION_LIMIT
     broken = replace(honest, status=spoilt, force=np.where(spoilt == Status.OK, honest.force, np.nan))
     monkeypatch.setattr(ritz, "solve", lambda *_: broken)
-    mended, shot = fallback.solve(question, True), shooting.solve(question, True)
+    mended, shot = fallback.solve(question), shooting.solve(question)
     touched = np.isin(spoilt, FAILED)
     taken = touched & np.isin(shot.status, (Status.OK, Status.NOT_ELLIPTIC))
     np.testing.assert_array_equal(mended.force[taken], shot.force[taken])
@@ -53,4 +53,6 @@ def test_fewer_deflections_are_flagged_than_by_ritz_alone(material):
 
 def test_it_is_what_solve_does_by_default():
     p = prior_draws(Yeoh, 20, seed=403)
-    np.testing.assert_array_equal(solve(Yeoh, p, FIFTEEN, **RADII).force, fallback.solve(asked(Yeoh, p, FIFTEEN)).force)
+    np.testing.assert_array_equal(
+        solve(request(Yeoh, p, FIFTEEN, **RADII)).force, fallback.solve(asked(Yeoh, p, FIFTEEN)).force
+    )

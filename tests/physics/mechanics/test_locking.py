@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from bayesmembrane.physics.materials.gent import Gent
-from bayesmembrane.physics.mechanics import Status, solve
+from bayesmembrane.physics.mechanics import Status, request, solve
 from bayesmembrane.physics.mechanics.locking import locking_deflection
 from tests.physics.mechanics.films import INNER, RADII
 
@@ -60,7 +60,7 @@ def test_limits():
 def test_force_grows_without_bound_towards_the_locking_deflection(jm, l0):
     lock = float(locking_deflection(jm, l0, 3.5)) * INNER / l0
     gaps = np.array([4e-3, 2e-3, 1e-3])
-    force = solve(Gent, [5.0, jm], lock * (1 - gaps), prestretch=l0, **RADII).force[0]
+    force = solve(request(Gent, [5.0, jm], lock * (1 - gaps), prestretch=l0, **RADII)).force[0]
     assert force[1:] / force[:-1] == pytest.approx([2.0, 2.0], rel=0.01), "the force goes like 1/(lock - delta)"
     # The extrapolated pole of 1/F is the locking deflection.
     a, b = 1 / force[1], 1 / force[2]
@@ -72,13 +72,13 @@ def test_force_grows_without_bound_towards_the_locking_deflection(jm, l0):
 def test_locked_is_named_at_the_exact_deflection(jm, l0, solver):
     lock = float(locking_deflection(jm, l0, 3.5)) * INNER / l0
     d = lock * np.array([0.5, 0.9, 0.99, 1 - 1e-3, 1 - 1e-4, 1 + 1e-7, 1.1, 3.0])
-    status = solve(Gent, [5.0, jm], d, prestretch=l0, solver=solver, **RADII).status[0]
+    status = solve(request(Gent, [5.0, jm], d, prestretch=l0, solver=solver, **RADII)).status[0]
     assert status.tolist() == [Status.OK] * 5 + [Status.LOCKED] * 3
 
 
 def test_every_film_of_a_batch_locks_on_its_own():
     jm = np.array([1.0, 17.42, 1e3, 0.01])
-    curves = solve(Gent, np.stack([np.full(4, 5.0), jm], axis=1), np.array([0.05, 0.10, 0.11]), **RADII)
+    curves = solve(request(Gent, np.stack([np.full(4, 5.0), jm], axis=1), np.array([0.05, 0.10, 0.11]), **RADII))
     lock = locking_deflection(jm, 1.0, 3.5) * INNER
     np.testing.assert_array_equal(curves.status == Status.LOCKED, curves.deflection >= lock[:, None])
     assert curves.ok.sum() == np.sum(curves.deflection < lock[:, None])

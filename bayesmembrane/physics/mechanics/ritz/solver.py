@@ -14,7 +14,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics.compiled import bind
 from bayesmembrane.physics.mechanics.locking import locking_deflection
-from bayesmembrane.physics.mechanics.problem import Problem, extensibility
+from bayesmembrane.physics.mechanics.request import Request, Spared, extensibility
 from bayesmembrane.physics.mechanics.ritz import kernels
 from bayesmembrane.physics.mechanics.ritz.simd import LANES
 from bayesmembrane.physics.mechanics.solution import Curves, Note, Status
@@ -97,18 +97,18 @@ def _prolongation(ratio: float, level: int) -> Array:
     return np.asarray(np.linalg.lstsq(new.T, old.T)[0])
 
 
-def shape(problem: Problem, t: Array) -> tuple[Array, Array, Array, Array]:
+def shape(request: Request, t: Array) -> tuple[Array, Array, Array, Array]:
     """(l2, u, w, h) of the first film at its first deflection, at t = ln(R/R1) (M,).
 
     u = l1 cos(theta), w = l1 sin(theta), and the rise h from the disc outwards in units of R1/l0. nan if unresolved.
     """
-    one = replace(problem, parameters=problem.parameters[:1], prestretch=problem.prestretch[:1])
-    d = np.where(problem.deflection[:1, :1] == 0, SMALLEST, problem.scaled[:1, :1])
+    one = replace(request, parameters=request.parameters[:1], prestretch=request.prestretch[:1])
+    d = np.where(request.deflection[:1, :1] == 0, SMALLEST, request.scaled[:1, :1])
     for level, (elements, bubbles) in enumerate(LEVELS):
         result, unknowns = follow(one, d, level, wishes=(False, True, False))
         if result[0, kernels.STATUS, 0] == Status.OK:
-            span, l0 = np.log(problem.ratio), problem.prestretch[0]
-            phi, slope = _shape_functions(problem.ratio, elements, bubbles, t)
+            span, l0 = np.log(request.ratio), request.prestretch[0]
+            phi, slope = _shape_functions(request.ratio, elements, bubbles, t)
             a, b = unknowns[0, 0::2, 0], unknowns[0, 1::2, 0]
             l2 = l0 + a @ phi
             return l2, l2 + a @ slope, np.exp(-t) * (d[0, 0] / span + b @ slope), d[0, 0] * t / span + b @ phi
@@ -187,7 +187,7 @@ def _path(d: Array, stride: float) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def follow(
-    problem: Problem, d: Array, level: int, wishes: tuple[bool, bool, bool] = (False, False, False)
+    request: Request, d: Array, level: int, wishes: tuple[bool, bool, bool] = (False, False, False)
 ) -> tuple[Array, Array]:
     """Continue B films from the flat film through ascending scaled deflections d (B, N).
 
@@ -196,15 +196,15 @@ def follow(
     `ritz_kernels.follow`.
     """
     grid, keep = _path(d, STRIDE / 2**level)
-    start = np.zeros((d.shape[0], 2 * basis(problem.ratio, *LEVELS[level]).functions))
-    return _run(problem, grid, keep, start, level, wishes)
+    start = np.zeros((d.shape[0], 2 * basis(request.ratio, *LEVELS[level]).functions))
+    return _run(request, grid, keep, start, level, wishes)
 
 
 def _run(
-    problem: Problem, grid: Array, keep: NDArray[np.bool_], start: Array, level: int, wishes: tuple[bool, bool, bool]
+    request: Request, grid: Array, keep: NDArray[np.bool_], start: Array, level: int, wishes: tuple[bool, bool, bool]
 ) -> tuple[Array, Array]:
     """`kernels.follow` over deflections grid (M, B) from unknowns start (B, 2n)."""
-    shape, count, fields = basis(problem.ratio, *LEVELS[level]), grid.shape[1], problem.parameters.shape[1]
+    shape, count, fields = basis(request.ratio, *LEVELS[level]), grid.shape[1], request.parameters.shape[1]
     blocks, n = -(-count // LANES), int(np.count_nonzero(keep))
     pad = np.minimum(np.arange(blocks * LANES), count - 1)
 
@@ -212,11 +212,11 @@ def _run(
         """(R, B) -> (blocks, R, LANES), the last film repeated."""
         return np.ascontiguousarray(rows[:, pad].reshape(len(rows), blocks, LANES).transpose(1, 0, 2))
 
-    gd = np.broadcast_to(_shear_modulus(problem), (1, count))
+    gd = np.broadcast_to(_shear_modulus(request), (1, count))
     result = np.empty((blocks, LANES, kernels.RESULTS + (fields if wishes[0] else 0), n))
     unknowns = np.empty((blocks, LANES, 2 * shape.functions, n if any(wishes[1:]) else 0))
-    rows = (blocked(v) for v in (problem.parameters.T, gd, problem.prestretch[None], grid, start.T))
-    compiled(problem.material).follow(*rows, shape.tables, LIMITS, keep, wishes, result, unknowns)
+    rows = (blocked(v) for v in (request.parameters.T, gd, request.prestretch[None], grid, start.T))
+    compiled(request.material).follow(*rows, shape.tables, LIMITS, keep, wishes, result, unknowns)
     padded = blocks * LANES
     return (
         result.reshape(padded, *result.shape[2:])[:count],
@@ -224,15 +224,15 @@ def _run(
     )
 
 
-def _shear_modulus(problem: Problem) -> Array:
-    return np.asarray(problem.material.shear_modulus(problem.parameters.T), dtype=float)
+def _shear_modulus(request: Request) -> Array:
+    return np.asarray(request.material.shear_modulus(request.parameters.T), dtype=float)
 
 
-def _films(problem: Problem, films: NDArray[np.intp]) -> Problem:
-    return replace(problem, parameters=problem.parameters[films], prestretch=problem.prestretch[films])
+def _films(request: Request, films: NDArray[np.intp]) -> Request:
+    return replace(request, parameters=request.parameters[films], prestretch=request.prestretch[films])
 
 
-def solve(problem: Problem, sensitivities: bool = False, only: str = "all", exact_up_to: float = np.inf) -> Curves:
+def solve(request: Request) -> Curves:
     """Force curves from the minimum of the stored energy,
 
         F = dE/d(delta),  E(delta) = min over the deformation of 2 pi int R^2 W dt.
@@ -242,27 +242,26 @@ def solve(problem: Problem, sensitivities: bool = False, only: str = "all", exac
     are followed again with these and with shorter steps. A path that ends at the same deflection for two bases ends
     physically, and is given its reason; what is left is flagged.
 
-    ``only`` "convex" or "elliptic" spares this to films that a resolved state shows not to be so (a prior rules them
-    out whatever their other forces are): what is not resolved at first stays flagged. Beyond the deflection
-    ``exact_up_to`` (m) states only show whether the film stays stable and convex: forces there are good to 1e-3.
+    Of a film that is spared (a prior rules it out whatever its other forces are) what is not resolved at first stays
+    flagged. Beyond the deflection ``exact_up_to`` states only show whether the film stays stable and convex.
     """
-    d, back = _ascending(np.where(problem.deflection == 0, SMALLEST, problem.scaled))
-    bound = extensibility(problem)
+    d, back = _ascending(np.where(request.deflection == 0, SMALLEST, request.scaled))
+    bound = extensibility(request)
     locked = np.zeros(d.shape, np.bool_)
     if np.any(bound < np.inf):
-        locked = d >= locking_deflection(bound, problem.prestretch, problem.ratio)[:, None]
+        locked = d >= locking_deflection(bound, request.prestretch, request.ratio)[:, None]
         # A locked deflection is replaced by the last one that can be reached; its answer is not used.
         reach = np.max(np.where(locked, 0.0, d), axis=1, keepdims=True)
         d = np.where(locked, np.where(reach > 0, reach, 1e-3), d)
-    loose = d > exact_up_to * (1 + 1e-9) * problem.prestretch[:, None] / problem.inner_radius
-    search = _Search(problem, d, ~locked, sensitivities, only, loose)
+    loose = d > request.exact_up_to * (1 + 1e-9) * request.prestretch[:, None] / request.inner_radius
+    search = _Search(request, d, ~locked, loose)
     if np.any(search.status) or np.any(locked):
         for level in range(1, len(LEVELS)):
             if not search.improve(level):
                 break
         _pass_on(search.status)
         search.status[locked] = Status.LOCKED
-    return _curves(problem, search, back)
+    return _curves(request, search, back)
 
 
 def _nearly_resolved(result: Array, d: Array) -> NDArray[np.bool_]:
@@ -271,11 +270,11 @@ def _nearly_resolved(result: Array, d: Array) -> NDArray[np.bool_]:
     return np.asarray(even & (result[:, kernels.GAIN] < LOOSE_GAIN * np.abs(result[:, kernels.FORCE] * d)))
 
 
-def _ruled_out(problem: Problem, result: Array, status: NDArray[np.int8], only: str) -> NDArray[np.bool_]:
-    """(B,) True for films with a resolved state that is not ``only``: "convex", "elliptic" or "all" (never)."""
-    if only == "all":
+def _ruled_out(result: Array, status: NDArray[np.int8], spare: Spared) -> NDArray[np.bool_]:
+    """(B,) True for films with a resolved state that shows them to be such as are spared."""
+    if spare is Spared.NONE:
         return np.zeros(len(result), np.bool_)
-    margin = result[:, kernels.CONVEX if only == "convex" else kernels.ELLIPTIC]
+    margin = result[:, kernels.CONVEX if spare is Spared.NOT_CONVEX else kernels.ELLIPTIC]
     return np.asarray(np.any((status == Status.OK) & (margin < -RULED_OUT), axis=1))
 
 
@@ -295,21 +294,18 @@ class _Search:
 
     def __init__(
         self,
-        problem: Problem,
+        request: Request,
         d: Array,
         wanted: NDArray[np.bool_],
-        sensitivities: bool,
-        only: str = "all",
         loose: NDArray[np.bool_] | None = None,
     ) -> None:
-        self.problem, self.d = problem, d
-        self.only = only
-        self.wishes = sensitivities, False, True
-        self.result, unknowns = follow(problem, d, 0, self.wishes)
+        self.request, self.d = request, d
+        self.wishes = request.sensitivities, False, True
+        self.result, unknowns = follow(request, d, 0, self.wishes)
         self.status = self.result[:, kernels.STATUS].astype(np.int8)
         if loose is not None:
             self.status[loose & (self.status == Status.UNRESOLVED) & _nearly_resolved(self.result, d)] = Status.OK
-        self.wanted = wanted & ~_ruled_out(problem, self.result, self.status, only)[:, None]
+        self.wanted = wanted & ~_ruled_out(self.result, self.status, request.spare)[:, None]
         self.ends = np.full(len(d), np.nan)
         self.rough: _Rough = self._nothing(0)
         if np.any(self.status):
@@ -341,9 +337,9 @@ class _Search:
         film, column, unknowns = self.rough
         if not film.size:
             return self._nothing(level)
-        ratio, d = self.problem.ratio, self.d[film, column]
+        ratio, d = self.request.ratio, self.d[film, column]
         start = (_prolongation(ratio, level - 1) @ unknowns.reshape(film.size, -1, 2)).reshape(film.size, -1)
-        result, unknowns = _run(_films(self.problem, film), d[None], np.ones(1, np.bool_), start, level, self.wishes)
+        result, unknowns = _run(_films(self.request, film), d[None], np.ones(1, np.bool_), start, level, self.wishes)
         verdict = result[:, kernels.STATUS, 0].astype(np.int8)
         still = verdict == Status.UNRESOLVED
         # A rough state that leads to no stable one lay astray: its film is followed again.
@@ -355,7 +351,7 @@ class _Search:
         """Whole films from the start, for the sake of their doubtful columns; returns those that are rough now."""
         if not films.size:
             return self._nothing(level)
-        result, unknowns = follow(_films(self.problem, films), self.d[films], level, self.wishes)
+        result, unknowns = follow(_films(self.request, films), self.d[films], level, self.wishes)
         verdict = result[:, kernels.STATUS].astype(np.int8)
         self._explain(films, verdict, level)
         at, column = np.nonzero(doubtful)
@@ -366,7 +362,7 @@ class _Search:
 
     def _nothing(self, level: int) -> _Rough:
         none = np.empty(0, np.intp)
-        return none, none, np.empty((0, 2 * basis(self.problem.ratio, *LEVELS[level]).functions))
+        return none, none, np.empty((0, 2 * basis(self.request.ratio, *LEVELS[level]).functions))
 
     def _explain(self, films: NDArray[np.intp], verdict: NDArray[np.int8], level: int) -> None:
         """Name the reason, in ``verdict`` (K, N) of K films, of paths that end where they did with the basis before."""
@@ -376,22 +372,22 @@ class _Search:
         self.ends[films] = np.nan
         if not some.size:
             return
-        if self.only != "all" and level > 1:
+        if self.request.spare is not Spared.NONE and level > 1:
             # Lost by several bases: such a film is worth no more effort where a prior is about to judge it.
             verdict[lost] = Status.INDEFINITE
             return
-        problem, d = _films(self.problem, films[some]), self.d[films[some]]
+        request, d = _films(self.request, films[some]), self.d[films[some]]
         first, rows = np.argmax(lost[some], axis=1), np.arange(some.size)
         high = d[rows, first]
         low = np.where(first > 0, d[rows, np.maximum(first - 1, 0)], high * 0.01)
-        ends, bent, convex, elliptic = _path_end(problem, low, high, level)
+        ends, bent, convex, elliptic = _path_end(request, low, high, level)
         self.ends[films[some]] = ends
         # Chains that lock end the path by stiffening: that is no loss of stability.
-        same = (np.abs(ends - before) < SAME_END * ends) & np.isinf(extensibility(problem))
+        same = (np.abs(ends - before) < SAME_END * ends) & np.isinf(extensibility(request))
         reason = np.where(bent, Status.NOT_ELLIPTIC, Status.INDEFINITE).astype(np.int8)
-        if self.only != "all" and level > 0:
+        if self.request.spare is not Spared.NONE and level > 0:
             # What lies beyond is reached, if at all, through states that rule the film out.
-            passed = (convex if self.only == "convex" else elliptic) < -RULED_OUT_ON_THE_WAY
+            passed = (convex if self.request.spare is Spared.NOT_CONVEX else elliptic) < -RULED_OUT_ON_THE_WAY
             same, reason = same | passed, np.where(passed, Status.NOT_ELLIPTIC, reason)
         for i in np.flatnonzero(same):
             verdict[some[i], lost[some[i]]] = reason[i]
@@ -406,7 +402,7 @@ def _pass_on(status: NDArray[np.int8]) -> None:
     status[films] = np.where(passed, first[:, None], status[films])
 
 
-def _path_end(problem: Problem, low: Array, high: Array, level: int) -> tuple[Array, NDArray[np.bool_], Array, Array]:
+def _path_end(request: Request, low: Array, high: Array, level: int) -> tuple[Array, NDArray[np.bool_], Array, Array]:
     """Where between the scaled deflections low and high (B,) the path ends, and whether P11 falls to zero there.
 
     P11 then goes like the root of the distance: over the last sweep it falls by more than half, or is small already.
@@ -416,14 +412,14 @@ def _path_end(problem: Problem, low: Array, high: Array, level: int) -> tuple[Ar
     margins = np.full((2, low.size), np.inf)
     for _ in range(2):
         fine = low[:, None] + (high - low)[:, None] * np.arange(SEARCH) / (SEARCH - 1)
-        result, _ = follow(problem, fine, level)
+        result, _ = follow(request, fine, level)
         found = result[:, kernels.STATUS] != Status.ITERATION_LIMIT
         last = np.sum(np.logical_and.accumulate(found, axis=1), axis=1) - 1
         good, at = last >= 0, np.maximum(last, 0)
         met = np.where(found[:, None], result[:, (kernels.CONVEX, kernels.ELLIPTIC)], np.inf)
         margins = np.minimum(margins, np.min(met, axis=2).T)
         p11 = result[rows, kernels.LEAST_P11, at]
-        bent |= good & ((p11 < NEARLY_BENT * _shear_modulus(problem)) | (p11 < 0.5 * result[:, kernels.LEAST_P11, 0]))
+        bent |= good & ((p11 < NEARLY_BENT * _shear_modulus(request)) | (p11 < 0.5 * result[:, kernels.LEAST_P11, 0]))
         high = np.where(good, fine[rows, np.minimum(last + 1, SEARCH - 1)], high)
         low = np.where(good, fine[rows, at], low)
     return low, bent, margins[0], margins[1]
@@ -437,14 +433,14 @@ def _ascending(d: Array) -> tuple[Array, NDArray[np.intp] | None]:
     return np.take_along_axis(d, order, axis=1), np.argsort(order, axis=1)
 
 
-def _curves(problem: Problem, search: _Search, back: NDArray[np.intp] | None) -> Curves:
+def _curves(request: Request, search: _Search, back: NDArray[np.intp] | None) -> Curves:
     """Undo the scaling and the sorting."""
     k, result, status = kernels, search.result, search.status
     if back is not None:
         result = np.take_along_axis(result, back[:, None], axis=2)
         status = np.take_along_axis(status, back, axis=1)
-    ok, sign = status == Status.OK, np.sign(problem.deflection)
-    length = problem.inner_radius / problem.prestretch[:, None]
+    ok, sign = status == Status.OK, np.sign(request.deflection)
+    length = request.inner_radius / request.prestretch[:, None]
     note = np.where(result[:, k.LEAST_P2] < 0, Note.WRINKLED, 0) | np.where(result[:, k.SLACK] <= 0, Note.SLACK, 0)
     factor = 2 * np.pi * length
 
@@ -458,7 +454,7 @@ def _curves(problem: Problem, search: _Search, back: NDArray[np.intp] | None) ->
         rows = row(slice(k.RESULTS, None), (factor * sign)[:, None])
         sensitivity = np.ascontiguousarray(np.moveaxis(rows, 1, 2))
     return Curves(
-        deflection=problem.deflection,
+        deflection=request.deflection,
         force=row(k.FORCE, factor * sign),
         status=status,
         note=np.where(ok, note, 0).astype(np.int8),

@@ -12,7 +12,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics.compiled import bind
 from bayesmembrane.physics.mechanics.locking import locking_deflection
-from bayesmembrane.physics.mechanics.problem import Problem, extensibility
+from bayesmembrane.physics.mechanics.request import Request, extensibility
 from bayesmembrane.physics.mechanics.shooting import kernels
 from bayesmembrane.physics.mechanics.solution import Curves, Note, Status
 
@@ -32,41 +32,35 @@ def compiled(material: type[Material]) -> Any:
     return bind(kernels.KERNELS, material)
 
 
-def solve(
-    problem: Problem,
-    sensitivities: bool = False,
-    only: str = "all",
-    exact_up_to: float = np.inf,
-    rtol: float = RTOL,
-) -> Curves:
-    """Force curves from the initial value problem at the disc,
+def solve(request: Request, rtol: float = RTOL) -> Curves:
+    """Force curves from the initial value request at the disc,
 
         F = 2 pi R1 P1 sin(theta) at R = R1, with (l1, theta)(R1) such that l2 = l0 and h = delta at the ring.
 
-    Sensitivities, if asked for, are central differences in each parameter.
+    Sensitivities, if asked for, are central differences in each parameter. No film is spared.
     """
-    locks = locking_deflection(extensibility(problem), problem.prestretch, problem.ratio)
-    lines = np.stack([_film(problem, i, float(locks[i]), rtol) for i in range(problem.parameters.shape[0])])
-    curves = _curves(problem, lines)
-    return replace(curves, sensitivity=_differences(problem, rtol)) if sensitivities else curves
+    locks = locking_deflection(extensibility(request), request.prestretch, request.ratio)
+    lines = np.stack([_film(request, i, float(locks[i]), rtol) for i in range(request.parameters.shape[0])])
+    curves = _curves(request, lines)
+    return replace(curves, sensitivity=_differences(request, rtol)) if request.sensitivities else curves
 
 
-def _film(problem: Problem, film: int, lock: float, rtol: float) -> Array:
+def _film(request: Request, film: int, lock: float, rtol: float) -> Array:
     """(N, SEEN + 1) : the rows of ``kernels.survey`` and the status code, in the order of the deflections asked for."""
     k = kernels
     # A film that is not deflected carries no lift, but has a stiffness: it is looked at a small way up.
-    targets, back = np.unique(np.maximum(problem.scaled[film], SMALLEST), return_inverse=True)
+    targets, back = np.unique(np.maximum(request.scaled[film], SMALLEST), return_inverse=True)
     out = np.full((targets.size, k.SEEN + 1), np.nan)
     free = targets < lock
     out[:, k.SEEN] = np.where(free, Status.ITERATION_LIMIT, Status.LOCKED)
     if np.any(free):
-        p, count = problem.parameters[film], int(np.sum(free))
+        p, count = request.parameters[film], int(np.sum(free))
         lines, found = np.empty((count + 1, k.SEEN)), np.empty((count, 3))
         start = float(np.clip(START, targets[0], targets[count - 1]))
-        compiled(problem.material).shoot(
-            targets[free], start, problem.prestretch[film], np.log(problem.ratio), p, rtol, found, lines
+        compiled(request.material).shoot(
+            targets[free], start, request.prestretch[film], np.log(request.ratio), p, rtol, found, lines
         )
-        lines[:, k.LEAST_P11 : k.LEAST_P2] /= float(problem.material.shear_modulus(p))
+        lines[:, k.LEAST_P11 : k.LEAST_P2] /= float(request.material.shear_modulus(p))
         out[:count, : k.SEEN] = lines[:-1]
         out[:count, k.SEEN] = _verdict(lines[:-1], lines[-1])
     return out[back]
@@ -86,19 +80,19 @@ def _verdict(lines: Array, end: Array) -> Array:
     return np.asarray(status, dtype=float)
 
 
-def _curves(problem: Problem, lines: Array) -> Curves:
+def _curves(request: Request, lines: Array) -> Curves:
     """Undo the scaling."""
     k = kernels
     status = lines[..., k.SEEN].astype(np.int8)
-    ok, sign = status == Status.OK, np.sign(problem.deflection)
-    length = problem.inner_radius / problem.prestretch[:, None]
+    ok, sign = status == Status.OK, np.sign(request.deflection)
+    length = request.inner_radius / request.prestretch[:, None]
     note = np.where(lines[..., k.LEAST_P2] < 0, Note.WRINKLED, 0) | np.where(lines[..., k.SLACK] <= 0, Note.SLACK, 0)
 
     def column(index: int, factor: Any = 1.0) -> Array:
         return np.where(ok, lines[..., index] * factor, np.nan)
 
     return Curves(
-        deflection=problem.deflection,
+        deflection=request.deflection,
         force=column(k.FORCE, 2 * np.pi * length * sign),
         status=status,
         note=np.where(ok, note, 0).astype(np.int8),
@@ -112,14 +106,14 @@ def _curves(problem: Problem, lines: Array) -> Curves:
     )
 
 
-def _differences(problem: Problem, rtol: float) -> Array:
+def _differences(request: Request, rtol: float) -> Array:
     columns = []
-    for i in range(problem.parameters.shape[1]):
-        step = 1e-4 * np.maximum(np.abs(problem.parameters[:, i]), 1e-3)
+    for i in range(request.parameters.shape[1]):
+        step = 1e-4 * np.maximum(np.abs(request.parameters[:, i]), 1e-3)
         forces = []
         for side in (1, -1):
-            p = problem.parameters.copy()
+            p = request.parameters.copy()
             p[:, i] += side * step
-            forces.append(solve(replace(problem, parameters=p), rtol=rtol * 1e-2).force)
+            forces.append(solve(replace(request, parameters=p, sensitivities=False), rtol=rtol * 1e-2).force)
         columns.append((forces[0] - forces[1]) / (2 * step[:, None]))
     return np.stack(columns, axis=-1)

@@ -8,7 +8,7 @@ import numpy as np
 
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED
 from bayesmembrane.comparison.result import Comparison, Row
-from bayesmembrane.physics.hypothesis import CONVEXITY
+from bayesmembrane.physics.convexity import MODES
 from bayesmembrane.report.sentences import listed
 from bayesmembrane.report.style import title
 from bayesmembrane.report.tables import Column, Table, Value
@@ -75,7 +75,7 @@ def spoken_label(row: Row) -> str:
 def modes_table(found: Mapping[str, Comparison]) -> Table | None:
     """ln Z under every convexity mode; None if nobody asked for it."""
     columns = [Column("range", "range"), Column("hypothesis", "hypothesis")]
-    for mode in CONVEXITY:
+    for mode in MODES:
         columns += [Column(mode, f"ln Z, {mode}", ".2f"), Column(f"{mode}_sd", "+-", ".2f")]
         columns.append(Column(f"{mode}_mass", "mass", ".3f"))
     rows = []
@@ -83,7 +83,7 @@ def modes_table(found: Mapping[str, Comparison]) -> Table | None:
         for r in (r for r in c.rows if r.modes):
             by_mode = {m.mode: m for m in r.modes}
             cells: list[Value] = [name, spoken_label(r)]
-            for mode in CONVEXITY:
+            for mode in MODES:
                 m = by_mode[mode]
                 cells += [m.log_evidence, m.sd, m.mass]
             rows.append(tuple(cells))

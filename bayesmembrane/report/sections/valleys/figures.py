@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.convexity import REACHED, ConvexityMode
 from bayesmembrane.report.canvas import Picture, _encoded, _figure, _style
 from bayesmembrane.report.sections.valleys.pairs import RANGE_COLOURS, label, pairs, percent
 from bayesmembrane.report.style import FAINT, INK, MUTED, with_unit
@@ -31,8 +32,8 @@ def valley_picture(found: Valleys, kind: str = "png") -> Picture:
     return _plane(found, kind) if k == 2 else pairs(found, kind)
 
 
-def _mode(v: Valley) -> str:
-    return "reached" if v.hypothesis.convexity == "none" else v.hypothesis.convexity
+def _mode(v: Valley) -> ConvexityMode:
+    return v.hypothesis.convexity if v.hypothesis.convexity.restricts else REACHED
 
 
 # ---- one parameter ---------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.plain import plain
-from bayesmembrane.physics.hypothesis import CONVEXITY
+from bayesmembrane.physics.convexity import RESTRICTING
 from bayesmembrane.report.canvas import Picture
 from bayesmembrane.report.sections.valleys.beside import beside_picture
 from bayesmembrane.report.sections.valleys.figures import valley_picture
@@ -64,7 +64,7 @@ def _row(v: Valley) -> tuple[Value, ...]:
         v.metric.unit if v.metric.unit != "-" else "ln",
         v.spectra[0].condition_number,
         (f"{opened}: {v.limit or 'no end'}" if opened else "no"),
-        ", ".join(f"{100 * v.share(m):.3g} %" for m in CONVEXITY[:3]),
+        ", ".join(f"{100 * v.share(m.name):.3g} %" for m in RESTRICTING),
         inside,
         "-" if first is None else f"{first.test}: {100 * first.reduction:.0f} %",
     )
