@@ -249,7 +249,7 @@ def sample(
     """The posterior, stored as a run; the same command continues a run that was interrupted."""
     from bayesmembrane.calibration.predictions import digest
     from bayesmembrane.calibration.run import sample as run
-    from bayesmembrane.data.measurement import read_measurement
+    from bayesmembrane.data.reading import read_measurement
     from bayesmembrane.physics.cache import CachedSolver
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
@@ -544,7 +544,7 @@ def demo(
 
 
 def _measurement(curve: Path, specimen: Path) -> Measurement:
-    from bayesmembrane.data.measurement import read_measurement
+    from bayesmembrane.data.reading import read_measurement
 
     measurement = read_measurement(curve, specimen)
     for note in measurement.provenance.notes:

@@ -27,8 +27,9 @@ from bayesmembrane.calibration.sampling.walk import Progress
 from bayesmembrane.comparison.compare import Range, compare_ranges
 from bayesmembrane.comparison.jobs import Tell
 from bayesmembrane.comparison.result import Comparison
-from bayesmembrane.data.measurement import Measurement, read_measurement
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.published import read_published_table
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.diagnosis.loop import Loop, loop
 from bayesmembrane.ground.registry import materials

@@ -23,7 +23,7 @@ import tomli_w
 
 from bayesmembrane.calibration.sampling.walk import Chains, Settings
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen
-from bayesmembrane.data.motion import Path as Motion
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import component

@@ -181,7 +181,7 @@ def available(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
     """Effects of the library that can be seen in this test, can be told from the material, and are not there yet."""
     found: list[Effect] = [cls() for cls in components("effects").values()]
     have = {e.name for e in hypothesis.effects}
-    rig, path = measurement.rig.name, measurement.path
+    rig, path = measurement.rig, measurement.path
     thin = measurement.specimen.thickness
     told = [e for e in found if e.name not in have and not e.absorbed]
     return [e for e in told if not e.unavailable(rig, path) and not e.negligible(thin)]
@@ -191,7 +191,7 @@ def absorbed(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
     """Effects that the material absorbs without trace."""
     have = {e.name for e in hypothesis.effects}
     found: list[Effect] = [cls() for cls in components("effects").values()]
-    rig, path = measurement.rig.name, measurement.path
+    rig, path = measurement.rig, measurement.path
     return [e for e in found if e.name not in have and e.absorbed and not e.unavailable(rig, path)]
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import (
     Carried,
@@ -50,7 +50,7 @@ class Composition:
     """
 
     effects: tuple[Effect, ...]
-    path: Path
+    path: Motion
 
     @cached_property
     def _places(self) -> list[tuple[Effect, slice]]:

@@ -11,9 +11,9 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import FAILURES
 from bayesmembrane.calibration.predictions import Digest
+from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.hypothesis import Hypothesis
-from bayesmembrane.physics.rigs.base import Rig
 from bayesmembrane.report.sentences import LOOSE, Case
 from bayesmembrane.report.style import spoken, title
 
@@ -51,7 +51,7 @@ class Specimen:
 
     name: str
     thickness: float
-    rig: Rig
+    rig: Fixture
     origin: str
     files: tuple[str, ...]
     notes: tuple[str, ...]

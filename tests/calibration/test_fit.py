@@ -7,9 +7,9 @@ from bayesmembrane.calibration.fit import fit
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
-from bayesmembrane.physics.forward import predict
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import request, solve
+from tests.physics.predicting import predict
 
 FILMS = {
     "neo_hookean": (7.5,),

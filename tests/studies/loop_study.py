@@ -18,7 +18,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from bayesmembrane.data.measurement import read_measurement
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
 from bayesmembrane.ground.errors import BayesmembraneError
 from bayesmembrane.ground.registry import materials

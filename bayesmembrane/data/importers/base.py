@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import tomli_w
 
-from bayesmembrane.data.measurement import csv_text, write_new
+from bayesmembrane.data.writing import csv_text, write_new
 from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array, HalfNormal
-from bayesmembrane.physics.effects.base import ANNULUS, Carried, EffectParameter, State
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, State
 
 THINNEST = 200e-6  # m
 
@@ -26,7 +26,7 @@ class ClampBending(Carried):
         "A force proportional to the deflection, seen in the flat toe of the curve, the same on all legs; stiffer "
         "materials hide it at large deflections."
     )
-    rigs: ClassVar[tuple[str, ...]] = ANNULUS
+    needs_clamp: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("stiffness", "N/m", "linear stiffness of the plate", HalfNormal(0.5), (0.0, 50.0), 0.0),
     )

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array, HalfNormal
-from bayesmembrane.physics.effects.base import ANNULUS, Carried, EffectParameter, State
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, State
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class OffCentreDisc(Carried):
         "Slightly too stiff in the toe, where the curve is steep on a double logarithmic plot, alike on all legs; "
         "mostly absorbed by the modulus."
     )
-    rigs: ClassVar[tuple[str, ...]] = ANNULUS
+    needs_clamp: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "square", "-", "square of the eccentricity over the free length", HalfNormal(3e-3), (0.0, 0.1), 0.0

@@ -3,7 +3,7 @@
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
@@ -63,5 +63,5 @@ def force(m: Measurement, *effects: str, x: np.ndarray | None = None, material: 
     return p.force[0]
 
 
-def path(d: np.ndarray, time: np.ndarray | None = None) -> Path:
-    return Path(d, time, float(np.max(d)))
+def path(d: np.ndarray, time: np.ndarray | None = None) -> Motion:
+    return Motion(d, time, float(np.max(d)))
