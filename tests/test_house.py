@@ -65,7 +65,7 @@ def test_no_file_of_the_house_names_a_registry_or_this_machine() -> None:
 
 def test_make_targets_exist() -> None:
     makefile = (ROOT / "Makefile").read_text()
-    for target in ("install", "demo", "test", "bench", "study", "lint", "clean"):
+    for target in ("install", "demo", "test", "bench", "study", "study-fuzz", "lint", "clean"):
         assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
 
 

@@ -40,7 +40,7 @@ Parameters = Annotated[
     typer.Option("--parameters", help="Membrane parameters, N/m (exponents and Gent's c2 pure numbers), by commas."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on stdout; logs go to stderr.")]
-Seed = Annotated[int, typer.Option("--seed", help="Seed of every random number.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of every random number.")]
 Curve = Annotated[Path, typer.Argument(help="The measured curve: CSV whose header names carry units.", metavar="CURVE")]
 SpecimenFile = Annotated[Path, typer.Option("--specimen", help="TOML with film, rig and noise.")]
 Effects = Annotated[str, typer.Option("--effects", help="Physical effects beside the material, by commas.")]
@@ -247,37 +247,36 @@ def sample(
     seed: Seed = 0,
 ) -> None:
     """The posterior, stored as a run; the same command continues a run that was interrupted."""
-    from bayesmembrane.calibration.predictions import digest
     from bayesmembrane.calibration.run import sample as run
     from bayesmembrane.data.reading import read_measurement
     from bayesmembrane.physics.cache import CachedSolver
+    from bayesmembrane.words.sampling import document
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
-    cache = CachedSolver(out_folder / "curves")
-    with _bar(claim.label()) as tell:
-        done = run(measurement, claim, seed=seed, out=out_folder, ess=ess, progress=tell, solve=cache)
-    if done.interrupted:
-        log.print(f"Interrupted; the run is stored in {done.path}. The same command resumes it: {_command()}")
-        raise typer.Exit(130)
-    rest = None
+    cache, rest = CachedSolver(out_folder / "curves"), None
     if max_deflection_mm is not None and measurement.full_range > measurement.deflection.max():
         whole = read_measurement(curve, specimen)
         rest = whole.select(whole.deflection > measurement.deflection.max())
-    digest(done, rest=rest, solve=cache)
+    with _bar(claim.label()) as tell:
+        done = run(measurement, claim, seed=seed, out=out_folder, ess=ess, progress=tell, solve=cache, rest=rest)
+    if done.interrupted:
+        log.print(f"Interrupted; the run is stored in {done.path}. The same command resumes it: {_command()}")
+        raise typer.Exit(130)
+    told = document(done)
 
     def show() -> None:
         rows = [
             [name, f"{v['mean']:.5g}", f"{v['sd']:.2g}", f"{v['hdi_94'][0]:.5g} to {v['hdi_94'][1]:.5g}"]
-            for name, v in done.status["posterior"].items()
+            for name, v in told["posterior"].items()
         ]
         table(f"{claim.material.title} on {curve}", ["parameter", "mean", "sd", "94 % interval"], rows)
-        s = done.status
-        out.print(f"ESS {s['ess_bulk']:.0f}, R-hat {s['r_hat']:.3f}, {s['evaluations']} curves, {s['seconds']:.0f} s.")
-        for sentence in s["sentences"]:
+        spent = f"{told['evaluations']} curves, {told['seconds']:.0f} s"
+        out.print(f"ESS {told['ess_bulk']:.0f}, R-hat {told['r_hat']:.3f}, {spent}.")
+        for sentence in told["sentences"]:
             out.print(sentence)
         out.print(f"Stored in {done.path}; bayesmembrane report {done.path} shows it.")
 
-    answer(done.summary(), as_json, show)
+    answer(told, as_json, show)
 
 
 @app.command()
@@ -362,6 +361,7 @@ def compare(
     """Which materials the data support, by two estimators of the evidence, with prediction beside it."""
     from bayesmembrane.comparison.compare import claimed, compare_ranges, ranges_of
     from bayesmembrane.report.sections.comparison.section import evidence_table
+    from bayesmembrane.words.sampling import with_notes
 
     claims = claimed(materials, effects, noise, convexity)
     if ranges_mm and max_deflection_mm is not None:
@@ -374,7 +374,7 @@ def compare(
     except KeyboardInterrupt:
         log.print(f"Interrupted; what is finished is stored in {out_folder}. The same command resumes it: {_command()}")
         raise typer.Exit(130) from None
-    answers = {name: c.summary() for name, c in found.items()}
+    answers = {name: with_notes(c) for name, c in found.items()}
     document = {**list(answers.values())[-1], "ranges": [{"range": n, **a} for n, a in answers.items()]}
 
     def show() -> None:
@@ -435,7 +435,6 @@ def loop(
     seed: Seed = 0,
 ) -> None:
     """Calibrate, diagnose, add what is missing, calibrate again, until adequate or abstaining; and report."""
-    from bayesmembrane.calibration.predictions import digest
     from bayesmembrane.diagnosis.loop import loop as run
     from bayesmembrane.report.page import write_report
 
@@ -459,8 +458,6 @@ def loop(
         log.print(f"Interrupted; the runs are stored in {out_folder}. The same command resumes: {_command()}")
         raise typer.Exit(130) from None
     runs = list({str(s.run.path): s.run for r in found.rounds for s in (r.before, r.after)}.values())
-    for stored in runs:
-        digest(stored)
     page = write_report([r.path for r in runs if r.path is not None], report_folder, loops=[found])
     document: dict[str, Any] = {
         "rounds": [r.summary() for r in found.rounds],
@@ -514,14 +511,11 @@ def report(
     seed: Seed = 0,
 ) -> None:
     """One self-contained HTML page about one run or several."""
-    from bayesmembrane.calibration.predictions import digest
     from bayesmembrane.calibration.run import load_run, run_folders
     from bayesmembrane.report.page import write_report
 
     found = [path for folder in folders for path in run_folders(folder)]
     runs = [load_run(path) for path in found]
-    for run in runs:
-        digest(run)
     page = write_report(runs, out_folder, title=title)
     document = {"report": str(page), "runs": [str(path) for path in found]}
     answer(document, as_json, lambda: out.print(f"The report lies in {page}"))

@@ -21,8 +21,8 @@ from rich.progress import Progress as Bars
 from bayesmembrane.app.terminal import lines, log
 from bayesmembrane.calibration.beside_paper import Compared, compare_with_paper, paper_break_points
 from bayesmembrane.calibration.fit import fit
-from bayesmembrane.calibration.predictions import digest
-from bayesmembrane.calibration.run import load_run, sample
+from bayesmembrane.calibration.predictions import Wanted
+from bayesmembrane.calibration.run import load_run, predictions_of, sample
 from bayesmembrane.calibration.sampling.walk import Progress
 from bayesmembrane.comparison.compare import Range, compare_ranges
 from bayesmembrane.comparison.jobs import Tell
@@ -84,13 +84,15 @@ def calibrate(
     tell(None)
     found = fit(measurement, claim, seed=seed, starts=published)
     stem = f"elastosil_50um_{range_name.lower()}_{name}"
-    run = sample(measurement, claim, seed=seed, out=chains, name=stem, ess=ess, progress=tell, solve=cache)
+    options: dict[str, Any] = {"seed": seed, "out": chains, "name": stem, "ess": ess, "progress": tell, "solve": cache}
+    run = sample(measurement, claim, predictions=False, **options)
     if run.interrupted or run.path is None:
         raise KeyboardInterrupt
     whole = shipped_measurement(RANGES[-1])
     beyond = whole.deflection > measurement.deflection.max()
     last = not np.any(beyond)
-    digest(run, rest=None if last else whole.select(beyond), breaks=paper_break_points() if last else (), solve=cache)
+    wanted = Wanted(breaks=paper_break_points()) if last else Wanted(rest=whole.select(beyond))
+    predictions_of(run, wanted, cache)
     return Done(run.path, compare_with_paper(measurement, [found], range_name, solve=cache), cache.tally)
 
 

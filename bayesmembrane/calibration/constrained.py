@@ -14,22 +14,30 @@ STARTS = 2
 MOST_ITERATIONS, TOLERANCE = 50, 1e-7
 
 
-def constrained_optimum(objective: Objective, pool: Array, free: Array) -> Array | None:
+def constrained_optimum(objective: Objective, pool: Array, free: Array, contained: list[Array]) -> Array | None:
     """x (k,) of the least |r(x)| among films that meet the convexity prior, None if none was found.
 
-    ``pool`` (M, k) are starts, the best first, ``free`` (k,) is the optimum without the constraint.
+    ``pool`` (M, k) are starts, the best first, ``free`` (k,) is the optimum without the constraint, ``contained`` are
+    the optima (k,) of simpler energies.
     """
-    prior = JointPrior(objective.hypothesis)
-    prediction = objective.forward(pool)
-    size, inside = objective.many(prediction), prior.inside(prediction)
-    feasible = pool[inside & np.isfinite(size)]
-    if not len(feasible):
+    feasible = _feasible(objective, pool)
+    simple = _feasible(objective, np.array(contained)) if contained else feasible[:0]
+    if not len(feasible) + len(simple):
         return None
-    anchor = feasible[0]
-    starts = [*apart(feasible, objective.spread, STARTS - 1), _pulled(objective, free, anchor)]
+    anchor = feasible[0] if len(feasible) else simple[0]
+    starts = [*apart(feasible, objective.spread, STARTS - 1), _pulled(objective, free, anchor), *simple]
     found = [_pulled(objective, _constrained_search(objective, s), anchor) for s in starts]
+    found += list(simple)
     sizes = objective.many(objective.forward(np.array(found), reached=False))
-    return np.asarray(found[int(np.argmin(sizes))])
+    best = int(np.argmin(sizes))
+    return np.asarray(found[best]) if np.isfinite(sizes[best]) else None
+
+
+def _feasible(objective: Objective, x: Array) -> Array:
+    """Those of x (M, k) that have a curve and meet the convexity prior."""
+    prediction = objective.forward(x)
+    inside = JointPrior(objective.hypothesis).inside(prediction)
+    return np.asarray(x[inside & np.isfinite(objective.many(prediction))])
 
 
 def _constrained_search(objective: Objective, start: Array) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bayesmembrane.ground.parameters import Array
 
 Residuals = Callable[[Array], tuple[Array, Array]]
-"""x (B, k) -> r (B, N) and dr/dx (B, N, k); nan where there is nothing to compare."""
+"""x (B, k) -> r (B, N) and dr/dx (B, N, k); nan where there is nothing to compare, or no slope."""
 
 DAMPING, EASIER, HARDER, HOPELESS = 1e-2, 0.2, 5.0, 1e12
 SLOW = 1e-9  # relative decrease of |r|^2 below which a step counts as slow
@@ -33,14 +33,15 @@ def descend(
 
     with coordinates at a bound left out while the step would leave it, and those in ``held`` (M, k) left out always.
     A row whose |r|^2 is more than ``behind`` times the least is given up when it crawls: films at the edge of what can
-    be solved cost most. Returns x (M, k) and |r| (M,), inf where a start has no residuals.
+    be solved cost most. Returns x (M, k) and |r| (M,), inf where a start has no residuals or no slopes: neither a
+    start nor a step goes where one of them is not a number.
 
     D. W. Marquardt, J. SIAM 11 (1963) 431; a row that finds no better point with any damping is done.
     """
     x = np.clip(start, low, high)
     free = np.ones(x.shape, bool) if held is None else ~held
     r, jacobian = residuals(x)
-    size = _square(r)
+    size = _square(r, jacobian)
     damping, slow, crawl = np.full(len(x), DAMPING), np.zeros(len(x), int), np.zeros(len(x), int)
     going = np.isfinite(size)
     for _ in range(iterations):
@@ -50,7 +51,7 @@ def descend(
         step = _step(x[rows], r[rows], jacobian[rows], damping[rows], free[rows], low, high)
         trial = np.clip(x[rows] + step, low, high)
         new_r, new_jacobian = residuals(trial)
-        new_size = _square(new_r)
+        new_size = _square(new_r, new_jacobian)
         better = new_size < size[rows]
         take = rows[better]
         gain = (size[take] - new_size[better]) / np.maximum(size[take], 1e-300)
@@ -70,11 +71,12 @@ def descend(
     return x, np.sqrt(size)
 
 
-def _square(r: Array) -> Array:
-    """|r|^2 (M,) of r (M, N); inf where it is not a number."""
-    with np.errstate(over="ignore"):
+def _square(r: Array, jacobian: Array) -> Array:
+    """|r|^2 (M,) of r (M, N) with slopes (M, N, k); inf where one of them is not a number, or too large to square."""
+    with np.errstate(over="ignore", invalid="ignore"):
         size = np.sum(r * r, axis=1)
-    return np.where(np.isfinite(size), size, np.inf)
+        known = np.isfinite(size) & np.isfinite(np.sum(jacobian * jacobian, axis=(1, 2)))
+    return np.where(known, size, np.inf)
 
 
 def _step(

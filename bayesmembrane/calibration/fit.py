@@ -15,9 +15,10 @@ from bayesmembrane.calibration.objective import Objective, apart
 from bayesmembrane.calibration.posterior import enough_points
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.convexity import REACHED, RESTRICTING
+from bayesmembrane.physics.convexity import FREE, REACHED, RESTRICTING
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.materials.neo_hookean import NeoHookean
 from bayesmembrane.physics.mechanics import api
 
 STARTED, POLISHED = 12, 2
@@ -27,6 +28,7 @@ FEW, ROUGH = 50, 1e-4  # evaluations and tolerance of a first search
 NEAR = 1e-3  # of the width of the bounds: an estimate this close is at the bound
 FLAT = 1e-4  # a loss that rises by less than this part on the way to the bound has no minimum before it
 TO_BOUND = 40  # iterations towards a bound
+LOWER = 1e-9  # a simpler energy's optimum is taken where it leads lower by more than this part: less is round-off
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class Fit:
     objective : what was minimised: `loss_N`, or the root of the weighted sum of squares
     margins : by how much each convexity mode is met; below 0 it is not
     at_bound : coordinates without an optimum inside their bounds: the loss falls, or is flat, up to the bound
-    status : "converged", or why the search ended
+    status : "converged", or why the search ended, or in a sentence why there is no fit: then all numbers are nan
     constrained : the optimum among films that meet the convexity prior; this one if it does; None without any
     """
 
@@ -115,9 +117,11 @@ def fit(
 
     Draws from the prior, and from a wider one, are brought to their best modulus, which is linear; from the best ones
     that lie apart, and from ``starts`` (membrane parameters (n,), for example published ones), a trust-region method
-    descends with exact derivatives, at first a little and then from the best ones to the end. Bounds are those of the
-    coordinates, not the prior, which plays no part but for the convexity constraint. Ogden films are sought among
-    those with c_i a_i > 0 only, which its coordinates cover.
+    descends with exact derivatives, at first a little and then from the best ones to the end. So does one from the
+    optimum of the neo-Hookean film, with the same effects, where the energy contains it (`Material.neo_hookean`): no
+    fit is worse than that of the energy inside. Bounds are those of the coordinates, not the prior, which plays no
+    part but for the convexity constraint. Ogden films are sought among those with c_i a_i > 0 only, which its
+    coordinates cover.
 
     Standard errors are s^2 (J^T J)^-1 with s^2 = |r|^2 / (N - k): the misfit counts as noise.
 
@@ -128,21 +132,34 @@ def fit(
     objective = Objective(hypothesis, measurement, loss, solve)
     rng = np.random.default_rng(seed)
     pool, size = objective.pool(rng)
-    x, status = _global(objective, pool[size < HOPEFUL * size[0]], [np.asarray(s, dtype=float) for s in starts])
+    contained = _contained(objective, seed)
+    published = [np.asarray(s, dtype=float) for s in starts]
+    x, status = _global(objective, pool[size < HOPEFUL * size[0]], published, contained)
     free = _result(objective, x, status)
-    if not hypothesis.convexity.restricts or free.convex:
+    if not hypothesis.convexity.restricts or free.convex or not np.isfinite(free.objective):
         return replace(free, constrained=free)
-    y = constrained_optimum(objective, pool, free.coordinates)
+    y = constrained_optimum(objective, pool, free.coordinates, contained)
     held = None if y is None else _result(objective, y, "converged")
     if held is not None and held.objective < free.objective:
         # The constraint led to a better valley: it is open without the constraint too.
-        x, _, status = objective.polish(held.coordinates)
-        free = _result(objective, x, status)
+        x, lower, status = objective.polish(held.coordinates)
+        free = _result(objective, x, status) if lower < held.objective else held
         held = free if free.convex else held
     return replace(free, constrained=held)
 
 
-def _global(objective: Objective, pool: Array, published: list[Array]) -> tuple[Array, str]:
+def _contained(objective: Objective, seed: int) -> list[Array]:
+    """What the optimum of the neo-Hookean film with the same effects is in coordinates (k,) of this hypothesis."""
+    h = objective.hypothesis
+    if h.material is NeoHookean or h.material.neo_hookean(1.0) is None:
+        return []
+    simple = replace(h, material=NeoHookean, convexity=FREE)
+    found = fit(objective.measurement, simple, loss=objective.loss, seed=seed, solve=objective.forward.solve)
+    material = h.material.neo_hookean(float(np.exp(found.coordinates[0])))
+    return [] if material is None else [np.concatenate([material, found.coordinates[1:]])]
+
+
+def _global(objective: Objective, pool: Array, published: list[Array], contained: list[Array]) -> tuple[Array, str]:
     """The best of all polished starts, (x, status)."""
     h = objective.hypothesis
     starts = apart(pool, objective.spread * APART, STARTED)
@@ -151,9 +168,14 @@ def _global(objective: Objective, pool: Array, published: list[Array]) -> tuple[
         if np.all(np.isfinite(start)):
             starts.append(np.concatenate([start, starts[0][h.material_size :]]))
     first = sorted((objective.polish(s, FEW, ROUGH) for s in starts if np.all(np.isfinite(objective(s)[0]))), key=_size)
-    best = apart(np.array([x for x, _, _ in first]), objective.spread * DISTINCT, POLISHED)
-    best_x, _, status = min((objective.polish(b) for b in best), key=_size)
-    return best_x, status
+    best = apart(np.array([x for x, size, _ in first if np.isfinite(size)]), objective.spread * DISTINCT, POLISHED)
+    found = min((objective.polish(b) for b in best), key=_size, default=(pool[0], np.inf, ""))
+    for x in contained:
+        # At a bound a search keeps off it, and may end higher than it was told to start.
+        there = x, float(np.linalg.norm(objective(x)[0])), "converged"
+        for other in (objective.polish(x), there):
+            found = other if other[1] < found[1] * (1 - LOWER) else found
+    return found[0], found[2]
 
 
 def _size(found: tuple[Array, float, str]) -> float:
@@ -164,12 +186,19 @@ def _size(found: tuple[Array, float, str]) -> float:
 
 
 def _result(objective: Objective, x: Array, status: str) -> Fit:
-    """Everything about the optimum x (k,)."""
+    """Everything about the optimum x (k,); where it has no curve or no slopes, nan and the reason."""
     r, jacobian = objective(x)
     prediction = objective.forward(x)
-    misfit = prediction.force[0] - objective.measurement.force
-    bound = _at_bound(objective, x, float(np.linalg.norm(r)))
-    covariance = _covariance(r, jacobian, bound)
+    force = prediction.force[0]
+    if not np.all(np.isfinite(force)):
+        # What lies beyond the data is solved along with it, and may cost the film its path.
+        force = objective.forward(x, reached=False).force[0]
+    if not np.all(np.isfinite(force)) or not np.all(np.isfinite(r)):
+        status, r, force = _no_fit(objective), np.full_like(r, np.nan), np.full_like(force, np.nan)
+    misfit = force - objective.measurement.force
+    there = bool(np.all(np.isfinite(r)))
+    bound = _at_bound(objective, x, float(np.linalg.norm(r))) if there else np.zeros(x.size, bool)
+    covariance = _covariance(r, jacobian, bound) if there else np.full((x.size, x.size), np.nan)
     return Fit(
         hypothesis=objective.hypothesis,
         loss=objective.loss,
@@ -177,7 +206,7 @@ def _result(objective: Objective, x: Array, status: str) -> Fit:
         covariance=covariance,
         parameters=_estimates(objective, x, covariance),
         deflection=objective.measurement.deflection,
-        force=prediction.force[0],
+        force=force,
         loss_N=float(np.linalg.norm(misfit)),
         rmse_N=float(np.sqrt(np.mean(misfit**2))),
         max_N=float(np.max(np.abs(misfit))),
@@ -185,6 +214,14 @@ def _result(objective: Objective, x: Array, status: str) -> Fit:
         margins={m.name: float(m.margin(prediction, objective.hypothesis.material)[0]) for m in RESTRICTING},
         at_bound=tuple(p.name for p, b in zip(objective.parameters, bound, strict=True) if b),
         status=status,
+    )
+
+
+def _no_fit(objective: Objective) -> str:
+    return (
+        f"no fit: no {objective.hypothesis.label()} film was found that reaches "
+        f"{1e3 * np.max(objective.measurement.deflection):g} mm with finite forces and slopes; "
+        "use a shorter range or another material"
     )
 
 

@@ -53,11 +53,3 @@ def goodness(measurement: Measurement, force: Array, parameters: int) -> Goodnes
 def dominates(own_noise: float | None, extra_sd: Array) -> bool:
     """True if the posterior puts more than half its weight on an inferred noise (B,) above the stated one, both N."""
     return own_noise is not None and bool(np.mean(extra_sd > own_noise) > 0.5)
-
-
-def dominates_sentence(own_noise: float, extra_sd: Array) -> str:
-    """What an engineer should read when it does."""
-    return (
-        f"The inferred extra noise ({1e3 * float(np.median(extra_sd)):.3g} mN) exceeds what the measurement states "
-        f"({1e3 * own_noise:.3g} mN): the model misses something, and its misfit is counted as noise."
-    )

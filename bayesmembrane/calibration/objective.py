@@ -24,6 +24,14 @@ MOST = 300  # evaluations of one search
 ON_THE_WAY = 24  # states at which a film is looked at before it is solved
 
 
+class _LevelError(Exception):
+    """The loss is level at ``x`` (k,), as where the film is slack at every point: no step can be made from there."""
+
+    def __init__(self, x: Array) -> None:
+        super().__init__()
+        self.x = x
+
+
 class Objective:
     """r(x) = L^-1 (F(x) - y) of coordinates that shape the curve, with its Jacobian."""
 
@@ -60,10 +68,14 @@ class Objective:
         return white[:, :, 0], white[:, :, 1:]
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
-        """(r (N,), J (N, k)) of one x (k,), remembered: a search asks for them one after the other."""
+        """(r (N,), J (N, k)) of one x (k,), remembered: a search asks for them one after the other.
+
+        A film whose slopes are not all numbers has no r either: no search may start there or step there.
+        """
         if self._last is None or not np.array_equal(self._last[0], x):
             r, j = self.batch(x[None, :])
-            self._last = (x.copy(), r[0], j[0])
+            known = np.all(np.isfinite(j[0]))
+            self._last = (x.copy(), r[0] if known else np.full_like(r[0], np.nan), j[0])
         return self._last[1], self._last[2]
 
     def many(self, prediction: Prediction) -> Array:
@@ -133,26 +145,35 @@ class Objective:
         return np.array([float(p.prior.distribution().std()) for p in self.parameters])
 
     def polish(self, x: Array, evaluations: int = MOST, tolerance: float = 1e-8) -> tuple[Array, float, str]:
-        """(x, |r|, status) after a trust-region search from x (k,)."""
+        """(x, |r|, status) after a trust-region search from x (k,); |r| is inf where x has no curve or no slopes."""
         room = 1e-6 * (self.high - self.low)
-        done = least_squares(
-            self._residual,
-            np.clip(x, self.low + room, self.high - room),
-            jac=self._slope,
-            bounds=(self.low, self.high),
-            x_scale="jac",
-            ftol=tolerance,
-            xtol=tolerance,
-            gtol=None,
-            max_nfev=evaluations,
-        )
+        start = np.clip(x, self.low + room, self.high - room)
+        if not np.all(np.isfinite(self(start)[0])):
+            return start, np.inf, "no curve at the start"
+        try:
+            done = least_squares(
+                self._residual,
+                start,
+                jac=self._slope,
+                bounds=(self.low, self.high),
+                x_scale="jac",
+                ftol=tolerance,
+                xtol=tolerance,
+                gtol=None,
+                max_nfev=evaluations,
+            )
+        except _LevelError as level:
+            return level.x, float(np.linalg.norm(self(level.x)[0])), "converged"
         return done.x, float(np.sqrt(2 * done.cost)), "converged" if done.status > 0 else "evaluation limit"
 
     def _residual(self, x: Array) -> Array:
         return self(x)[0]
 
     def _slope(self, x: Array) -> Array:
-        return self(x)[1]
+        r, jacobian = self(x)
+        if not np.any(r @ jacobian):  # least_squares would divide zero by zero, and go on with nan
+            raise _LevelError(x.copy())
+        return jacobian
 
 
 def apart(pool: Array, distance: Array, count: int) -> list[Array]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -20,9 +19,6 @@ from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.solution import Status
 from bayesmembrane.physics.noise.base import NoiseLikelihood
-
-NOTEWORTHY = 1e-3
-"""A part of numerical failures above this is reported in a sentence."""
 
 
 class Outcome(IntEnum):
@@ -150,17 +146,6 @@ def tally(outcome: NDArray[np.int8]) -> Counter[str]:
     """How many draws met each outcome, by label."""
     counts = np.bincount(outcome, minlength=len(Outcome))
     return Counter({o.label: int(counts[o]) for o in Outcome if counts[o]})
-
-
-def failure_sentence(counts: Mapping[str, int]) -> str:
-    """What is to be said of numerical failures: "" unless they are more than `NOTEWORTHY` of all draws."""
-    failed, total = sum(counts.get(o.label, 0) for o in FAILURES), sum(counts.values())
-    if failed <= NOTEWORTHY * total:
-        return ""
-    return (
-        f"{failed} of {total} draws ({100 * failed / total:.2g} %) could not be solved to 1e-6 after every refinement "
-        "and count as impossible; if they lie near the posterior, it is narrower than it should be."
-    )
 
 
 def enough_points(hypothesis: Hypothesis, measurement: Measurement) -> None:

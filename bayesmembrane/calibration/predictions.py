@@ -1,4 +1,4 @@
-"""What a report needs of a run and the run's draws do not say by themselves: computed once, stored beside them.
+"""What a run predicts, and its draws do not say by themselves: computed once, stored beside them.
 
 Bands of the curve inside and beyond the fitted range, residuals, the states that the film reaches, the map of its
 convexity, its deformed shapes, and what thicker films of the same silicone should do. A report reads this and solves
@@ -7,22 +7,13 @@ nothing.
 
 from __future__ import annotations
 
-import json
-import os
-import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass
 
-import h5netcdf
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayesmembrane.calibration.beside_paper import BreakPoint
-from bayesmembrane.calibration.run import Run
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.convexity import RESTRICTING
 from bayesmembrane.physics.forward import Forward, Solve
@@ -33,7 +24,6 @@ from bayesmembrane.physics.mechanics.convexity import least_eigenvalue
 from bayesmembrane.physics.mechanics.solution import Status
 from bayesmembrane.physics.rigs.base import rig_of
 
-FILE = "digest.nc"
 QUANTILES = (0.05, 0.5, 0.95)
 DRAWS, SHAPE_DRAWS = 400, 30
 INSIDE, OUTSIDE = 60, 40
@@ -44,7 +34,23 @@ FEWEST = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Digest:
+class Wanted:
+    """What is to be predicted beyond the fitted points.
+
+    up_to : deflection in m up to which the curve is predicted; the whole measured range, or a sixth more, unless given
+    rest : points that were not used for the fit
+    breaks : break points of specimens of the same silicone, predicted as F(d') = F(d) d'/d
+    draws : how many posterior draws at most are followed
+    """
+
+    up_to: float | None = None
+    rest: Measurement | None = None
+    breaks: tuple[BreakPoint, ...] = ()
+    draws: int = DRAWS
+
+
+@dataclass(frozen=True, eq=False)
+class Predictions:
     """A run in numbers that can be drawn. SI units; Q stands for 5, 50 and 95 %.
 
     Attributes
@@ -114,93 +120,17 @@ class Digest:
         return np.asarray(self.lost.sum(axis=0))
 
 
-# Dimensions of the stored arrays, so that other programs read them with names.
-_DIMS = {
-    "at": "point", "force": "point", "sd": "point",
-    "rest_at": "rest", "rest_force": "rest", "rest_sd": "rest",
-    "deflection": "grid", "beyond": "grid", "curve": "quantile grid", "repeat": "quantile grid", "lost": "reason grid",
-    "residual": "quantile point", "rest_residual": "quantile rest", "curves_at": "quantile point",
-    "film": "parameter", "shape_at": "shape", "state_1": "shape radius", "state_2": "shape radius",
-    "shape_radius": "shape draw radius", "shape_height": "shape draw radius",
-    "map_1": "stretch_1", "map_2": "stretch_2", "eigenvalue": "stretch_1 stretch_2",
-    "break_at": "specimen", "break_thickness": "specimen", "break_force": "specimen",
-    "break_predicted": "quantile specimen", "break_lost": "specimen",
-}  # fmt: skip
-
-
-def digest(
-    run: Run,
-    *,
-    up_to: float | None = None,
-    rest: Measurement | None = None,
-    breaks: Sequence[BreakPoint] = (),
-    draws: int = DRAWS,
-    solve: Solve = api.solve,
-) -> Digest:
-    """The digest of a run, stored in its folder as ``digest.nc``; arguments as in `digest_draws`.
-
-    A stored digest of the same draws is read back if it was made with the same arguments, or if none are given.
-    Raises `StorageError` if the folder cannot be written.
-    """
-    seed = int(run.settings["seed"])
-    asked = {"up_to": up_to, "rest": rest.data_hash if rest else None, "draws": draws, "breaks": repr(tuple(breaks))}
-    plain = up_to is None and rest is None and not breaks
-    stored = load_digest(run, None if plain else asked)
-    if stored is not None:
-        return stored
-    found = digest_draws(
-        run.hypothesis,
-        run.measurement,
-        run.draws(),
-        up_to=up_to,
-        rest=rest,
-        breaks=breaks,
-        draws=draws,
-        seed=seed,
-        solve=solve,
-    )
-    if run.path is not None:
-        _store(found, run.path, {"draws_of": _state(run), "asked": asked})
-    return found
-
-
-def load_digest(run: Run, asked: Mapping[str, Any] | None = None) -> Digest | None:
-    """The digest stored with a run; None if there is none, or it is of other draws or not what was ``asked``.
-
-    Raises `StorageError` if it is damaged.
-    """
-    if run.path is None or not (run.path / FILE).is_file():
-        return None
-    found, made = _read(run.path / FILE)
-    same = made.get("draws_of") == _state(run) and (asked is None or made.get("asked") == dict(asked))
-    return found if same else None
-
-
-def _state(run: Run) -> str:
-    """What tells one set of draws from another: an interrupted run that went on has more evaluations."""
-    return f"{run.settings['fingerprint']} {run.status['evaluations']}"
-
-
-def digest_draws(
+def predict_draws(
     hypothesis: Hypothesis,
     measurement: Measurement,
     coordinates: ArrayLike,
-    *,
-    up_to: float | None = None,
-    rest: Measurement | None = None,
-    breaks: Sequence[BreakPoint] = (),
-    draws: int = DRAWS,
+    wanted: Wanted | None = None,
     seed: int = 0,
     solve: Solve = api.solve,
-) -> Digest:
-    """The digest of posterior draws x (S, k), from at most ``draws`` of them.
-
-    Parameters
-    ----------
-    up_to : deflection in m up to which the curve is predicted; the whole measured range, or a sixth more, unless given
-    rest : points that were not used for the fit
-    breaks : break points of specimens of the same silicone, predicted as F(d') = F(d) d'/d
-    """
+) -> Predictions:
+    """What posterior draws x (S, k) of a hypothesis on a measurement predict."""
+    wanted = wanted or Wanted()
+    up_to, rest, breaks, draws = wanted.up_to, wanted.rest, wanted.breaks, wanted.draws
     x = _subset(np.atleast_2d(np.asarray(coordinates, dtype=float)), draws, seed)
     end = float(np.max(measurement.deflection))
     last = max(end, up_to if up_to is not None else max(7 / 6 * end, measurement.full_range))
@@ -220,7 +150,7 @@ def digest_draws(
     film = hypothesis.material.from_vector(films[chosen])
     states = _profiles(film, shape_at, measurement)
     own_sd = measurement.force_sd
-    unused = _Points.of(rest)
+    unused = _points(rest)
     rest_force = np.empty((len(x), 0))
     if rest is not None and rest.across is not None:  # each reading has its own state
         rest_force = Forward(hypothesis, rest, rest.deflection, solve)(x, reached=False).force
@@ -236,7 +166,7 @@ def digest_draws(
     some = films[np.linspace(0, len(films) - 1, min(SHAPE_DRAWS, len(films))).astype(int)]
     shapes = [_profiles(hypothesis.material.from_vector(p), shape_at, measurement) for p in some]
     lam1, lam2, eigenvalue = _map(film, states)
-    return Digest(
+    return Predictions(
         at=measurement.deflection,
         force=measurement.force,
         sd=own_sd if own_sd is not None else np.full(len(measurement), np.nan),
@@ -277,19 +207,20 @@ def digest_draws(
 
 
 @dataclass(frozen=True)
-class _Points:
+class _Readings:
     at: Array
     force: Array
     sd: Array
 
-    @staticmethod
-    def of(measurement: Measurement | None) -> _Points:
-        if measurement is None:
-            return _Points(*(np.empty(0) for _ in range(3)))
-        sd = measurement.force_sd
-        return _Points(
-            measurement.deflection, measurement.force, sd if sd is not None else np.full(len(measurement), np.nan)
-        )
+
+def _points(measurement: Measurement | None) -> _Readings:
+    """Deflection, force and stated noise of points, nan without any; none if there is no measurement."""
+    if measurement is None:
+        return _Readings(*(np.empty(0) for _ in range(3)))
+    sd = measurement.force_sd
+    return _Readings(
+        measurement.deflection, measurement.force, sd if sd is not None else np.full(len(measurement), np.nan)
+    )
 
 
 def _subset(x: Array, draws: int, seed: int) -> Array:
@@ -359,53 +290,3 @@ def _map(film: Material, states: Array) -> tuple[Array, Array, Array]:
     gd = abs(float(np.asarray(film.shear_modulus(film.vector)))) or 1.0
     value = least_eigenvalue(hessian[..., 0, 0], hessian[..., 0, 1], hessian[..., 1, 1])
     return l1, l2, np.asarray(value / gd)
-
-
-# ---- storage ---------------------------------------------------------------------------------------------------------
-
-
-def _store(found: Digest, folder: Path, made: Mapping[str, Any]) -> None:
-    """Write ``digest.nc``, whole or not at all; raises `StorageError` if that cannot be."""
-    path = folder / FILE
-    try:
-        handle, name = tempfile.mkstemp(dir=folder, prefix=f".{FILE}.")
-        os.close(handle)
-        try:
-            _write(found, Path(name), made)
-            os.chmod(name, 0o644)
-            os.replace(name, path)
-        finally:
-            Path(name).unlink(missing_ok=True)
-    except OSError as error:
-        reason = error.strerror or error
-        raise StorageError(f"the digest cannot be written ({reason})", str(path), "free some space") from None
-
-
-def _read(path: Path) -> tuple[Digest, dict[str, Any]]:
-    try:
-        with h5netcdf.File(path, "r") as file:
-            arrays = {name: np.asarray(file.variables[name][...]) for name in _DIMS}
-            values: dict[str, Any] = json.loads(file.attrs["values"])
-            made = json.loads(file.attrs["made"])
-        values |= arrays
-        values["beyond"] = arrays["beyond"].astype(bool)
-        for name in ("reasons", "specimens"):
-            values[name] = tuple(values[name])
-        return Digest(**values), made
-    except (OSError, KeyError, ValueError, TypeError) as error:
-        reason = type(error).__name__
-        raise StorageError(f"the digest is damaged ({reason})", str(path), "remove the file and report again") from None
-
-
-def _write(found: Digest, path: Path, made: Mapping[str, Any]) -> None:
-    values: Mapping[str, Any] = {f.name: getattr(found, f.name) for f in fields(found)}
-    with h5netcdf.File(path, "w") as file:
-        for name, dims in _DIMS.items():
-            array = np.asarray(values[name])
-            array = array.astype(np.int8) if array.dtype == bool else array
-            for dimension, size in zip(dims.split(), array.shape, strict=True):
-                if dimension not in file.dimensions:
-                    file.dimensions[dimension] = size
-            file.create_variable(name, tuple(dims.split()), data=array)
-        file.attrs["values"] = json.dumps({k: v for k, v in values.items() if k not in _DIMS})
-        file.attrs["made"] = json.dumps(made)

@@ -1,11 +1,10 @@
 """A run: a posterior sampled, judged and stored under ``chains/<name>/``, and read back.
 
-run.toml       what was asked: data, hypothesis, settings, seed, versions, fingerprint
-posterior.nc   arviz InferenceData: posterior, prior, log_likelihood, posterior_predictive, observed_data,
-               constant_data (the means of the ensembles over the whole walk among it), sample_stats; a chain is
-               an ensemble
-status.json    what came out, written last
-chains.npz     only where a run was interrupted: everything needed to go on as if it had not been
+run.toml         what was asked: data, hypothesis, settings, seed, versions, fingerprint
+posterior.nc     draws and what belongs to them, as arviz InferenceData (`calibration.layout`)
+status.json      what came out in numbers, written last
+predictions.nc   what the draws predict, made for every finished run
+chains.npz       only where a run was interrupted: everything needed to go on as if it had not been
 """
 
 from __future__ import annotations
@@ -15,24 +14,33 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import arviz
 import numpy as np
 
-from bayesmembrane.calibration import store as storage
-from bayesmembrane.calibration.crosscheck import crosscheck
-from bayesmembrane.calibration.goodness import dominates, dominates_sentence, goodness
-from bayesmembrane.calibration.posterior import Posterior, failure_sentence
-from bayesmembrane.calibration.sampling.walk import Callback, Chains, Sampled, Settings, run_ensembles
+from bayesmembrane.calibration.layout import measurement_of
+from bayesmembrane.calibration.outcome import outcome
+from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.prediction_store import read_predictions, write_predictions
+from bayesmembrane.calibration.predictions import Predictions, Wanted, predict_draws
+from bayesmembrane.calibration.quality import Quality, quality_of
+from bayesmembrane.calibration.sampling.chains import read_chains
+from bayesmembrane.calibration.sampling.walk import Callback, Settings, run_ensembles
+from bayesmembrane.calibration.store import (
+    ASKED,
+    CHAINS,
+    STATUS,
+    claim,
+    describe,
+    is_finished,
+    read_run,
+    run_name,
+    write_run,
+)
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.cache import CachedSolver, Tally
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis, from_settings
 from bayesmembrane.physics.mechanics import api
-
-MOST_DRAWS, LONG, DRAWS_IF_LONG = 4000, 100, 1000
-PRIOR_DRAWS = 500
-WALK_STEPS = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +70,7 @@ class Run:
     @cached_property
     def measurement(self) -> Measurement:
         """What it was sampled against."""
-        return storage.measurement_of(self.data)
+        return measurement_of(self.data)
 
     @property
     def interrupted(self) -> bool:
@@ -78,8 +86,19 @@ class Run:
         values = self.data.posterior_predictive["curve"].values
         return np.asarray(values.reshape(-1, values.shape[-1]), dtype=float)
 
+    @cached_property
+    def quality(self) -> Quality:
+        """How far the draws can be trusted."""
+        posterior = self.data.posterior
+        return quality_of(self.status, posterior["noise.sd"].values.ravel() if "noise.sd" in posterior else np.empty(0))
+
+    @property
+    def draws_name(self) -> str:
+        """What tells these draws from others: an interrupted run that went on has more evaluations."""
+        return f"{self.settings['fingerprint']} {self.status['evaluations']}"
+
     def summary(self) -> dict[str, Any]:
-        """Plain values for the JSON answer of ``sample``."""
+        """Plain values of the JSON answer of ``sample``."""
         return {"run": str(self.path) if self.path else self.name, **self.status}
 
 
@@ -94,38 +113,69 @@ def sample(
     settings: Settings | None = None,
     progress: Callback | None = None,
     solve: Solve = api.solve,
+    predictions: bool = True,
+    rest: Measurement | None = None,
 ) -> Run:
     """Sample p(parameters | measurement) until every coordinate is worth ``ess`` independent draws, and store it.
 
     ``out`` is the folder of all runs (None: nothing is stored), ``name`` that of this one in it (None: made from
     specimen, hypothesis, range and a fingerprint of everything that the answer depends on). A finished run with this
     fingerprint is read back, an interrupted one continued. Ctrl-C stores what is there, with the status "interrupted".
+    A run that is stored and finished gets its ``predictions``, those of the points ``rest`` that were left out among
+    them; without, `predictions_of` makes them when they are asked for.
 
     Raises `SettingsError` for hypotheses that the data cannot reach, `StorageError` if the folder cannot be written
     or belongs to something else.
     """
-    settings, cached = settings or Settings(ess=ess), _tally(solve)
-    posterior = Posterior(hypothesis, measurement, solve)
-    asked = storage.describe(measurement, hypothesis, settings, seed)
-    name = name or storage.run_name(measurement, hypothesis, asked)
-    folder = None if out is None else storage.claim(Path(out) / name, asked)
-    if folder is not None and (folder / storage.STATUS).exists() and not (folder / storage.CHAINS).exists():
-        return load_run(folder)
-    before = storage.read_chains(folder) if folder is not None else None
-    sampled = run_ensembles(posterior, settings, seed, progress, before)
-    run = _assemble(posterior, sampled, settings, seed, name, folder, asked)
-    if cached is not None and (now := _tally(solve)) is not None:
-        run.status["cache"] = now.since(cached).summary()
-    if folder is not None:
-        storage.write_run(folder, asked, run.data, run.status, sampled.chains if run.interrupted else None)
+    settings = settings or Settings(ess=ess)
+    asked = describe(measurement, hypothesis, settings, seed)
+    name = name or run_name(measurement, hypothesis, asked)
+    folder = None if out is None else claim(Path(out) / name, asked)
+    if folder is not None and is_finished(folder):
+        run = load_run(folder)
+    else:
+        posterior, counted = Posterior(hypothesis, measurement, solve), _tally(solve)
+        before = None if folder is None else read_chains(folder / CHAINS)
+        sampled = run_ensembles(posterior, settings, seed, progress, before)
+        data, status = outcome(posterior, sampled, settings.ess, seed)
+        if counted is not None and (now := _tally(solve)) is not None:
+            status["cache"] = now.since(counted).summary()
+        run = Run(name, folder, asked, status, data)
+        if folder is not None:
+            write_run(folder, asked, data, status, sampled.chains if run.interrupted else None)
+    if predictions and folder is not None and not run.interrupted:
+        predictions_of(run, None if rest is None else Wanted(rest=rest), solve)
     return run
 
 
 def load_run(path: str | Path) -> Run:
     """The run stored in the folder ``path``; raises `StorageError` if there is none, or it is damaged."""
     path = Path(path)
-    settings, status, data = storage.read_run(path)
+    settings, status, data = read_run(path)
     return Run(path.name, path, settings, status, data)
+
+
+def predictions_of(run: Run, wanted: Wanted | None = None, solve: Solve = api.solve) -> Predictions:
+    """What the draws of a run predict; read back if it is stored with them, else computed and, if they are, stored.
+
+    ``wanted`` None takes what there is, or makes what `Wanted` asks for. Raises `StorageError` if what is stored is
+    damaged, or the folder cannot be written.
+    """
+    found = stored_predictions(run, wanted)
+    if found is None:
+        asked, seed = wanted or Wanted(), int(run.settings["seed"])
+        found = predict_draws(run.hypothesis, run.measurement, run.draws(), asked, seed, solve)
+        if run.path is not None:
+            write_predictions(found, run.path, run.draws_name, asked)
+    return found
+
+
+def stored_predictions(run: Run, wanted: Wanted | None = None) -> Predictions | None:
+    """The predictions stored with a run; None if there are none, or not of these draws, or not what is ``wanted``.
+
+    Raises `StorageError` if they are damaged.
+    """
+    return None if run.path is None else read_predictions(run.path, run.draws_name, wanted)
 
 
 def _tally(solve: Solve) -> Tally | None:
@@ -136,124 +186,5 @@ def _tally(solve: Solve) -> Tally | None:
 def run_folders(path: str | Path) -> list[Path]:
     """The runs, finished or interrupted, in the folder ``path``; ``path`` itself if it is a run or holds none."""
     path = Path(path)
-    runs = sorted(p.parent for p in path.glob(f"*/{storage.STATUS}") if (p.parent / storage.ASKED).is_file())
-    return runs if runs and not (path / storage.ASKED).is_file() else [path]
-
-
-def _assemble(
-    posterior: Posterior, sampled: Sampled, settings: Settings, seed: int, name: str, folder: Path | None, asked: Any
-) -> Run:
-    """Everything that is derived from the chains."""
-    hypothesis, measurement = posterior.hypothesis, posterior.measurement
-    x, lp = sampled.draws(MOST_DRAWS if len(measurement) <= LONG else DRAWS_IF_LONG)
-    flat = x.reshape(-1, x.shape[-1])
-    evaluation = posterior.evaluate(flat)
-    rng = np.random.default_rng([seed, 1])
-    noise = posterior.noise.draw(hypothesis.noise_coordinates(flat), rng)
-    masses, prior = posterior.prior.survey(measurement, seed, solve=posterior.solve)
-    prior = prior[:PRIOR_DRAWS]
-    shape = x.shape[:2]
-
-    def folded(values: Array) -> Array:
-        return values.reshape(*shape, *values.shape[1:]).astype(np.float32)
-
-    data = storage.inference_data(
-        measurement,
-        _walk(sampled.chains),
-        posterior=named(hypothesis, measurement, flat, shape),
-        prior=named(hypothesis, measurement, prior, (1, len(prior))) if len(prior) else None,
-        log_likelihood={"force": folded(posterior.pointwise(flat, evaluation.force))},
-        posterior_predictive={"force": folded(evaluation.force + noise), "curve": folded(evaluation.force)},
-        sample_stats={"lp": lp, "log_prior": evaluation.log_prior.reshape(shape)},
-    )
-    status = {
-        **_answer(hypothesis, data, sampled, settings),
-        "prior_mass": {mode: {"value": m.value, "sd": m.sd} for mode, m in masses.items()},
-        **_judgement(posterior, data, evaluation.force[int(np.argmax(lp))]),
-        "crosscheck": crosscheck(posterior.forward, flat, seed).summary(),
-        "best": _best(hypothesis, measurement, flat[int(np.argmax(lp))]),
-    }
-    status["sentences"] = [*_sentences(sampled, settings, status), *status.pop("_more")]
-    return Run(name, folder, asked, status, data)
-
-
-def _walk(chains: Chains) -> dict[str, Array]:
-    """Means over the walkers of each ensemble at `WALK_STEPS` steps at most, burn-in included."""
-    at = np.unique(np.linspace(0, chains.steps - 1, WALK_STEPS).round().astype(int))
-    return {"ensemble_mean": chains.x[:, at].mean(axis=2), "ensemble_step": at.astype(float)}
-
-
-def named(hypothesis: Hypothesis, measurement: Measurement, x: Array, shape: tuple[int, ...]) -> dict[str, Array]:
-    """Coordinates and natural parameters by full name, each of ``shape``, of draws x (B, k)."""
-    natural = hypothesis.natural(x, measurement)
-    values = {n: natural[:, i] for i, n in enumerate(hypothesis.natural_names)}
-    values |= {n: x[:, i] for i, n in enumerate(hypothesis.names)}
-    return {n: v.reshape(shape) for n, v in values.items()}
-
-
-def short(hypothesis: Hypothesis, name: str) -> str:
-    """The name in JSON answers: the material's parameters without their component."""
-    return name.removeprefix(f"{hypothesis.material.name}.")
-
-
-def _answer(hypothesis: Hypothesis, data: Any, sampled: Sampled, settings: Settings) -> dict[str, Any]:
-    c = sampled.convergence
-    table = {}
-    for name in hypothesis.natural_names:
-        values = data.posterior[name].values.ravel()
-        low, high = arviz.hdi(values, hdi_prob=0.94)  # type: ignore[no-untyped-call]
-        table[short(hypothesis, name)] = {
-            "mean": float(np.mean(values)),
-            "sd": float(np.std(values)),
-            "hdi_94": [float(low), float(high)],
-        }
-    return {
-        "status": sampled.status,
-        "posterior": table,
-        "ess_bulk": float(np.min(c.ess)),
-        "ess_wanted": settings.ess,
-        "r_hat": float(np.max(c.r_hat)),
-        "tau": {n: float(t) for n, t in zip(hypothesis.names, c.tau, strict=True)},
-        "acceptance": c.acceptance,
-        "steps": sampled.chains.steps,
-        "burn": c.burn,
-        "walkers": int(sampled.chains.x.shape[2]),
-        "evaluations": sampled.chains.evaluations,
-        "seconds": sampled.chains.seconds,
-        "tally": dict(sampled.chains.counts),
-    }
-
-
-def _judgement(posterior: Posterior, data: Any, best: Array) -> dict[str, Any]:
-    """Goodness of the best draw's curve, by the measurement's own noise, and what the inferred noise says."""
-    found = goodness(posterior.measurement, best, posterior.hypothesis.curve_size)
-    answer: dict[str, Any] = {"goodness": found.summary(), "extra_noise_dominates": False, "_more": []}
-    if "noise.sd" in data.posterior and found.own_noise_N is not None:
-        sd = data.posterior["noise.sd"].values.ravel()
-        if dominates(found.own_noise_N, sd):
-            answer["extra_noise_dominates"] = True
-            answer["_more"] = [dominates_sentence(found.own_noise_N, sd)]
-    return answer
-
-
-def _best(hypothesis: Hypothesis, measurement: Measurement, x: Array) -> dict[str, float]:
-    """Natural parameters of the draw with the largest posterior density."""
-    values = hypothesis.natural(x, measurement)[0]
-    return {short(hypothesis, n): float(v) for n, v in zip(hypothesis.natural_names, values, strict=True)}
-
-
-def _sentences(sampled: Sampled, settings: Settings, status: dict[str, Any]) -> list[str]:
-    """What a reader must know before trusting the numbers."""
-    c, sentences = sampled.convergence, []
-    if not c.enough(settings.ess):
-        why = (
-            "the run was interrupted"
-            if sampled.status == "interrupted"
-            else f"the limit of {sampled.chains.steps} steps"
-        )
-        sentences.append(
-            f"Not converged ({why}): ESS {np.min(c.ess):.0f} of {settings.ess:.0f} wanted, {c.lengths:.0f} of 50 "
-            f"autocorrelation times walked, R-hat {np.max(c.r_hat):.3f}."
-        )
-    failures = failure_sentence(sampled.chains.counts)
-    return [*sentences, failures] if failures else sentences
+    runs = sorted(p.parent for p in path.glob(f"*/{STATUS}") if (p.parent / ASKED).is_file())
+    return runs if runs and not (path / ASKED).is_file() else [path]

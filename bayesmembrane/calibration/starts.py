@@ -9,6 +9,7 @@ import numpy as np
 from bayesmembrane.calibration.descent import descend
 from bayesmembrane.calibration.objective import Objective, apart
 from bayesmembrane.calibration.posterior import Posterior, tally
+from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 
@@ -122,7 +123,7 @@ def _tempered(lp: Array, worth: float, count: int, rng: np.random.Generator) -> 
     for _ in range(40):
         b = 0.5 * (low + high)
         w = np.exp(b * lp)
-        low, high = (b, high) if np.sum(w) ** 2 / np.sum(w * w) >= worth else (low, b)
+        low, high = (b, high) if effective_draws(w) >= worth else (low, b)
     # The largest of ln w + Gumbel noise are a draw without replacement.
     order = np.argsort(-(low * lp + rng.gumbel(size=lp.size)))
     return np.asarray(np.resize(order, count) if len(order) < count else order[:count])

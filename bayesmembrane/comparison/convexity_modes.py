@@ -12,6 +12,7 @@ from scipy.special import logsumexp
 
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.prior import Mass
+from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
 from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.ground.errors import SettingsError
@@ -88,8 +89,7 @@ class _Weighted:
         return np.where(self.inside[mode], self.log_weight, -np.inf)
 
     def ess(self, mode: str) -> float:
-        w = self.relative(mode)
-        return float(np.sum(w) ** 2 / np.sum(w * w)) if np.any(w > 0) else 0.0
+        return effective_draws(self.relative(mode))
 
     def relative(self, mode: str) -> Array:
         """Weights (B,), the largest of no convexity being one."""

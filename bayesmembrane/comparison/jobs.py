@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.calibration import store as storage
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.prior import DRAWS, Mass
 from bayesmembrane.calibration.run import Run, load_run, sample
 from bayesmembrane.calibration.sampling.walk import Progress, Settings
 from bayesmembrane.calibration.starts import starting_points
+from bayesmembrane.calibration.store import ASKED, STATUS, claim, describe, is_finished, run_name
 from bayesmembrane.comparison.convexity_modes import ByMode, by_convexity
 from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, SIGMAS, together
@@ -92,7 +92,7 @@ def judge(job: Job, tell: Tell) -> Row:
 
 def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Row:
     """What the draws of a run tell, and nested sampling beside it."""
-    key = f"{run.settings['fingerprint']} {run.status['evaluations']}"
+    key = run.draws_name
     draws, worth = run.draws(), float(run.status["ess_bulk"])
 
     def kept(name: str, words: str, make: Callable[[], Any], more: str = "") -> Any:
@@ -130,7 +130,7 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
         run=run.path,
         evaluations=int(run.status["evaluations"]) + climbed.evaluations + bridged.evaluations,
         seconds=float(run.status["seconds"]) + climbed.seconds + bridged.seconds,
-        notes=tuple(run.status["sentences"]),
+        quality=run.quality,
     )
 
 
@@ -179,7 +179,8 @@ def _run(job: Job, tell: Tell) -> Run:
     folder = folder_of(job)
     if folder is not None and _serves(folder, _asked(job)):
         return load_run(folder)
-    run = sample(job.measurement, job.hypothesis, seed=job.seed, out=job.out, settings=job.settings, progress=progress)
+    options: dict[str, Any] = {"seed": job.seed, "out": job.out, "settings": job.settings, "progress": progress}
+    run = sample(job.measurement, job.hypothesis, predictions=False, **options)
     if run.interrupted:
         raise KeyboardInterrupt
     return run
@@ -206,7 +207,7 @@ def _modes(posterior: Posterior, run: Run, found: Estimate, seed: int) -> tuple[
 
 
 def _asked(job: Job) -> dict[str, Any]:
-    return storage.describe(job.measurement, job.hypothesis, job.settings, job.seed)
+    return describe(job.measurement, job.hypothesis, job.settings, job.seed)
 
 
 def folder_of(job: Job) -> Path | None:
@@ -217,21 +218,21 @@ def folder_of(job: Job) -> Path | None:
     if job.out is None:
         return None
     asked = _asked(job)
-    for path in sorted(job.out.glob(f"*/{storage.ASKED}")):
+    for path in sorted(job.out.glob(f"*/{ASKED}")):
         if _serves(path.parent, asked):
             return path.parent
-    return storage.claim(job.out / storage.run_name(job.measurement, job.hypothesis, asked), asked)
+    return claim(job.out / run_name(job.measurement, job.hypothesis, asked), asked)
 
 
 def _serves(folder: Path, asked: dict[str, Any]) -> bool:
     """Whether a folder holds a finished run that answers what is asked."""
     try:
-        held = tomllib.loads((folder / storage.ASKED).read_text(encoding="utf-8"))
+        held = tomllib.loads((folder / ASKED).read_text(encoding="utf-8"))
         same = all(held[part] == asked[part] for part in ("seed", "hypothesis", "code"))
         same = same and held["data"]["sha256"] == asked["data"]["sha256"]
-        if not same or (folder / storage.CHAINS).exists():
+        if not same or not is_finished(folder):
             return False
-        status = json.loads((folder / storage.STATUS).read_text(encoding="utf-8"))
+        status = json.loads((folder / STATUS).read_text(encoding="utf-8"))
         return bool(status["ess_bulk"] >= asked["sampling"]["ess"])
     except (OSError, ValueError, KeyError):
         return False

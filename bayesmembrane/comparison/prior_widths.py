@@ -9,6 +9,7 @@ import arviz
 import numpy as np
 
 from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array, Prior, Uniform
 from bayesmembrane.physics.forward import Forward, Solve
@@ -100,7 +101,7 @@ def _reweighted(name: str, factor: float, log_ratio: Array, worth: float, mass: 
     n = len(log_ratio)
     w = np.exp(log_ratio - np.max(log_ratio))
     w /= np.mean(w)
-    ess = float(worth * n / np.mean(w * w))
+    ess = worth * effective_draws(w)
     log_mass, log_mass_sd = mass
     change = float(np.max(log_ratio) + np.log(np.mean(np.exp(log_ratio - np.max(log_ratio))))) - log_mass
     k = _tail_index(log_ratio, worth)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bayesmembrane.calibration.prior import Mass
+from bayesmembrane.calibration.quality import Quality
 from bayesmembrane.comparison.convexity_modes import ByMode
 from bayesmembrane.comparison.evidence.estimate import WIDEST, Evidence
 from bayesmembrane.comparison.leave_out.score import LeaveOneOut, LeaveRangeOut
@@ -33,7 +34,7 @@ class Row:
     widths, modes : ln Z under other prior widths, and under the other convexity modes
     run : folder of the posterior draws, if it is stored
     evaluations, seconds : in all
-    notes : sentences on the quality of the draws
+    quality : how far the draws can be trusted, None without any
     reason : "" or why the hypothesis has no evidence, as a sentence
     """
 
@@ -49,7 +50,7 @@ class Row:
     run: Path | None = None
     evaluations: int = 0
     seconds: float = 0.0
-    notes: tuple[str, ...] = ()
+    quality: Quality | None = None
     reason: str = ""
 
     @property
@@ -77,7 +78,6 @@ class Row:
             "run": str(self.run) if self.run else None,
             "evaluations": self.evaluations,
             "seconds": self.seconds,
-            "notes": list(self.notes),
             "reason": self.reason or (e.reason if e else ""),
         }
 

@@ -70,7 +70,10 @@ class Motion:
 
     @cached_property
     def speed(self) -> Array:
-        """(N,) m/s: speed of the disc, averaged over neighbours on the same leg; `NOMINAL_SPEED` without times."""
+        """(N,) m/s: speed of the disc, averaged over neighbours on the same leg.
+
+        `NOMINAL_SPEED` without times, and where the disc never moves.
+        """
         if self.time is None or self.time.size < 2:
             return np.full(self.deflection.size, NOMINAL_SPEED)
         speed = np.abs(np.diff(self.deflection)) / np.diff(self.time)
@@ -84,7 +87,8 @@ class Motion:
                 np.ones(inner.size), np.ones(window), "same"
             )
             middle[leg] = np.interp(leg, np.arange(low, low + inner.size) + 0.5, smooth[: inner.size])
-        return np.maximum(middle, SLOWEST * float(np.max(middle)))
+        fastest = float(np.max(middle))
+        return np.maximum(middle, SLOWEST * fastest) if fastest > 0 else np.full(middle.size, NOMINAL_SPEED)
 
 
 def legs(deflection: Array) -> NDArray[np.int8]:

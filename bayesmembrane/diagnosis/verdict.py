@@ -99,6 +99,8 @@ def _renewed(tracer: Tracer, judged: list[Judged]) -> tuple[Tracer, list[Judged]
     """
     best = judged[0].candidate
     basis = np.column_stack([tracer.basis, best.slopes])
+    if orthonormal(basis).shape[1] >= len(tracer.measurement):
+        return tracer, judged  # few points: what the best model leaves is nothing at all, and says nothing of noise
     noise = own_noise(tracer.measurement, basis)
     weight = effective_weight(noise.white(best.residual))
     search = replace(tracer.search, noise=noise, weight=weight)

@@ -1,8 +1,8 @@
 """Finds the components: one class a file in this package, plus entry points of other packages.
 
-A component of a group ("materials", "effects", "noise", "rigs", "importers") is a class that derives from an abstract
-class of ``bayesmembrane/<group>/base.py``, leaves nothing abstract, and has a ``name``. Writing its file is enough;
-another package declares it under the entry point group ``bayesmembrane.<group>``.
+A component of a group ("materials", "effects", "noise", "rigs", "importers", "sections") is a class that derives from
+an abstract class of the ``base.py`` of the group's folder, leaves nothing abstract, and has a ``name``. Writing its
+file is enough; another package declares it under the entry point group ``bayesmembrane.<group>``.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ if TYPE_CHECKING:
     from bayesmembrane.physics.materials.base import Material
 
 _PACKAGE = __name__.partition(".")[0]
-_ROOMS = {"importers": "data"}  # all others live in physics
+_ROOMS = {"importers": "data", "sections": "report"}  # all others live in physics
 _SINGULAR = {
     "materials": "material",
     "effects": "effect",
     "noise": "noise model",
     "rigs": "rig",
     "importers": "importer",
+    "sections": "section of the report",
 }
 
 

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.calibration.predictions import load_digest
-from bayesmembrane.calibration.run import Run, load_run
+from bayesmembrane.calibration.run import Run, load_run, predictions_of
 from bayesmembrane.ground.errors import SettingsError, StorageError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.report.view import Sampling, Shown, Specimen
@@ -19,8 +18,7 @@ _SHOWN_APART = ("hypothesis", "sampling", "data", "code", "versions", "seed", "f
 def read(run: Run | Path | str) -> Shown:
     """A run, or the folder that holds one, as a report shows it.
 
-    Raises `StorageError` if the folder holds no run, or a run without digest; `SettingsError` for a run that is not
-    stored.
+    Raises `StorageError` if the folder holds no run; `SettingsError` for a run that is not stored.
     """
     if not isinstance(run, Run):
         folder = Path(run)
@@ -28,14 +26,7 @@ def read(run: Run | Path | str) -> Shown:
             raise StorageError("there is no such run folder", str(folder), "name a folder under chains/")
         run = load_run(folder)
     if run.path is None:
-        raise SettingsError(f'the run "{run.name}" is not stored', remedy="sample with out=, and digest it")
-    digest = load_digest(run)
-    if digest is None:
-        raise StorageError(
-            "the run has no digest, or one of other draws",
-            str(run.path),
-            "make one with calibration.predictions.digest(run)",
-        )
+        raise SettingsError(f'the run "{run.name}" is not stored', remedy="sample with out=")
     m, h = run.measurement, run.hypothesis
     p = m.provenance
     return Shown(
@@ -50,7 +41,7 @@ def read(run: Run | Path | str) -> Shown:
             p.notes,
         ),
         data_hash=m.data_hash,
-        digest=digest,
+        digest=predictions_of(run),
         x=run.draws(),
         natural=_stacked(run.data.posterior, h.natural_names),
         prior=_stacked(run.data.prior, h.names) if "prior" in run.data.groups() else np.empty((0, len(h.names))),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bayesmembrane.calibration.posterior import FAILURES
-from bayesmembrane.calibration.predictions import Digest
+from bayesmembrane.calibration.predictions import Predictions
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -75,7 +75,7 @@ class Shown:
     hypothesis: Hypothesis
     specimen: Specimen
     data_hash: str
-    digest: Digest
+    digest: Predictions
     x: Array
     natural: Array
     prior: Array

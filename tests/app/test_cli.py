@@ -103,6 +103,13 @@ def test_a_missing_option_is_wrong_usage(run: Run) -> None:
     assert run("force", "--material", "gent")[0] == 2
 
 
+def test_a_negative_seed_is_wrong_usage(run: Run) -> None:
+    code, out, err = run("fit", CURVE, "--specimen", SPECIMEN, "--material", "gent", "--seed", "-1")
+    assert (code, out) == (2, "")
+    assert "--seed" in err
+    assert "Traceback" not in err
+
+
 def test_fit_answers_the_contract(run: Run) -> None:
     code, out, _ = run("fit", CURVE, "--specimen", SPECIMEN, "--material", "neo_hookean", "--json")
     answer = json.loads(out)

@@ -31,6 +31,21 @@ def test_walls_of_nan_are_not_crossed() -> None:
     assert size[1] == np.inf
 
 
+def test_no_start_and_no_step_goes_where_slopes_are_missing() -> None:
+    """A film may have a force and no slope: the step after it would be nowhere."""
+
+    def walled(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        r, j = rosenbrock(x)
+        j[x[:, 0] > 0.5, 1] = np.nan
+        return r, j
+
+    x, size = descend(walled, np.array([[-1.0, 1.0], [2.0, 2.0]]), LOW, HIGH, 200)
+    assert np.all(np.isfinite(x))
+    assert x[0, 0] <= 0.5
+    assert size[0] < 0.75
+    assert size[1] == np.inf
+
+
 def test_bounds_and_held_coordinates_are_kept() -> None:
     start = np.array([[-3.0, 2.0]])
     x, _ = descend(rosenbrock, start, LOW, np.array([0.5, 5.0]), 200)

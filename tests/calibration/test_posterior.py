@@ -1,13 +1,12 @@
 """The posterior: what it is made of, and why it is zero where it is."""
 
-from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from bayesmembrane.calibration.posterior import Outcome, Posterior, failure_sentence, tally
+from bayesmembrane.calibration.posterior import Outcome, Posterior, tally
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -62,13 +61,6 @@ def test_a_numerical_failure_is_counted_and_not_taken_for_physics(film) -> None:
     e = p.evaluate(at("gent", [[7.5, 50.0], [7.5, 60.0]]))
     assert list(e.outcome) == [Outcome.UNRESOLVED, Outcome.OK]
     assert e.log_likelihood[0] == -np.inf
-
-
-def test_failures_are_told_from_a_tenth_of_a_percent() -> None:
-    assert failure_sentence(Counter({"ok": 9990, "unresolved": 10})) == ""
-    assert failure_sentence(Counter({"ok": 1000, "locked": 500})) == ""
-    sentence = failure_sentence(Counter({"ok": 9970, "unresolved": 20, "iteration limit": 10}))
-    assert sentence.startswith("30 of 10000 draws (0.3 %)")
 
 
 def test_more_parameters_than_points_are_refused(film) -> None:  # type: ignore[no-untyped-def]

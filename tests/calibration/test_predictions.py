@@ -1,4 +1,4 @@
-"""The digest says what the draws say."""
+"""Predictions say what the draws say, and are stored with them."""
 
 from pathlib import Path
 
@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from bayesmembrane.calibration.beside_paper import BreakPoint
-from bayesmembrane.calibration.predictions import FILE, Digest, digest, digest_draws, load_digest
-from bayesmembrane.calibration.run import Run, sample
+from bayesmembrane.calibration.prediction_store import FILE
+from bayesmembrane.calibration.predictions import Predictions, Wanted, predict_draws
+from bayesmembrane.calibration.run import Run, load_run, predictions_of, sample, stored_predictions
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import StorageError
@@ -32,8 +33,8 @@ def gent(limits: list[float], noise: float = -20.0) -> np.ndarray:
     return np.array([[np.log(15.0), np.log(jm), noise] for jm in limits])
 
 
-def made(x: np.ndarray, **options: object) -> Digest:
-    return digest_draws(hypothesis("gent"), measured(), x, **options)  # type: ignore[arg-type]
+def made(x: np.ndarray, **options: object) -> Predictions:
+    return predict_draws(hypothesis("gent"), measured(), x, Wanted(**options))  # type: ignore[arg-type]
 
 
 def test_bands_are_quantiles_of_the_curves_and_the_end_of_the_fit_is_on_the_grid() -> None:
@@ -56,7 +57,7 @@ def test_bands_hold_the_truth_and_widen_beyond_the_fit() -> None:
     force = shot(at) + 0.02 * np.random.default_rng(8).standard_normal(at.size)
     part = Measurement(at, force, Annulus(0.010, 0.035), Specimen("film", 50e-6)).up_to(0.06)
     claim = hypothesis("gent")
-    found = digest_draws(claim, part, sample(part, claim, seed=5).draws())
+    found = predict_draws(claim, part, sample(part, claim, seed=5).draws())
     low, middle, high = found.curve
     truth, inner = shot(found.deflection), ~found.beyond
     sd = (high - low) / (2 * 1.645)
@@ -85,7 +86,7 @@ def test_draws_that_lock_are_counted_by_reason_and_bands_end_where_most_have_no_
 
 
 def test_thickness_scales_the_force_at_break() -> None:
-    breaks = [BreakPoint("a", 50e-6, 0.030, 1.0), BreakPoint("b", 200e-6, 0.030, 1.0), BreakPoint("c", 50e-6, 0.2, 1.0)]
+    breaks = tuple(BreakPoint(n, t, d, 1.0) for n, t, d in (("a", 50e-6, 0.03), ("b", 200e-6, 0.03), ("c", 50e-6, 0.2)))
     found = made(gent([40.0] * 3), breaks=breaks)
     assert found.break_predicted[1, 1] == pytest.approx(4 * found.break_predicted[1, 0])
     assert found.break_lost.tolist() == [0.0, 0.0, 1.0]
@@ -114,40 +115,61 @@ def test_states_shapes_and_map_belong_to_the_film() -> None:
     assert np.nanmin(found.eigenvalue) > 0
 
 
+SHORT = Settings(ess=1.0, chunk=30, most_steps=30, walkers=16)
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    settings = Settings(ess=1.0, chunk=30, most_steps=30, walkers=16)
-    return sample(measured(), hypothesis("neo_hookean"), out=tmp_path_factory.mktemp("chains"), settings=settings)
+    out = tmp_path_factory.mktemp("chains")
+    return sample(measured(), hypothesis("neo_hookean"), out=out, settings=SHORT, predictions=False)
 
 
-def test_a_stored_digest_equals_the_one_that_was_computed(run: Run) -> None:
-    assert load_digest(run) is None
-    breaks = (BreakPoint("1", 100e-6, 0.02, 1.0),)
-    fresh = digest(run, breaks=breaks, draws=10)
-    again = load_digest(run)
-    assert again is not None
-    for name, value in vars(fresh).items():
+def assert_same(a: Predictions, b: Predictions) -> None:
+    for name, value in vars(a).items():
         if isinstance(value, np.ndarray):
-            np.testing.assert_array_equal(value, getattr(again, name), err_msg=name)
+            np.testing.assert_array_equal(value, getattr(b, name), err_msg=name)
+            assert value.dtype == getattr(b, name).dtype, name
         else:
-            assert getattr(again, name) == value, name
-    assert again.beyond.dtype == bool
+            assert getattr(b, name) == value, name
+
+
+def test_stored_predictions_equal_those_that_were_computed(run: Run) -> None:
+    assert stored_predictions(run) is None
+    fresh = predictions_of(run, Wanted(breaks=(BreakPoint("1", 100e-6, 0.02, 1.0),), draws=10))
+    again = stored_predictions(run)
+    assert again is not None
+    assert_same(fresh, again)
+
+
+def test_a_finished_run_has_its_predictions_whoever_made_it(run: Run, tmp_path: Path) -> None:
+    at = np.array([0.034, 0.040])
+    rest = Measurement(at, force_curve("gent", (7.5, 40.0), at)[0], Annulus(0.010, 0.035), Specimen("film", 50e-6))
+    done = sample(measured(), hypothesis("neo_hookean"), out=tmp_path, settings=SHORT, rest=rest)
+    found = stored_predictions(done)
+    assert found is not None
+    assert found.rest_at.tolist() == at.tolist()
+    assert_same(found, predict_draws(done.hypothesis, done.measurement, done.draws(), Wanted(rest=rest)))
+    assert done.path is not None
+    (done.path / FILE).unlink()
+    assert predictions_of(load_run(done.path)).rest_at.size == 0
+    assert (done.path / FILE).is_file()
+    assert_same(predictions_of(run, Wanted()), predict_draws(run.hypothesis, run.measurement, run.draws()))
 
 
 def test_other_questions_are_computed_anew_and_none_reads_back(run: Run) -> None:
-    digest(run, up_to=0.06, draws=10)
-    assert digest(run).deflection[-1] == pytest.approx(0.06)
-    assert digest(run, up_to=0.05, draws=10).deflection[-1] == pytest.approx(0.05)
-    assert digest(run).deflection[-1] == pytest.approx(0.05)
+    predictions_of(run, Wanted(up_to=0.06, draws=10))
+    assert predictions_of(run).deflection[-1] == pytest.approx(0.06)
+    assert predictions_of(run, Wanted(up_to=0.05, draws=10)).deflection[-1] == pytest.approx(0.05)
+    assert predictions_of(run).deflection[-1] == pytest.approx(0.05)
 
 
-def test_a_digest_of_other_draws_does_not_count(run: Run) -> None:
-    digest(run, up_to=0.05, draws=10)
+def test_predictions_of_other_draws_do_not_count(run: Run) -> None:
+    predictions_of(run, Wanted(up_to=0.05, draws=10))
     other = Run(run.name, run.path, run.settings, {**run.status, "evaluations": 1}, run.data)
-    assert load_digest(other) is None
+    assert stored_predictions(other) is None
 
 
-def test_a_damaged_digest_is_named(run: Run, tmp_path: Path) -> None:
+def test_damaged_predictions_are_named(run: Run, tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(b"no netCDF")
-    with pytest.raises(StorageError, match=r"the digest is damaged"):
-        load_digest(Run(run.name, tmp_path, run.settings, run.status, run.data))
+    with pytest.raises(StorageError, match=r"the predictions are damaged"):
+        stored_predictions(Run(run.name, tmp_path, run.settings, run.status, run.data))

@@ -16,6 +16,7 @@ from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import request, solve
+from bayesmembrane.words.sampling import sentences
 from tests.physics.predicting import predict
 
 
@@ -49,7 +50,7 @@ def test_the_truth_is_recovered_with_a_noise_of_its_own(film, name: str, paramet
     assert run.status["r_hat"] <= 1.01
     assert run.status["crosscheck"]["largest"] < 1e-6
     assert run.status["prior_mass"]["none"]["value"] == 1.0
-    assert not run.status["sentences"]
+    assert not sentences(run.quality)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +80,9 @@ def test_a_run_is_read_back_as_it_was(stored: Run) -> None:
     assert np.array_equal(again.draws(), stored.draws())
     assert np.array_equal(again.curves(), stored.curves())
     json.dumps(again.summary(), allow_nan=False)
-    assert {p.name for p in stored.path.iterdir()} == {"run.toml", "posterior.nc", "status.json"}
+    names = {"run.toml", "posterior.nc", "status.json", "predictions.nc"}
+    assert {p.name for p in stored.path.iterdir()} == names
+    assert again.quality == stored.quality
 
 
 def test_inference_data_is_complete(stored: Run) -> None:
@@ -185,7 +188,7 @@ def test_an_interrupted_run_is_stored_and_continued(film, tmp_path: Path) -> Non
     assert partial.interrupted
     assert partial.path is not None
     assert load_run(partial.path).interrupted
-    assert "Not converged (the run was interrupted)" in partial.status["sentences"][0]
+    assert "Not converged (the run was interrupted)" in sentences(partial.quality)[0]
     done = sample(curve, hypothesis("neo_hookean"), **options)  # type: ignore[arg-type]
     assert done.path == partial.path
     assert done.status["status"] == "converged"
@@ -198,7 +201,7 @@ def test_a_run_that_stops_early_says_so(film) -> None:  # type: ignore[no-untype
     curve = film("neo_hookean", (7.5,), noise=0.02, seed=1)
     run = sample(curve, hypothesis("neo_hookean"), settings=Settings(ess=1e6, chunk=60, most_steps=60))
     assert run.status["status"] == "step limit"
-    assert "the limit of 60 steps" in run.status["sentences"][0]
+    assert "the limit of 60 steps" in sentences(run.quality)[0]
 
 
 def test_noise_that_dominates_is_told(film) -> None:  # type: ignore[no-untyped-def]
@@ -206,5 +209,5 @@ def test_noise_that_dominates_is_told(film) -> None:  # type: ignore[no-untyped-
     curve = film("yeoh", (8.0, -0.2, 0.03), noise=0.002, seed=6, stated=True)
     run = sample(curve, hypothesis("neo_hookean"), seed=1)
     assert run.status["extra_noise_dominates"]
-    assert any("the model misses something" in s for s in run.status["sentences"])
+    assert any("the model misses something" in s for s in sentences(run.quality))
     assert run.status["goodness"]["reduced_chi2"] > 100

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bayesmembrane.calibration.store import inference_data, measurement_of
+from bayesmembrane.calibration.layout import inference_data, measurement_of
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.motion import NOMINAL_SPEED, Motion, holds
 from bayesmembrane.physics.rigs.annulus import Annulus
@@ -33,6 +33,8 @@ def test_one_point_has_a_path() -> None:
     one = Motion(np.array([0.01]), np.array([5.0]), 0.01)
     assert one.clock == pytest.approx([0.0])
     assert np.all(one.speed == NOMINAL_SPEED)
+    still = Motion(np.full(5, 0.01), np.arange(5.0), 0.01)
+    assert np.all(still.speed == NOMINAL_SPEED)
 
 
 def test_legs_and_cycles_of_a_selection_are_those_of_the_test() -> None:

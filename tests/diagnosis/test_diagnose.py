@@ -13,6 +13,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.ogden import Ogden
+from bayesmembrane.physics.rigs.equibiaxial import Equibiaxial
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.diagnosis.curves import measured
 from tests.generator.datasets import Dataset, generate
@@ -162,3 +163,13 @@ def test_a_stated_deviation_that_the_readings_contradict_raises_no_alarm(tmp_pat
     assert not found.noise.stated
     assert found.noise.excess == pytest.approx(1.5, rel=0.2)
     assert "Of the noise" in found.sentence
+
+
+def test_points_as_few_as_a_model_with_an_effect_has_coordinates_are_diagnosed() -> None:
+    """An effect then leaves nothing from which a noise could be told."""
+    stretch = np.array([1.43586233, 1.83998239, 2.27175154, 2.69922374, 3.18189218, 3.56241002])
+    stress = 1e6 * np.array([0.0719473831, 0.101390533, 0.127559295, 0.152277887, 0.179799764, 0.201397329])
+    rig, specimen = Equibiaxial(), Specimen("few", 5e-5)
+    force = stress * rig.width * specimen.thickness
+    curve = Measurement(rig.length * (stretch - 1), force, rig, specimen, time=28.1 * np.arange(6.0))
+    assert diagnose(curve, Hypothesis(materials()["gent"], convexity="elliptic")).verdict in VERDICTS

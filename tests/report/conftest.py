@@ -5,8 +5,8 @@ import pytest
 
 from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.calibration.goodness import goodness
-from bayesmembrane.calibration.predictions import digest, digest_draws
-from bayesmembrane.calibration.run import Run, sample
+from bayesmembrane.calibration.predictions import Wanted, predict_draws
+from bayesmembrane.calibration.run import Run, predictions_of, sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen
 from bayesmembrane.physics.cache import Tally
@@ -43,7 +43,7 @@ def show(material: str, center: tuple[float, ...], measurement: Measurement, dom
     claim = hypothesis(material)
     x = drawn(claim, center)
     k = x.shape[1]
-    found = digest_draws(claim, measurement, x, up_to=0.05, breaks=BREAKS, draws=25)
+    found = predict_draws(claim, measurement, x, Wanted(up_to=0.05, breaks=BREAKS, draws=25))
     good = status == "converged"
     sampling = Sampling(
         status=status,
@@ -97,8 +97,9 @@ def neo_hookean() -> Shown:
 
 @pytest.fixture(scope="session")
 def stored(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A neo-Hookean run of a few steps, with its digest."""
+    """A neo-Hookean run of a few steps, with its predictions."""
     settings = Settings(ess=1.0, chunk=40, most_steps=40, walkers=16)
-    run = sample(measured(), hypothesis("neo_hookean"), out=tmp_path_factory.mktemp("chains"), settings=settings)
-    digest(run, breaks=BREAKS, rest=None, draws=20)
+    out = tmp_path_factory.mktemp("chains")
+    run = sample(measured(), hypothesis("neo_hookean"), out=out, settings=settings, predictions=False)
+    predictions_of(run, Wanted(breaks=BREAKS, draws=20))
     return run

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from bayesmembrane.calibration.beside_paper import Compared
-from bayesmembrane.calibration.predictions import FILE, digest
-from bayesmembrane.calibration.run import Run
+from bayesmembrane.calibration.prediction_store import FILE
+from bayesmembrane.calibration.run import Run, predictions_of
 from bayesmembrane.ground.errors import SettingsError, StorageError
 from bayesmembrane.physics.cache import Tally
 from bayesmembrane.reconstruction.result import Influence, LossCheck, RangeResult, Reconstruction
@@ -197,10 +197,10 @@ def test_what_is_read_is_what_was_stored(stored: Run) -> None:
     assert shown.specimen.name == '<b>&"film'
 
 
-def test_a_digest_is_read_back_unless_something_else_is_asked(stored: Run) -> None:
+def test_predictions_are_read_back_unless_something_else_is_asked(stored: Run) -> None:
     assert stored.path is not None
     before = (stored.path / FILE).read_bytes()
-    again = digest(stored)
+    again = predictions_of(stored)
     assert (stored.path / FILE).read_bytes() == before
     assert again.specimens == ("1", "2")
 

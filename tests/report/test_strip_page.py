@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesmembrane.calibration.predictions import digest
-from bayesmembrane.calibration.run import sample
+from bayesmembrane.calibration.predictions import Wanted
+from bayesmembrane.calibration.run import predictions_of, sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.physics.forward import Forward
@@ -27,8 +27,9 @@ def test_a_strip_is_reported_without_a_lifted_film(rig, tmp_path: Path) -> None:
     force = Forward(claim, m, d)(np.array([[3.0]])).force[0]
     noise = 0.01 * float(force.max()) * np.random.default_rng(1).normal(size=d.size)
     m = Measurement(d, force + noise, rig, Specimen("tape", 1e-3))
-    run = sample(m, claim, out=tmp_path / "chains", settings=Settings(ess=1.0, chunk=40, most_steps=40, walkers=16))
-    digest(run, draws=20)
+    settings = Settings(ess=1.0, chunk=40, most_steps=40, walkers=16)
+    run = sample(m, claim, out=tmp_path / "chains", settings=settings, predictions=False)
+    predictions_of(run, Wanted(draws=20))
     page = write_report([run], tmp_path / "report").read_text(encoding="utf-8")
     twin = json.loads((tmp_path / "report" / "report.json").read_text(encoding="utf-8"))
     assert "the deformed film, height" not in page

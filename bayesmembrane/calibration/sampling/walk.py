@@ -1,4 +1,4 @@
-"""Draws from a posterior by two or more independent ensembles of walkers; the only file that knows emcee."""
+"""Draws from a posterior by two or more independent ensembles of walkers: emcee's loop, and when it may stop."""
 
 from __future__ import annotations
 
@@ -8,27 +8,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-import arviz
 import emcee
 import numpy as np
-from emcee.autocorr import integrated_time
 
 from bayesmembrane.calibration.posterior import Posterior, tally
-from bayesmembrane.calibration.sampling.proposals.emulator import Emulator, emulate
-from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture
+from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.convergence import LEAST_TAUS, Convergence, convergence
+from bayesmembrane.calibration.sampling.proposals.learned import Learned, learn, next_lesson
 from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 
-LEAST_TAUS = 50
-BURN_TAUS = 10
-LEAST_STEPS = 20  # fewer say nothing
-R_HAT = 1.01
 GROWTH = 1.25  # a look costs little, but nothing is learned from looking at every step
-FIRST_LESSON, NEXT_LESSON = 100, 2
-"""The proposal is learned from the chains after so many steps, and anew whenever there are so many times as many,
-until the run converges. What came before the last lesson never counts: only a fixed proposal makes a chain."""
-WALK_SHARE, JUMP_SHARE, LEARN_FROM = 0.4, 0.3, 2000
 
 
 @dataclass(frozen=True)
@@ -65,62 +56,6 @@ class Progress:
     tau: float
     steps_per_second: float
     seconds_left: float
-
-
-@dataclass(frozen=True, eq=False)
-class Chains:
-    """Everything that the ensembles walked, and where they stand: what resuming needs.
-
-    Attributes
-    ----------
-    x : (E, steps, walkers, k) coordinates, in order
-    log_posterior : (E, steps, walkers)
-    random_states : state of each ensemble's generator, as NumPy gives it
-    counts : outcomes of all evaluations, by label
-    seconds : time spent
-    lessons : steps after which the proposal was learned
-    """
-
-    x: Array
-    log_posterior: Array
-    random_states: tuple[Any, ...]
-    counts: Counter[str]
-    seconds: float
-    lessons: tuple[int, ...] = ()
-
-    @property
-    def steps(self) -> int:
-        return int(self.x.shape[1])
-
-    @property
-    def evaluations(self) -> int:
-        return sum(self.counts.values())
-
-
-@dataclass(frozen=True, eq=False)
-class Convergence:
-    """What the chains are worth.
-
-    Attributes
-    ----------
-    tau : (k,) integrated autocorrelation time in steps, averaged over walkers as emcee does, the worst ensemble's
-    burn : steps left out at the start, the same in all ensembles
-    ess : (k,) (steps - burn) x walkers / tau, added over ensembles
-    r_hat : (k,) rank-normalised, between the halves of the ensembles (A. Vehtari et al., Bayesian Anal. 16 (2021) 667)
-    acceptance : part of the proposals that were accepted after burn-in
-    lengths : (steps - burn) / max tau
-    """
-
-    tau: Array
-    burn: int
-    ess: Array
-    r_hat: Array
-    acceptance: float
-    lengths: float
-
-    def enough(self, wanted: float) -> bool:
-        """True if tau can be believed, every ESS is at least ``wanted`` and every R-hat at most 1.01."""
-        return bool(self.lengths >= LEAST_TAUS and np.min(self.ess) >= wanted and np.max(self.r_hat) <= R_HAT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,11 +100,11 @@ def run_ensembles(
     began = time.perf_counter() - (0.0 if chains is None else chains.seconds)
     if chains is None:
         chains = _start(posterior, settings, seed, counts)
-    sampler = _sampler(posterior, walkers, counts, learned(posterior, chains))
+    sampler = _sampler(posterior, walkers, counts, learn(posterior, chains))
     target, status = max(settings.chunk, chains.steps), "interrupted"
     try:
         while True:
-            lesson = _next_lesson(chains)
+            lesson = next_lesson(chains)
             stop = target if lesson <= chains.steps else min(target, lesson)
             chains = _walk(sampler, chains, stop, counts, began)
             found = convergence(chains)
@@ -181,54 +116,13 @@ def run_ensembles(
             if chains.steps >= settings.most_steps:
                 status = "step limit"
                 break
-            if chains.steps >= _next_lesson(chains):
+            if chains.steps >= next_lesson(chains):
                 chains = replace(chains, lessons=(*chains.lessons, chains.steps))
-                sampler = _sampler(posterior, walkers, counts, learned(posterior, chains))
+                sampler = _sampler(posterior, walkers, counts, learn(posterior, chains))
             target = min(settings.most_steps, _next_look(chains.steps, found, settings))
     except KeyboardInterrupt:
         found = convergence(chains)
     return Sampled(chains, found, status)
-
-
-def convergence(chains: Chains) -> Convergence:
-    """Autocorrelation times, burn-in, ESS, R-hat and acceptance of what was walked so far.
-
-    Burn-in is ten autocorrelation times of the second half, and half of the steps at most, but all the steps from which
-    the proposal was learned.
-    """
-    steps, walkers = chains.x.shape[1:3]
-    if steps < LEAST_STEPS:
-        unknown = np.full(chains.x.shape[3], np.inf)
-        return Convergence(unknown, 0, 1 / unknown, unknown, 0.0, 0.0)
-    learned = max((s for s in chains.lessons if s <= steps - LEAST_STEPS), default=0)
-    tau = _tau(chains.x[:, max(learned, steps // 2) :])
-    burn = max(learned, min(steps // 2, int(np.ceil(BURN_TAUS * np.max(tau)))))
-    kept = chains.x[:, burn:]
-    tau = _tau(kept)
-    flat = kept[:, :: max(1, int(np.max(tau) / 4))].reshape(kept.shape[0], -1, kept.shape[-1])
-    moved = np.any(kept[:, 1:] != kept[:, :-1], axis=-1)
-    return Convergence(
-        tau=np.max(tau, axis=0),
-        burn=burn,
-        ess=np.sum(kept.shape[1] * walkers / tau, axis=0),
-        r_hat=np.array([_r_hat(flat[:, :, i]) for i in range(flat.shape[-1])]),
-        acceptance=float(np.mean(moved)) if moved.size else 0.0,
-        lengths=float(kept.shape[1] / np.max(tau)),
-    )
-
-
-def _r_hat(flat: Array) -> float:
-    """Rank-normalised R-hat of (E, draws) in order of time: arviz splits each ensemble into halves itself."""
-    if flat.shape[1] < 4 or np.ptp(flat) == 0:
-        return np.inf
-    return float(arviz.rhat(flat, method="rank"))  # type: ignore[no-untyped-call]
-
-
-def _tau(x: Array) -> Array:
-    """(E, k) integrated autocorrelation times of x (E, steps, walkers, k); at least one step."""
-    with np.errstate(all="ignore"):
-        tau = np.array([integrated_time(e, tol=0, quiet=True) for e in x])
-    return np.where(np.isfinite(tau), np.maximum(tau, 1.0), len(x[0]))
 
 
 def _next_look(steps: int, found: Convergence, settings: Settings) -> int:
@@ -254,90 +148,15 @@ def _walkers(posterior: Posterior, settings: Settings) -> int:
     return settings.walkers or 16 * -(-4 * posterior.size // 16)
 
 
-def learned(posterior: Posterior, chains: Chains) -> tuple[Emulator | None, Mixture | None]:
-    """What proposals are made from, learned from the later part of what all ensembles walked until the last lesson.
-
-    An emulator of the curves to walk on, and t-distributions to jump to: one is right where curves are smooth in the
-    parameters, the other where they are not but the posterior is compact. None where there is nothing to learn from.
-    Both follow from the chains alone, so that a run that was interrupted learns the same again.
-    """
-    if not chains.lessons:
-        return None, None
-    end = chains.lessons[-1]
-    x, rng = chains.x[:, end // 4 : end].reshape(-1, chains.x.shape[-1]), np.random.default_rng(end)
-    found: list[Any] = []
-    for learn in (
-        lambda: emulate(posterior, x, rng),
-        lambda: fit_mixture(x[rng.permutation(len(x))[:LEARN_FROM]], rng),
-    ):
-        try:
-            found.append(learn())
-        except np.linalg.LinAlgError:
-            found.append(None)
-    return found[0], found[1]
-
-
-def _next_lesson(chains: Chains) -> int:
-    """Steps after which the proposal may be learned (anew)."""
-    return int(NEXT_LESSON * chains.lessons[-1]) if chains.lessons else FIRST_LESSON
-
-
-def _sampler(
-    posterior: Posterior, walkers: int, counts: Counter[str], known: tuple[Emulator | None, Mixture | None]
-) -> Any:
-    """An ensemble that proposes by differential evolution, snooker and stretch, and from what was ``known`` by then.
-
-    The first two suit curved valleys; differential evolution with gamma = 1 jumps between valleys.
-    """
+def _sampler(posterior: Posterior, walkers: int, counts: Counter[str], known: Learned) -> Any:
+    """An ensemble that proposes by differential evolution, snooker and stretch, and from what was ``known`` by then."""
 
     def log_probability(x: Array) -> Array:
         e = posterior.evaluate(x)
         counts.update(tally(e.outcome))
         return e.log_posterior
 
-    emulator, mixture = known
-    moves: list[tuple[Any, float]] = []
-    if emulator is not None:
-        moves.append((emcee.moves.MHMove(_walking(emulator)), WALK_SHARE))
-    if mixture is not None:
-        moves.append((emcee.moves.MHMove(_jumping(mixture)), JUMP_SHARE))
-    share = 1 - sum(weight for _, weight in moves)
-    moves += [
-        (emcee.moves.DEMove(), 0.6 * share),
-        (emcee.moves.DEMove(gamma0=1.0), 0.1 * share),
-        (emcee.moves.DESnookerMove(), 0.1 * share),
-        (emcee.moves.StretchMove(), 0.2 * share),
-    ]
-    return emcee.EnsembleSampler(walkers, posterior.size, log_probability, moves=moves, vectorize=True)
-
-
-Proposal = Callable[[Array, Any], tuple[Array, Array]]
-
-
-def _walking(emulator: Emulator) -> Proposal:
-    """The proposal of a Metropolis-Hastings move: where a walk on the emulator ends, and its factor."""
-
-    def propose(x: Array, random: Any) -> tuple[Array, Array]:
-        return emulator.walk(x, _generator(random))
-
-    return propose
-
-
-def _jumping(mixture: Mixture) -> Proposal:
-    """The proposal y ~ g whatever the place x, with the factor ln g(x) - ln g(y).
-
-    W. K. Hastings, Biometrika 57 (1970) 97.
-    """
-
-    def propose(x: Array, random: Any) -> tuple[Array, Array]:
-        y = mixture.draw(_generator(random), len(x))
-        return y, mixture.log_density(x) - mixture.log_density(y)
-
-    return propose
-
-
-def _generator(random: Any) -> np.random.Generator:
-    return np.random.default_rng(random.randint(2**31, size=4))
+    return emcee.EnsembleSampler(walkers, posterior.size, log_probability, moves=known.moves(), vectorize=True)
 
 
 def _start(posterior: Posterior, settings: Settings, seed: int, counts: Counter[str]) -> Chains:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import arviz
 import numpy as np
 from scipy.special import logsumexp
 
+from bayesmembrane.calibration.sampling.convergence import effective_steps
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture, reweighted
 from bayesmembrane.comparison.evidence.population import from_prior
 from bayesmembrane.comparison.evidence.target import Estimate, Problem, Target
@@ -81,8 +81,7 @@ class _Half:
             error = float(np.std(values.mean(axis=0), ddof=1) / np.sqrt(walkers))
         series = values.mean(axis=1)
         if steps >= SERIES and np.ptp(series) > 0:
-            worth = float(arviz.ess(series[None, :], method="mean"))  # type: ignore[no-untyped-call]
-            error = max(error, float(np.std(series) / np.sqrt(max(worth, 1.0))))
+            error = max(error, float(np.std(series) / np.sqrt(effective_steps(series))))
         return error
 
     def worth(self) -> float:

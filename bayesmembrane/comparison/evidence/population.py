@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.comparison.evidence.target import Problem
 from bayesmembrane.ground.parameters import Array
 
@@ -78,7 +79,7 @@ def _rise(added: Array, left: float) -> float:
 
     def part(rise: float) -> float:
         w = np.exp(rise * (added - np.max(added)))
-        return float(np.sum(w) ** 2 / np.sum(w * w) / len(w))
+        return effective_draws(w) / len(w)
 
     if part(left) >= KEPT:
         return left

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around, fit_mixture
 from bayesmembrane.ground.parameters import Array
 
@@ -52,8 +53,8 @@ class Pool:
         wa, wb = np.exp(a - np.max(a)), np.exp(b - np.max(b))
         ratio = wa / np.mean(wa) - wb / np.mean(wb)
         # Few weights do not show the tail that they miss: repeats with other seeds scatter by ten over their number.
-        error = max(float(np.std(ratio) / np.sqrt(len(ratio))), UNSEEN / _worth(wb))
-        return float(logsumexp(a) - logsumexp(b)), error, _worth(wb)
+        error = max(float(np.std(ratio) / np.sqrt(len(ratio))), UNSEEN / effective_draws(wb))
+        return float(logsumexp(a) - logsumexp(b)), error, effective_draws(wb)
 
     def _led(self, i: int) -> Array:
         """Some of the draws, each once, by their weights for p(x | y_-i) to a power that leaves enough of them."""
@@ -62,10 +63,10 @@ class Pool:
         low, high = 0.0, 1.0
         for _ in range(30):
             middle = 0.5 * (low + high)
-            enough = _worth(np.exp(middle * b)) >= LED_BY * self.posterior.size
+            enough = effective_draws(np.exp(middle * b)) >= LED_BY * self.posterior.size
             low, high = (middle, high) if enough else (low, middle)
         w = np.exp(high * b)
-        return self.x[np.unique(self.rng.choice(len(w), int(4 * _worth(w)), p=w / np.sum(w)))]
+        return self.x[np.unique(self.rng.choice(len(w), int(4 * effective_draws(w)), p=w / np.sum(w)))]
 
     def _add(self, g: Mixture, count: int) -> None:
         """Draw from g, made broader and with heavy tails, and weigh everything anew."""
@@ -92,8 +93,3 @@ class Pool:
             # Meng & Wong's iteration: the mean of p / q is the normalisation of p.
             self.log_q = np.logaddexp(share[0] + self.log_p - self.log_z, log_g)
             self.log_z = float(logsumexp(self.log_p - self.log_q) - np.log(len(self.log_p)))
-
-
-def _worth(w: Array) -> float:
-    """How many equally weighted draws weights are worth."""
-    return float(np.sum(w) ** 2 / np.sum(w * w))

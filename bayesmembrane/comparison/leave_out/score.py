@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.comparison.leave_out.pool import Pool
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
@@ -166,7 +167,7 @@ def _summary(
     cumulative = logsumexp(total, axis=0) - np.log(count) if good.size else np.full(held.size, -np.inf)
     terms = np.diff(cumulative, prepend=0.0) if good.size else cumulative
     w = np.exp(total[:, -1] - np.max(total[:, -1])) if good.size else np.zeros(1)
-    effective = float(np.sum(w) ** 2 / np.sum(w * w)) if good.size else 0.0
+    effective = effective_draws(w)
     predicted = np.mean(mean[good], axis=0) if good.size else np.full(held.size, np.nan)
     spread = np.sqrt(np.mean(variance[good], axis=0) + np.var(mean[good], axis=0)) if good.size else predicted
     miss = whole.force[held] - predicted

@@ -73,6 +73,15 @@ class Material(ABC):
         """G d in N/m: the initial slope is W11(1, 1) = 2 W12(1, 1) = 4 G d."""
 
     @staticmethod
+    def neo_hookean(gd: float) -> Array | None:
+        """Coordinates (n_coordinates,) within bounds of the film that is neo-Hookean with modulus ``gd`` = G d (N/m).
+
+        Where the energy becomes neo-Hookean only in a limit, those next to it; None if it never does. A fit tries them
+        too, so that an energy never fits worse than the one that it contains.
+        """
+        return None
+
+    @staticmethod
     def extensibility(p: Any) -> Any:
         """The bound on I1 - 3 that no state can pass; infinity unless the chains lock."""
         return np.full(np.shape(p[0]), np.inf)

@@ -70,6 +70,10 @@ class Gent(Material):
         return np.stack([0.5 * np.exp(ln_gd), np.exp(ln_jm)])
 
     @staticmethod
+    def neo_hookean(gd: float) -> Array:
+        return np.array([np.log(gd), Gent.coordinates[1].bounds[1]])
+
+    @staticmethod
     def shear_modulus(p: Any) -> Any:
         return 2.0 * p[0]
 

@@ -60,5 +60,9 @@ class MooneyRivlin(Material):
         return np.stack([(1.0 - share) * half, share * half])
 
     @staticmethod
+    def neo_hookean(gd: float) -> Array:
+        return np.array([np.log(gd), 0.0])
+
+    @staticmethod
     def shear_modulus(p: Any) -> Any:
         return 2.0 * (p[0] + p[1])

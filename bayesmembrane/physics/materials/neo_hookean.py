@@ -50,5 +50,9 @@ class NeoHookean(Material):
         return np.stack([0.5 * np.exp(ln_gd)])
 
     @staticmethod
+    def neo_hookean(gd: float) -> Array:
+        return np.array([np.log(gd)])
+
+    @staticmethod
     def shear_modulus(p: Any) -> Any:
         return 2.0 * p[0]

@@ -139,5 +139,11 @@ class Ogden(Material):
         return np.stack([g1 / a1, r2 * g1 / a2, r3 * g1 / a3, a1, a2, a3])
 
     @staticmethod
+    def neo_hookean(gd: float) -> Array:
+        # The first term with a1 = 2; the others as soft as they may be.
+        soft = Ogden.coordinates[1].bounds[0], Ogden.coordinates[2].bounds[0]
+        return np.array([np.log(gd), *soft, np.log(2.0), 0.0, np.log(2.0)])
+
+    @staticmethod
     def shear_modulus(p: Any) -> Any:
         return 0.5 * (p[0] * p[3] + p[1] * p[4] + p[2] * p[5])

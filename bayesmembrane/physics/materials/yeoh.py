@@ -62,5 +62,9 @@ class Yeoh(Material):
         return np.stack([c1, b2 * c1, b3 * c1])
 
     @staticmethod
+    def neo_hookean(gd: float) -> Array:
+        return np.array([np.log(gd), 0.0, 0.0])
+
+    @staticmethod
     def shear_modulus(p: Any) -> Any:
         return 2.0 * p[0]

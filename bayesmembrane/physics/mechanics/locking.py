@@ -46,8 +46,9 @@ def _shoot(th, jm, l0, span):  # type: ignore[no-untyped-def]
         l2 += step / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
         th += step / 6.0 * (b1 + 2.0 * b2 + 2.0 * b3 + b4)
         h += step / 6.0 * (e0 * c1 + 2.0 * e1 * c2 + 2.0 * e1 * c3 + e2 * c4)
-        # Steps that are long for a film that collapses may throw it anywhere.
-        if not l2 > 0.8 * before or l2 < 0.1 * l0:
+        # Steps that are long for a film that collapses may throw it anywhere, out of 0 < th < pi too, which no film
+        # leaves: from there it would come back to the ring with a length or a height that means nothing.
+        if not l2 > 0.8 * before or l2 < 0.1 * l0 or not 0.0 < th < np.pi:
             return (np.inf if a1 > 0.0 else -np.inf), np.nan
     return l2, h
 

@@ -9,7 +9,9 @@ import pytest
 from scipy.stats import truncnorm
 
 from bayesmembrane.calibration.posterior import Evaluation, Outcome
-from bayesmembrane.calibration.sampling.walk import Chains, Progress, Settings, convergence, run_ensembles
+from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.convergence import convergence
+from bayesmembrane.calibration.sampling.walk import Progress, Settings, run_ensembles
 from bayesmembrane.ground.errors import SettingsError
 
 MEAN = np.array([1.0, -2.0, 3.0])

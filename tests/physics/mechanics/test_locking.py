@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from bayesmembrane.physics.materials.gent import Gent
 from bayesmembrane.physics.mechanics import Status, request, solve
-from bayesmembrane.physics.mechanics.locking import locking_deflection
+from bayesmembrane.physics.mechanics.locking import TABLE, locking_deflection
 from tests.physics.mechanics.films import INNER, RADII
 
 CASES = [(jm, l0, ratio) for jm in (0.5, 17.42, 100.0) for l0 in (1.0, 1.1) for ratio in (1.5, 3.5, 8.0)]
@@ -82,3 +82,12 @@ def test_every_film_of_a_batch_locks_on_its_own():
     lock = locking_deflection(jm, 1.0, 3.5) * INNER
     np.testing.assert_array_equal(curves.status == Status.LOCKED, curves.deflection >= lock[:, None])
     assert curves.ok.sum() == np.sum(curves.deflection < lock[:, None])
+
+
+def test_a_collapsing_film_that_is_thrown_about_is_no_root():
+    """A step too long for the collapse once led to the ring with a negative height, and the table to a traceback."""
+    ratio, jm = 11.112034099332558, np.exp(TABLE[161]) + np.array([-1e-6, 0.0, 1e-6])
+    found = np.array([locking_deflection([j, j], [1.0, 1.0 + 1e-12], ratio)[0] for j in jm])
+    assert np.all(found > 0)
+    assert np.all(np.diff(found) > 0)
+    assert locking_deflection(jm, 1.0, ratio) == pytest.approx(found, rel=1e-6)

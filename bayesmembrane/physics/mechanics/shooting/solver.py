@@ -37,7 +37,8 @@ def solve(request: Request, rtol: float = RTOL) -> Curves:
 
         F = 2 pi R1 P1 sin(theta) at R = R1, with (l1, theta)(R1) such that l2 = l0 and h = delta at the ring.
 
-    Sensitivities, if asked for, are central differences in each parameter. No film is spared.
+    Sensitivities, if asked for, are differences in each parameter: central, or one-sided next to a film that is lost.
+    No film is spared.
     """
     locks = locking_deflection(extensibility(request), request.prestretch, request.ratio)
     lines = np.stack([_film(request, i, float(locks[i]), rtol) for i in range(request.parameters.shape[0])])
@@ -107,6 +108,13 @@ def _curves(request: Request, lines: Array) -> Curves:
 
 
 def _differences(request: Request, rtol: float) -> Array:
+    """dF/dp (B, N, n): central, or to the side that has a force where the other film is no longer stable."""
+    tight, plain = rtol * 1e-2, replace(request, sensitivities=False)
+
+    def force(parameters: Array) -> Array:
+        return solve(replace(plain, parameters=parameters), rtol=tight).force
+
+    middle = None
     columns = []
     for i in range(request.parameters.shape[1]):
         step = 1e-4 * np.maximum(np.abs(request.parameters[:, i]), 1e-3)
@@ -114,6 +122,11 @@ def _differences(request: Request, rtol: float) -> Array:
         for side in (1, -1):
             p = request.parameters.copy()
             p[:, i] += side * step
-            forces.append(solve(replace(request, parameters=p, sensitivities=False), rtol=rtol * 1e-2).force)
-        columns.append((forces[0] - forces[1]) / (2 * step[:, None]))
+            forces.append(force(p))
+        column = (forces[0] - forces[1]) / (2 * step[:, None])
+        if np.any(np.isfinite(forces[0]) != np.isfinite(forces[1])):
+            middle = force(request.parameters) if middle is None else middle
+            for side, there in zip((1, -1), forces, strict=True):
+                column = np.where(np.isnan(column), side * (there - middle) / step[:, None], column)
+        columns.append(column)
     return np.stack(columns, axis=-1)

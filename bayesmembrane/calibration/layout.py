@@ -1,0 +1,85 @@
+"""A run as arviz InferenceData: the groups and dimensions of its arrays, and the measurement among them.
+
+posterior, prior, log_likelihood, posterior_predictive, observed_data, constant_data (the means of the ensembles over
+the whole walk among it), sample_stats; a chain is an ensemble.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import arviz
+import numpy as np
+
+from bayesmembrane.data.measurement import Measurement, Provenance, Specimen
+from bayesmembrane.data.motion import Motion
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import component
+
+MOTION = ("deflection", "time", "across")
+OPTIONAL = ("time", "force_sd", "covariance", "across")
+
+
+def inference_data(measurement: Measurement, walk: Mapping[str, Array] | None = None, **groups: Any) -> Any:
+    """arviz InferenceData with ``groups``, the measured curve, all that `measurement_of` needs, and a ``walk``.
+
+    walk : ``ensemble_mean`` (E, T, k) means over the walkers at the steps ``ensemble_step`` (T,)
+    """
+    constant = {"deflection": measurement.deflection, **(walk or {})}
+    for name in OPTIONAL:
+        values = getattr(measurement, name)
+        if values is not None:
+            constant[name] = values
+    if measurement.motion is not None:
+        motion = {n: getattr(measurement.motion, n) for n in MOTION}
+        constant |= {f"motion_{n}": v for n, v in motion.items() if v is not None}
+        constant["places"] = measurement.on_path.astype(float)
+    dims = {n: ["point"] for n in ("force", "curve", "deflection", "time", "force_sd", "across", "places")}
+    dims |= {f"motion_{n}": ["station"] for n in MOTION}
+    dims |= {"ensemble_mean": ["ensemble", "step", "coordinate"], "ensemble_step": ["step"]}
+    data = arviz.from_dict(
+        **groups,
+        observed_data={"force": measurement.force},
+        constant_data=constant,
+        dims={**dims, "covariance": ["point", "point_2"]},
+    )
+    p = measurement.provenance
+    about = {
+        "rig": {"kind": measurement.rig.name, "lengths": measurement.rig.lengths},
+        "specimen": {"name": measurement.specimen.name, "thickness": measurement.specimen.thickness},
+        "provenance": {**asdict(p), "notes": list(p.notes)},
+        "full_range": measurement.full_range,
+    }
+    data.constant_data.attrs["measurement"] = json.dumps(about)
+    return data
+
+
+def measurement_of(data: Any) -> Measurement:
+    """The measurement that `inference_data` stored."""
+    about = json.loads(data.constant_data.attrs["measurement"])
+    rig = component("rigs", about["rig"]["kind"])(**about["rig"]["lengths"])
+    held = data.constant_data.data_vars
+
+    def array(name: str) -> Array:
+        return np.asarray(held[name].values, dtype=float)
+
+    arrays = {name: array(name) for name in ("deflection", *OPTIONAL) if name in held}
+    motion = {n: array(f"motion_{n}") for n in MOTION if f"motion_{n}" in held}
+    places = array("places").astype(int) if motion else None
+    whole = (motion["deflection"], motion.get("time"), about["full_range"], motion.get("across")) if motion else None
+    if "covariance" in arrays:
+        arrays.pop("force_sd", None)
+    notes = {**about["provenance"], "notes": tuple(about["provenance"]["notes"])}
+    return Measurement(
+        force=np.asarray(data.observed_data["force"].values, dtype=float),
+        rig=rig,
+        specimen=Specimen(**about["specimen"]),
+        provenance=Provenance(**notes),
+        full_range=about["full_range"],
+        motion=None if whole is None else Motion(*whole),
+        places=places,
+        **arrays,
+    )

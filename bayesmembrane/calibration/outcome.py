@@ -1,0 +1,120 @@
+"""What came out of a walk: the draws and all that is derived from them, as InferenceData and as plain values."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import arviz
+import numpy as np
+
+from bayesmembrane.calibration.crosscheck import crosscheck
+from bayesmembrane.calibration.goodness import dominates, goodness
+from bayesmembrane.calibration.layout import inference_data
+from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.walk import Sampled
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.hypothesis import Hypothesis
+
+MOST_DRAWS, LONG, DRAWS_IF_LONG = 4000, 100, 1000
+PRIOR_DRAWS = 500
+WALK_STEPS = 500
+
+
+def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) -> tuple[Any, dict[str, Any]]:
+    """(InferenceData, status) of a walk that was to be worth ``wanted`` draws; all of it follows from the chains."""
+    hypothesis, measurement = posterior.hypothesis, posterior.measurement
+    x, lp = sampled.draws(MOST_DRAWS if len(measurement) <= LONG else DRAWS_IF_LONG)
+    flat = x.reshape(-1, x.shape[-1])
+    evaluation = posterior.evaluate(flat)
+    rng = np.random.default_rng([seed, 1])
+    noise = posterior.noise.draw(hypothesis.noise_coordinates(flat), rng)
+    masses, prior = posterior.prior.survey(measurement, seed, solve=posterior.solve)
+    prior = prior[:PRIOR_DRAWS]
+    shape = x.shape[:2]
+
+    def folded(values: Array) -> Array:
+        return values.reshape(*shape, *values.shape[1:]).astype(np.float32)
+
+    data = inference_data(
+        measurement,
+        _walked(sampled.chains),
+        posterior=_named(hypothesis, measurement, flat, shape),
+        prior=_named(hypothesis, measurement, prior, (1, len(prior))) if len(prior) else None,
+        log_likelihood={"force": folded(posterior.pointwise(flat, evaluation.force))},
+        posterior_predictive={"force": folded(evaluation.force + noise), "curve": folded(evaluation.force)},
+        sample_stats={"lp": lp, "log_prior": evaluation.log_prior.reshape(shape)},
+    )
+    best = int(np.argmax(lp))
+    status = {
+        **_answer(hypothesis, data, sampled, wanted),
+        "prior_mass": {mode: {"value": m.value, "sd": m.sd} for mode, m in masses.items()},
+        **_judgement(posterior, data, evaluation.force[best]),
+        "crosscheck": crosscheck(posterior.forward, flat, seed).summary(),
+        "best": _best(hypothesis, measurement, flat[best]),
+    }
+    return data, status
+
+
+def _walked(chains: Chains) -> dict[str, Array]:
+    """Means over the walkers of each ensemble at `WALK_STEPS` steps at most, burn-in included."""
+    at = np.unique(np.linspace(0, chains.steps - 1, WALK_STEPS).round().astype(int))
+    return {"ensemble_mean": chains.x[:, at].mean(axis=2), "ensemble_step": at.astype(float)}
+
+
+def _named(hypothesis: Hypothesis, measurement: Measurement, x: Array, shape: tuple[int, ...]) -> dict[str, Array]:
+    """Coordinates and natural parameters by full name, each of ``shape``, of draws x (B, k)."""
+    natural = hypothesis.natural(x, measurement)
+    values = {n: natural[:, i] for i, n in enumerate(hypothesis.natural_names)}
+    values |= {n: x[:, i] for i, n in enumerate(hypothesis.names)}
+    return {n: v.reshape(shape) for n, v in values.items()}
+
+
+def _short(hypothesis: Hypothesis, name: str) -> str:
+    """The name in JSON answers: the material's parameters without their component."""
+    return name.removeprefix(f"{hypothesis.material.name}.")
+
+
+def _answer(hypothesis: Hypothesis, data: Any, sampled: Sampled, wanted: float) -> dict[str, Any]:
+    c = sampled.convergence
+    table = {}
+    for name in hypothesis.natural_names:
+        values = data.posterior[name].values.ravel()
+        low, high = arviz.hdi(values, hdi_prob=0.94)  # type: ignore[no-untyped-call]
+        table[_short(hypothesis, name)] = {
+            "mean": float(np.mean(values)),
+            "sd": float(np.std(values)),
+            "hdi_94": [float(low), float(high)],
+        }
+    return {
+        "status": sampled.status,
+        "posterior": table,
+        "ess_bulk": float(np.min(c.ess)),
+        "ess_wanted": wanted,
+        "r_hat": float(np.max(c.r_hat)),
+        "tau": {n: float(t) for n, t in zip(hypothesis.names, c.tau, strict=True)},
+        "acceptance": c.acceptance,
+        "steps": sampled.chains.steps,
+        "burn": c.burn,
+        "walkers": int(sampled.chains.x.shape[2]),
+        "evaluations": sampled.chains.evaluations,
+        "seconds": sampled.chains.seconds,
+        "tally": dict(sampled.chains.counts),
+    }
+
+
+def _judgement(posterior: Posterior, data: Any, best: Array) -> dict[str, Any]:
+    """Goodness of the best draw's curve, by the measurement's own noise, and what the inferred noise says."""
+    found = goodness(posterior.measurement, best, posterior.hypothesis.curve_size)
+    sd = data.posterior["noise.sd"].values.ravel() if "noise.sd" in data.posterior else np.empty(0)
+    return {
+        "goodness": found.summary(),
+        "extra_noise_dominates": sd.size > 0 and dominates(found.own_noise_N, sd),
+    }
+
+
+def _best(hypothesis: Hypothesis, measurement: Measurement, x: Array) -> dict[str, float]:
+    """Natural parameters of the draw with the largest posterior density."""
+    values = hypothesis.natural(x, measurement)[0]
+    return {_short(hypothesis, n): float(v) for n, v in zip(hypothesis.natural_names, values, strict=True)}

@@ -1,0 +1,77 @@
+"""The predictions of a run as a netCDF file beside its draws: named arrays that other programs read too."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray
+
+from bayesmembrane.calibration.predictions import Predictions, Wanted
+from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.files import write_whole
+
+FILE = "predictions.nc"
+
+# Dimensions of the stored arrays, so that other programs read them with names.
+_DIMS = {
+    "at": "point", "force": "point", "sd": "point",
+    "rest_at": "rest", "rest_force": "rest", "rest_sd": "rest",
+    "deflection": "grid", "beyond": "grid", "curve": "quantile grid", "repeat": "quantile grid", "lost": "reason grid",
+    "residual": "quantile point", "rest_residual": "quantile rest", "curves_at": "quantile point",
+    "film": "parameter", "shape_at": "shape", "state_1": "shape radius", "state_2": "shape radius",
+    "shape_radius": "shape draw radius", "shape_height": "shape draw radius",
+    "map_1": "stretch_1", "map_2": "stretch_2", "eigenvalue": "stretch_1 stretch_2",
+    "break_at": "specimen", "break_thickness": "specimen", "break_force": "specimen",
+    "break_predicted": "quantile specimen", "break_lost": "specimen",
+}  # fmt: skip
+
+
+def write_predictions(found: Predictions, folder: Path, draws_of: str, wanted: Wanted) -> None:
+    """Store what was ``wanted`` of the draws called ``draws_of``; raises `StorageError` if that cannot be."""
+    values = {f.name: getattr(found, f.name) for f in fields(found)}
+    single = {name: value for name, value in values.items() if name not in _DIMS}
+    made = {"draws_of": draws_of, "wanted": _plain(wanted)}
+    dataset = xarray.Dataset(
+        {name: (dims.split(), np.asarray(values[name])) for name, dims in _DIMS.items()},
+        attrs={"values": json.dumps(single), "made": json.dumps(made)},
+    )
+    write_whole(folder / FILE, lambda part: dataset.to_netcdf(part, engine="h5netcdf"), "the predictions")
+
+
+def read_predictions(folder: Path, draws_of: str, wanted: Wanted | None = None) -> Predictions | None:
+    """What is stored in ``folder``; None if that is nothing, of other draws, or not what was ``wanted`` (None: any).
+
+    Raises `StorageError` if the file is damaged.
+    """
+    path = folder / FILE
+    if not path.is_file():
+        return None
+    try:
+        dataset = xarray.load_dataset(path, engine="h5netcdf")
+        made: Mapping[str, Any] = json.loads(dataset.attrs["made"])
+        if made["draws_of"] != draws_of or (wanted is not None and made["wanted"] != _plain(wanted)):
+            return None
+        values: dict[str, Any] = json.loads(dataset.attrs["values"])
+        values |= {name: np.asarray(dataset[name].values) for name in _DIMS}
+        for name in ("reasons", "specimens"):
+            values[name] = tuple(values[name])
+        return Predictions(**values)
+    except (OSError, KeyError, ValueError, TypeError) as error:
+        reason = type(error).__name__
+        raise StorageError(
+            f"the predictions are damaged ({reason})", str(path), "remove the file and report again"
+        ) from None
+
+
+def _plain(wanted: Wanted) -> dict[str, Any]:
+    return {
+        "up_to": wanted.up_to,
+        "rest": None if wanted.rest is None else wanted.rest.data_hash,
+        "breaks": repr(wanted.breaks),
+        "draws": wanted.draws,
+    }

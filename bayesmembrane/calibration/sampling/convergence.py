@@ -1,0 +1,102 @@
+"""What draws are worth: autocorrelation times, effective sample sizes and R-hat, of chains, of series and of weights.
+
+The one place for all of them; everything that counts draws asks here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import arviz
+import numpy as np
+from emcee.autocorr import integrated_time
+
+from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.ground.parameters import Array
+
+LEAST_TAUS = 50
+BURN_TAUS = 10
+LEAST_STEPS = 20  # fewer say nothing
+R_HAT = 1.01
+
+
+@dataclass(frozen=True, eq=False)
+class Convergence:
+    """What the chains are worth.
+
+    Attributes
+    ----------
+    tau : (k,) integrated autocorrelation time in steps, averaged over walkers as emcee does, the worst ensemble's
+    burn : steps left out at the start, the same in all ensembles
+    ess : (k,) (steps - burn) x walkers / tau, added over ensembles
+    r_hat : (k,) rank-normalised, between the halves of the ensembles (A. Vehtari et al., Bayesian Anal. 16 (2021) 667)
+    acceptance : part of the proposals that were accepted after burn-in
+    lengths : (steps - burn) / max tau
+    """
+
+    tau: Array
+    burn: int
+    ess: Array
+    r_hat: Array
+    acceptance: float
+    lengths: float
+
+    def enough(self, wanted: float) -> bool:
+        """True if tau can be believed, every ESS is at least ``wanted`` and every R-hat at most 1.01."""
+        return bool(self.lengths >= LEAST_TAUS and np.min(self.ess) >= wanted and np.max(self.r_hat) <= R_HAT)
+
+
+def convergence(chains: Chains) -> Convergence:
+    """Autocorrelation times, burn-in, ESS, R-hat and acceptance of what was walked so far.
+
+    Burn-in is ten autocorrelation times of the second half, and half of the steps at most, but all the steps from which
+    the proposal was learned.
+    """
+    steps, walkers = chains.x.shape[1:3]
+    if steps < LEAST_STEPS:
+        unknown = np.full(chains.x.shape[3], np.inf)
+        return Convergence(unknown, 0, 1 / unknown, unknown, 0.0, 0.0)
+    learned = max((s for s in chains.lessons if s <= steps - LEAST_STEPS), default=0)
+    tau = autocorrelation_times(chains.x[:, max(learned, steps // 2) :])
+    burn = max(learned, min(steps // 2, int(np.ceil(BURN_TAUS * np.max(tau)))))
+    kept = chains.x[:, burn:]
+    tau = autocorrelation_times(kept)
+    flat = kept[:, :: max(1, int(np.max(tau) / 4))].reshape(kept.shape[0], -1, kept.shape[-1])
+    moved = np.any(kept[:, 1:] != kept[:, :-1], axis=-1)
+    return Convergence(
+        tau=np.max(tau, axis=0),
+        burn=burn,
+        ess=np.sum(kept.shape[1] * walkers / tau, axis=0),
+        r_hat=np.array([r_hat(flat[:, :, i]) for i in range(flat.shape[-1])]),
+        acceptance=float(np.mean(moved)) if moved.size else 0.0,
+        lengths=float(kept.shape[1] / np.max(tau)),
+    )
+
+
+def r_hat(flat: Array) -> float:
+    """Rank-normalised R-hat of (E, draws) in order of time: arviz splits each ensemble into halves itself."""
+    if flat.shape[1] < 4 or np.ptp(flat) == 0:
+        return np.inf
+    return float(arviz.rhat(flat, method="rank"))  # type: ignore[no-untyped-call]
+
+
+def autocorrelation_times(x: Array) -> Array:
+    """(E, k) integrated autocorrelation times of x (E, steps, walkers, k); at least one step."""
+    with np.errstate(all="ignore"):
+        tau = np.array([integrated_time(e, tol=0, quiet=True) for e in x])
+    return np.where(np.isfinite(tau), np.maximum(tau, 1.0), len(x[0]))
+
+
+def effective_draws(weights: Array) -> float:
+    """(sum w)^2 / sum w^2: how many equally weighted draws the weights (B,) >= 0 are worth; 0 if none is positive.
+
+    L. Kish, Survey Sampling (1965), section 8.2.
+    """
+    total = np.sum(weights)
+    return float(total**2 / np.sum(weights * weights)) if total > 0 else 0.0
+
+
+def effective_steps(series: Array) -> float:
+    """How many independent values the mean of a series (S,) in order of time is worth; at least one."""
+    worth = float(arviz.ess(series[None, :], method="mean"))  # type: ignore[no-untyped-call]
+    return max(worth, 1.0)

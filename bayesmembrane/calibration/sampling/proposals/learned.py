@@ -1,0 +1,66 @@
+"""What moves an ensemble makes: those that need only its walkers, and those learned from what was walked so far."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.proposals.emulator import Emulator, emulate
+from bayesmembrane.calibration.sampling.proposals.ensemble import ensemble_moves
+from bayesmembrane.calibration.sampling.proposals.jumping import jumping
+from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture
+from bayesmembrane.calibration.sampling.proposals.walking import walking
+
+FIRST_LESSON, NEXT_LESSON = 100, 2
+"""The proposal is learned from the chains after so many steps, and anew whenever there are so many times as many,
+until the run converges. What came before the last lesson never counts: only a fixed proposal makes a chain."""
+WALK_SHARE, JUMP_SHARE, LEARN_FROM = 0.4, 0.3, 2000
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """What proposals are made from; None where there is nothing to learn from."""
+
+    emulator: Emulator | None = None
+    mixture: Mixture | None = None
+
+    def moves(self) -> list[tuple[Any, float]]:
+        """emcee's moves with their weights, which add up to one."""
+        moves: list[tuple[Any, float]] = []
+        if self.emulator is not None:
+            moves.append((walking(self.emulator), WALK_SHARE))
+        if self.mixture is not None:
+            moves.append((jumping(self.mixture), JUMP_SHARE))
+        share = 1 - sum(weight for _, weight in moves)
+        return moves + ensemble_moves(share)
+
+
+def learn(posterior: Posterior, chains: Chains) -> Learned:
+    """An emulator and a mixture, from the later part of what all ensembles walked until the last lesson.
+
+    An emulator of the curves to walk on, and t-distributions to jump to: one is right where curves are smooth in the
+    parameters, the other where they are not but the posterior is compact. Both follow from the chains alone, so that a
+    run that was interrupted learns the same again.
+    """
+    if not chains.lessons:
+        return Learned()
+    end = chains.lessons[-1]
+    x, rng = chains.x[:, end // 4 : end].reshape(-1, chains.x.shape[-1]), np.random.default_rng(end)
+    emulator: Emulator | None = None
+    mixture: Mixture | None = None
+    # Draws that fill no volume teach nothing: then the walkers do without.
+    with suppress(np.linalg.LinAlgError):
+        emulator = emulate(posterior, x, rng)
+    with suppress(np.linalg.LinAlgError):
+        mixture = fit_mixture(x[rng.permutation(len(x))[:LEARN_FROM]], rng)
+    return Learned(emulator, mixture)
+
+
+def next_lesson(chains: Chains) -> int:
+    """Steps after which the proposal may be learned (anew)."""
+    return int(NEXT_LESSON * chains.lessons[-1]) if chains.lessons else FIRST_LESSON

@@ -1,0 +1,61 @@
+"""What is said of a sampled run, and the JSON answer of ``sample``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bayesmembrane.calibration.quality import Quality
+from bayesmembrane.calibration.run import Run
+from bayesmembrane.calibration.sampling.convergence import LEAST_TAUS
+from bayesmembrane.comparison.result import Comparison
+
+
+def document(run: Run) -> dict[str, Any]:
+    """The JSON answer of ``sample``: what was stored, and what a reader must know before trusting it."""
+    return {**run.summary(), "sentences": list(sentences(run.quality))}
+
+
+def sentences(quality: Quality) -> tuple[str, ...]:
+    """What a reader must know before trusting the numbers; none if all is well."""
+    said = (convergence_sentence(quality), failure_sentence(quality), noise_sentence(quality))
+    return tuple(sentence for sentence in said if sentence)
+
+
+def convergence_sentence(quality: Quality) -> str:
+    """What the draws lack of what was wanted, and why the walk ended; "" if nothing."""
+    if quality.converged:
+        return ""
+    why = "the run was interrupted" if quality.ended == "interrupted" else f"the limit of {quality.steps} steps"
+    return (
+        f"Not converged ({why}): ESS {quality.ess:.0f} of {quality.wanted:.0f} wanted, {quality.lengths:.0f} of "
+        f"{LEAST_TAUS} autocorrelation times walked, R-hat {quality.r_hat:.3f}."
+    )
+
+
+def failure_sentence(quality: Quality) -> str:
+    """What numerical failures may do to the posterior; "" if they are few."""
+    if not quality.noteworthy_failures:
+        return ""
+    share = 100 * quality.failed / quality.evaluated
+    return (
+        f"{quality.failed} of {quality.evaluated} draws ({share:.2g} %) could not be solved to 1e-6 after every "
+        "refinement and count as impossible; if they lie near the posterior, it is narrower than it should be."
+    )
+
+
+def noise_sentence(quality: Quality) -> str:
+    """What an engineer should read when the inferred noise exceeds the stated one; "" if it does not."""
+    if quality.own_noise is None or quality.extra_noise is None:
+        return ""
+    return (
+        f"The inferred extra noise ({1e3 * quality.extra_noise:.3g} mN) exceeds what the measurement states "
+        f"({1e3 * quality.own_noise:.3g} mN): the model misses something, and its misfit is counted as noise."
+    )
+
+
+def with_notes(comparison: Comparison) -> dict[str, Any]:
+    """The JSON answer of ``compare`` on one range, each hypothesis with the sentences on its run."""
+    answer = comparison.summary()
+    rows = zip(answer["table"], comparison.rows, strict=True)
+    table = [{**row, "notes": list(sentences(r.quality)) if r.quality else []} for row, r in rows]
+    return {**answer, "table": table}
