@@ -50,7 +50,7 @@ lint: $(STAMP)
 	$(VENV)/bin/lint-imports
 
 bench: $(STAMP)
-	$(PY) tests/benchmarks/bench.py
+	$(PY) -m tests.benchmarks.bench
 
 study: $(STAMP)
 	$(PY) -m pytest -n $(PYTEST_WORKERS) -m study

@@ -8,8 +8,8 @@ import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.registry import material
-from bayesmembrane.physics.mechanics.reference import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
+from tests.reference.slow_solver import force_curve
 
 INNER, OUTER = 0.010, 0.035
 

@@ -25,11 +25,12 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.materials.base import Material
-from bayesmembrane.physics.mechanics import fallback, reference, request, solve
+from bayesmembrane.physics.mechanics import fallback, request, solve
 from bayesmembrane.physics.mechanics.convexity import reached_convexity
 from bayesmembrane.physics.mechanics.request import Request
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
 from bayesmembrane.physics.mechanics.shooting import solver as shooting
+from tests.reference import slow_solver
 
 SEED = 20240607
 RADII = {"inner_radius": 0.010, "outer_radius": 0.035}
@@ -97,7 +98,7 @@ def baseline(films: list[Material], exact: Array) -> Row:
         for rtol in TOLERANCES:
             forces, begun = [], time.thread_time()
             for film in films:
-                forces.append(reference.force_curve(film, GRIDS[15], **RADII, rtol=rtol, method=method))
+                forces.append(slow_solver.force_curve(film, GRIDS[15], **RADII, rtol=rtol, method=method))
             spent = (time.thread_time() - begun) / len(films) * 1e6
             if best is not None and spent > 1.5 * best.us_15:
                 break
@@ -111,8 +112,8 @@ def baseline(films: list[Material], exact: Array) -> Row:
         raise SystemExit(f"solve_ivp + root does not reach {EXACT:g} for {films[0].name}")
     method, rtol = best.note.split(", rtol ")
     options = {**RADII, "method": method, "rtol": float(rtol)}
-    spent = microseconds(lambda: reference.force_curve(films[0], GRIDS[366], **options), 1)
-    again = microseconds(lambda: [reference.force_curve(film, GRIDS[15], **options) for film in films], 3)
+    spent = microseconds(lambda: slow_solver.force_curve(films[0], GRIDS[366], **options), 1)
+    again = microseconds(lambda: [slow_solver.force_curve(film, GRIDS[15], **options) for film in films], 3)
     return replace(best, us_15=again / len(films), us_366=spent)
 
 
@@ -120,13 +121,13 @@ def collocation(film: Material, exact: Array) -> Row:
     """``solve_bvp``; its time for 366 points is that of every 24th step, times 24."""
     for tol in TOLERANCES:
         begun = time.thread_time()
-        forces = reference.force_curve_bvp(film, GRIDS[15], **RADII, tol=tol)
+        forces = slow_solver.force_curve_bvp(film, GRIDS[15], **RADII, tol=tol)
         spent = (time.thread_time() - begun) * 1e6
         worst = error(forces, exact)
         if worst <= EXACT:
             break
     few = np.sort(np.concatenate([GRIDS[366][23::48], GRIDS[366][24::48]]))
-    part = microseconds(lambda: reference.force_curve_bvp(film, few, **RADII, tol=tol), 1)
+    part = microseconds(lambda: slow_solver.force_curve_bvp(film, few, **RADII, tol=tol), 1)
     note = f"tol {tol:.0e}; 366 points: {few.size} solved and scaled up"
     return Row(film.name, "solve_bvp", spent, part * 366 / few.size, worst, note=note)
 

@@ -19,12 +19,12 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
-from bayesmembrane.physics.mechanics.reference import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.report.sections.valleys.section import write_valleys
 from bayesmembrane.valleys.beside import valleys_beside
 from bayesmembrane.valleys.follow import Valleys, valleys
 from bayesmembrane.valleys.surface import Chart, Surface
+from tests.reference.slow_solver import force_curve
 
 Film = Callable[..., Measurement]
 

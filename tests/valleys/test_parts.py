@@ -12,7 +12,6 @@ from bayesmembrane.calibration.descent import descend
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.physics.mechanics.reference import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.valleys.between import arc_length, closest_approach
 from bayesmembrane.valleys.next_tests import rank
@@ -20,6 +19,7 @@ from bayesmembrane.valleys.posterior import Normal
 from bayesmembrane.valleys.profile import floor, pair_maps, profiles
 from bayesmembrane.valleys.result import metric_of
 from bayesmembrane.valleys.surface import Surface
+from tests.reference.slow_solver import force_curve
 
 
 class Quadratic:

@@ -14,7 +14,6 @@ from bayesmembrane.physics.materials.ogden import Ogden
 from bayesmembrane.physics.materials.yeoh import Yeoh
 from bayesmembrane.physics.mechanics import Note, Status, request, solve
 from bayesmembrane.physics.mechanics.fallback import solve as solve_whatever_it_takes
-from bayesmembrane.physics.mechanics.reference import force_curve_bvp
 from bayesmembrane.physics.mechanics.ritz import kernels as ritz_kernels
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
 from bayesmembrane.physics.mechanics.shooting import solver as shooting
@@ -30,6 +29,7 @@ from tests.physics.mechanics.films import (
     prior_draws,
     silicone,
 )
+from tests.reference.slow_solver import force_curve_bvp
 
 FINEST = len(ritz.LEVELS) - 1
 

@@ -13,7 +13,6 @@ from bayesmembrane.physics.materials.neo_hookean import NeoHookean
 from bayesmembrane.physics.materials.ogden import Ogden
 from bayesmembrane.physics.materials.yeoh import Yeoh
 from bayesmembrane.physics.mechanics import Status, request, solve
-from bayesmembrane.physics.mechanics.reference import force_curve
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
 from bayesmembrane.physics.mechanics.shooting import solver as shooting
 from tests.physics.mechanics.films import (
@@ -28,6 +27,7 @@ from tests.physics.mechanics.films import (
     prior_draws,
     silicone,
 )
+from tests.reference.slow_solver import force_curve
 
 
 @every_material

@@ -14,13 +14,13 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.physics.mechanics.reference import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.report.page import write_shown
 from bayesmembrane.report.sections.valleys.figures import valley_picture
 from bayesmembrane.report.sections.valleys.section import TESTS, next_table, valley_table, write_valleys
 from bayesmembrane.report.view import Shown
 from bayesmembrane.valleys.follow import Valleys, valleys
+from tests.reference.slow_solver import force_curve
 
 
 def curve(name: str, parameters: tuple[float, ...]) -> Measurement:

@@ -7,8 +7,8 @@ import pytest
 
 from bayesmembrane.physics.materials.gent import Gent
 from bayesmembrane.physics.materials.neo_hookean import NeoHookean
-from bayesmembrane.physics.mechanics.reference import force_curve, force_curve_bvp
 from tests.physics.mechanics.films import FIFTEEN, INNER, MM, OUTER, every_material, silicone
+from tests.reference.slow_solver import force_curve, force_curve_bvp
 
 
 @every_material
