@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-import arviz
 import numpy as np
 
+from bayesmembrane.calibration.draws import arviz
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import arviz
 import numpy as np
 
 from bayesmembrane.calibration.crosscheck import crosscheck
+from bayesmembrane.calibration.draws import arviz
 from bayesmembrane.calibration.goodness import dominates, goodness
 from bayesmembrane.calibration.layout import inference_data
 from bayesmembrane.calibration.posterior import Posterior

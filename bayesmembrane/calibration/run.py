@@ -97,6 +97,17 @@ class Run:
         """What tells these draws from others: an interrupted run that went on has more evaluations."""
         return f"{self.settings['fingerprint']} {self.status['evaluations']}"
 
+    def to_stored(self) -> Path:
+        """The folder that holds it; raises `TypeError` if there is none."""
+        if self.path is None:
+            raise TypeError(f"the run {self.name} has no folder, so that no answer can be stored that rests on it")
+        return self.path
+
+    @classmethod
+    def from_stored(cls, value: Path) -> Run:
+        """The inverse of `to_stored`; raises `StorageError` if the run is gone."""
+        return load_run(value)
+
     def summary(self) -> dict[str, Any]:
         """Plain values of the JSON answer of ``sample``."""
         return {"run": str(self.path) if self.path else self.name, **self.status}

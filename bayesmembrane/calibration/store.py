@@ -11,10 +11,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-import arviz
 import numpy as np
 import tomli_w
 
+from bayesmembrane.calibration.draws import arviz
 from bayesmembrane.calibration.fingerprint import SAMPLING, code_of
 from bayesmembrane.calibration.sampling.chains import Chains, write_chains
 from bayesmembrane.calibration.sampling.walk import Settings

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import arviz
 import numpy as np
 
+from bayesmembrane.calibration.draws import arviz
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.data.measurement import Measurement

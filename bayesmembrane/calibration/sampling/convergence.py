@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import arviz
 import numpy as np
 from emcee.autocorr import integrated_time
 
+from bayesmembrane.calibration.draws import arviz
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.ground.parameters import Array
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import arviz
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from bayesmembrane.calibration.draws import arviz
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.comparison.leave_out.pool import Pool
