@@ -9,7 +9,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -91,6 +91,11 @@ class Fixture(ABC):
     def place(self, deflection: float) -> str:
         """A deflection in m in words, to follow "at"."""
         return f"{1e3 * deflection:.3g} mm"
+
+    @classmethod
+    def example(cls) -> Self:
+        """A rig of a usual size."""
+        return cls()
 
     @property
     def lengths(self) -> dict[str, float]:

@@ -54,10 +54,15 @@ class Imported:
 
 
 class Importer(ABC):
-    """Reads one layout of files. A subclass has a ``name``, a ``title``, and two methods."""
+    """Reads one layout of files. A subclass has two methods, and
+
+    name, title : how answers call it, and in words what it reads
+    example : a short file of this layout
+    """
 
     name: ClassVar[str]
     title: ClassVar[str]
+    example: ClassVar[bytes]
 
     @staticmethod
     @abstractmethod

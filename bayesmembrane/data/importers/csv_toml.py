@@ -26,6 +26,8 @@ class CsvToml(Importer):
         "separated by semicolons, tabs or commas, decimal points or commas"
     )
 
+    example: ClassVar[bytes] = b"Time [s];Deflection [mm];Force [mN]\n0;1,5;10,25\n1;2,5;47,5\n2;3,5;130,0\n"
+
     @staticmethod
     def recognises(data: bytes) -> bool:
         if b"\0" in data:

@@ -48,6 +48,11 @@ class Annulus(Rig):
     def size(self) -> float:
         return self.outer_radius
 
+    @classmethod
+    def example(cls) -> Self:
+        """The rig of the paper."""
+        return cls(0.010, 0.035)
+
     @property
     def radius_ratio(self) -> float:
         """R2 / R1."""
