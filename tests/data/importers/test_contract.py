@@ -59,7 +59,7 @@ def test_what_it_imports_is_a_measurement(importer: type[Importer], tmp_path: Pa
 @given(data=st.data())
 @settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_what_it_cannot_read_is_refused(importer: type[Importer], data: st.DataObject) -> None:
-    """Whatever was cut out of a file or written into it: columns of finite numbers, or a refusal that names the file."""
+    """Whatever was cut out of a file or written into it: finite numbers, or a refusal that names the file."""
     text = importer.example
     at = data.draw(st.integers(0, len(text)))
     cut = data.draw(st.integers(0, len(text) - at))
