@@ -16,7 +16,6 @@ import numpy as np
 
 from bayesmembrane.app import analyses
 from bayesmembrane.app.answers import asked, kept
-from bayesmembrane.app.pages import gathered, write
 from bayesmembrane.app.pool import Tell, workers
 from bayesmembrane.calibration.beside_paper import compare_with_paper, paper_break_points
 from bayesmembrane.calibration.run import load_run
@@ -27,9 +26,10 @@ from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.registry import materials
-from bayesmembrane.ground.stored import answer, answer_folders
+from bayesmembrane.ground.stored import answer, answer_folders, store
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.report.page import write_report
 
 TITLE = "What the published force curve of a 50 um silicone film says about five materials"
 RANGES = ("OP1", "OP2")
@@ -91,7 +91,7 @@ def demo(
             for job in [submit(verb, label, place) for label, verb in stage.items()]:
                 job.result()
     compare(place, say)
-    page = write([found.result for found in gathered([folder])], page_folder, TITLE)
+    page = write_report([folder], page_folder, TITLE)
     return {
         "report": str(page),
         "verdicts": [_verdict(c) for c in _answers(folder, "loop")],
@@ -106,8 +106,11 @@ def demo(
 
 
 def reconstruct(place: Place, tell: Tell) -> None:
-    """The curve behind the published losses."""
-    analyses.reconstruct(place.seed, place.folder)
+    """The curve behind the published losses, and those losses beside it."""
+    found = analyses.reconstruct(place.seed, place.folder)
+    assert found.folder is not None
+    printed = read_published_table()
+    store(found.folder, "published", printed, plain(printed))
 
 
 def calibrate(name: str, range_name: str, place: Place, tell: Tell) -> None:
@@ -177,15 +180,6 @@ def shipped_ranges() -> dict[str, Range]:
         "OP1": Range(short, both.select(used | (both.deflection > end * (1 + 1e-9)))),
         "OP2": Range(long),
         "OP1 and OP2": Range(both),
-    }
-
-
-def paper_losses() -> dict[str, dict[str, float]]:
-    """Losses of the paper's optima over the range that they were fitted to, N, by range and material."""
-    table = read_published_table()
-    return {
-        name: {row.material: float(row.loss[i]) for row in table.rows if row.column == name}
-        for i, name in enumerate(table.ranges)
     }
 
 

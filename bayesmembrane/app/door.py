@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bayesmembrane.app import analyses, documents
-from bayesmembrane.app.pages import gathered, write
+from bayesmembrane.app.folders import lying
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.comparison.compare import Range
@@ -19,10 +19,10 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.diagnose import Diagnosis
 from bayesmembrane.diagnosis.loop import Loop
-from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.physics import hypothesis as hypotheses
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.reconstruction.result import Reconstruction
+from bayesmembrane.report.page import write_report
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
 
@@ -140,14 +140,11 @@ def reconstruct(*, seed: int = 0, out: Folder | None = None) -> Reconstruction:
 
 
 def report(*shown: Any, out: Folder, title: str | None = None) -> Path:
-    """Write ``out/index.html`` about results, or about all that lies in folders, and return its path."""
-    if not shown:
-        raise SettingsError("a report needs something to show", remedy="name results, or folders of answers")
-    folders = [Path(s) for s in shown if isinstance(s, str | Path)]
-    results = [s for s in shown if not isinstance(s, str | Path)]
-    if folders:
-        results += [found.result for found in gathered(folders)]
-    return write(results, Path(out), title)
+    """Write ``out/index.html`` about results, and about all that lies in folders, and return its path.
+
+    Raises `SettingsError` if there is nothing to show, `StorageError` for a folder that holds nothing.
+    """
+    return write_report(shown, Path(out), title)
 
 
 def load(folder: Folder) -> Any:
@@ -155,8 +152,8 @@ def load(folder: Folder) -> Any:
 
     Raises `StorageError` if there is none, or one is damaged.
     """
-    found = gathered([Path(folder)])
-    return found[0].result if len(found) == 1 else {(f.folder.name, f.kind): f.result for f in found}
+    found = lying([Path(folder)])
+    return found[0].read() if len(found) == 1 else {(each.folder.name, each.kind): each.read() for each in found}
 
 
 def as_dict(result: Any) -> dict[str, Any]:

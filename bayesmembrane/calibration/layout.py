@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.calibration.draws import arviz
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.ground.registry import component
 
 MOTION = ("deflection", "time", "across")

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from bayesmembrane.calibration.crosscheck import crosscheck
-from bayesmembrane.calibration.draws import arviz
 from bayesmembrane.calibration.goodness import dominates, goodness
 from bayesmembrane.calibration.layout import inference_data
 from bayesmembrane.calibration.posterior import Posterior
@@ -15,6 +14,7 @@ from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.walk import Sampled
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 MOST_DRAWS, LONG, DRAWS_IF_LONG = 4000, 100, 1000

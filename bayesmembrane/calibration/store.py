@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from bayesmembrane.calibration.draws import arviz
 from bayesmembrane.calibration.fingerprint import SAMPLING, code_of
 from bayesmembrane.calibration.sampling.chains import Chains, write_chains
 from bayesmembrane.calibration.sampling.walk import Settings
@@ -23,6 +22,7 @@ from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.files import write_text, write_whole
 from bayesmembrane.ground.fingerprint import digest
 from bayesmembrane.ground.plain import json_text
+from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 ASKED, POSTERIOR, STATUS, CHAINS = "run.toml", "posterior.nc", "status.json", "chains.npz"

@@ -88,6 +88,10 @@ class Fixture(ABC):
         """A clause on what the forces and deflections of this rig stand for, or "" if they are what was measured."""
         return ""
 
+    def ring(self) -> tuple[float, float] | None:
+        """Radii in m of the disc and of the clamp between which the film spans; None if it is no ring."""
+        return None
+
     def place(self, deflection: float) -> str:
         """A deflection in m in words, to follow "at"."""
         return f"{1e3 * deflection:.3g} mm"

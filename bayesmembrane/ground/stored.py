@@ -23,8 +23,6 @@ from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.tree import Decoder, Encoder
 
 PROGRAM, FORMAT = "bayesmembrane", 1
-KINDS = ("fit", "comparison", "valleys", "diagnosis", "loop", "reconstruction", "predictions")
-"""What is stored today; other kinds may be, the name is all that is said of them."""
 
 _START = f'{{"program": "{PROGRAM}"'
 _FAULTS = (

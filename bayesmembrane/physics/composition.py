@@ -20,11 +20,11 @@ from bayesmembrane.physics.effects.base import (
     Compliance,
     Deflection,
     Effect,
+    FilmState,
     Geometry,
     Memory,
     Sensor,
     Slack,
-    State,
     ordered,
 )
 from bayesmembrane.physics.mechanics.solution import Status
@@ -135,7 +135,7 @@ class Composition:
             more = effect.excess(p, given, self.path)
             excess = more if excess is None else excess + more
         virgin, slope = law(given, excess)
-        force, state = virgin, State(self.path, given, virgin, slope)
+        force, state = virgin, FilmState(self.path, given, virgin, slope)
         for effect, p in self._acting(Carried, x):
             force = effect.carried(p, force, state)
         for effect, p in self._acting(Memory, x):

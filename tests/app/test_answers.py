@@ -14,7 +14,7 @@ import pytest
 import bayesmembrane as bm
 from bayesmembrane.app import analyses
 from bayesmembrane.app.answers import Asked, asked, kept
-from bayesmembrane.app.pages import gathered
+from bayesmembrane.app.folders import lying
 from bayesmembrane.calibration.fit import fit as least_squares
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError, StorageError
@@ -96,18 +96,18 @@ def test_fit_and_diagnosis_come_back_as_they_were(curve: Measurement, tmp_path: 
 def test_valleys_with_an_effect_come_back_as_they_were(curve: Measurement, tmp_path: Path) -> None:
     claim = hypothesis("neo_hookean", ["force_offset"])
     found = analyses.valleys(curve, claim, out=tmp_path)
-    (again,) = gathered([tmp_path])
+    (again,) = lying([tmp_path])
     assert again.kind == "valleys"
-    assert equal(bm.as_dict(again.result), bm.as_dict(found.result))
-    np.testing.assert_array_equal(again.result.added.ranges[0].floor, found.result.added.ranges[0].floor)
+    assert equal(bm.as_dict(again.read()), bm.as_dict(found.result))
+    np.testing.assert_array_equal(again.read().added.ranges[0].floor, found.result.added.ranges[0].floor)
 
 
 def test_a_loop_is_read_back_with_its_runs_also_where_it_was_moved(curve: Measurement, tmp_path: Path) -> None:
     found = analyses.loop(curve, PLAIN, ess=100, out=tmp_path / "here", runs=tmp_path / "here" / "runs")
     (tmp_path / "here").rename(tmp_path / "there")
-    (again,) = gathered([tmp_path / "there"])
+    (again,) = lying([tmp_path / "there"])
     assert again.kind == "loop"
-    first, before = again.result.rounds[0], found.result.rounds[0]
+    first, before = again.read().rounds[0], found.result.rounds[0]
     assert first.before.run.path.is_dir()
     np.testing.assert_array_equal(first.before.run.draws(), before.before.run.draws())
     assert (first.after is first.before) == (before.after is before.before)
@@ -116,7 +116,7 @@ def test_a_loop_is_read_back_with_its_runs_also_where_it_was_moved(curve: Measur
 
 def test_a_comparison_is_read_back(curve: Measurement, tmp_path: Path) -> None:
     found = bm.compare(curve, [PLAIN], ess=100, out=tmp_path)
-    kinds = {f.kind: f.result for f in gathered([tmp_path])}
+    kinds = {f.kind: f.read() for f in lying([tmp_path])}
     assert set(kinds) == {"comparison", "run"}
     (again,) = kinds["comparison"].values()
     assert equal(bm.as_dict(again), bm.as_dict(found))
@@ -127,7 +127,7 @@ def test_a_folder_without_anything_is_told(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     for place in ("empty", "absent"):
         with pytest.raises(StorageError, match=place):
-            gathered([tmp_path / place])
+            lying([tmp_path / place])
 
 
 def test_what_is_no_result_has_no_document() -> None:

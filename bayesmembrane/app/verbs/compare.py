@@ -46,7 +46,7 @@ def verb(
 
 def show(found: dict[str, Comparison]) -> None:
     """Evidence and prediction of each range, on the terminal."""
-    from bayesmembrane.report.sections.comparison.section import evidence_table
+    from bayesmembrane.report.sections.evidence.tables import evidence_table
 
     for name, comparison in found.items():
         shown = evidence_table({name: comparison})

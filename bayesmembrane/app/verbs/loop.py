@@ -30,7 +30,7 @@ def verb(
 ) -> None:
     """Calibrate, diagnose, add what is missing, calibrate again, until adequate or abstaining; and report."""
     from bayesmembrane.app import analyses
-    from bayesmembrane.app.pages import write
+    from bayesmembrane.report.page import write_report
 
     adapt = beside.noise == "auto"
     claim = beside.with_material(material.material, noise="white" if adapt else "")
@@ -46,7 +46,7 @@ def verb(
             out=stored.folder,
             tell=lambda text: tell(claim.label(), text),
         )
-    page = write([found.result, *analyses.loop_runs(found.result)], report_folder)
+    page = write_report([*analyses.loop_runs(found.result), found.result], report_folder)
     document = {**found.document, "report": str(page)}
     answer(document, output.as_json, lambda: show(document, measurement))
 

@@ -22,13 +22,14 @@ def verb(
     title: Annotated[str | None, typer.Option(help="Title of the page.")] = None,
 ) -> None:
     """One self-contained HTML page about whatever answers and runs lie there."""
-    from bayesmembrane.app.pages import gathered, write
+    from bayesmembrane.app.folders import RUN, lying
+    from bayesmembrane.report.page import write_report
 
-    found = gathered(folders)
-    page = write([f.result for f in found], page_folder, title)
+    found = lying(folders)
+    page = write_report(folders, page_folder, title)
     document = {
         "report": str(page),
-        "runs": [str(f.folder) for f in found if f.kind == "run"],
-        "answers": [{"folder": str(f.folder), "kind": f.kind} for f in found if f.kind != "run"],
+        "runs": [str(f.folder) for f in found if f.kind == RUN],
+        "answers": [{"folder": str(f.folder), "kind": f.kind} for f in found if f.kind != RUN],
     }
     answer(document, output.as_json, lambda: say(f"The report lies in {page}"))

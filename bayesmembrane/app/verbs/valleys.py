@@ -37,7 +37,7 @@ def verb(
     With --effects also the valley without them, and how far the two lie apart.
     """
     from bayesmembrane.app import analyses
-    from bayesmembrane.report.sections.valleys.section import write_valleys
+    from bayesmembrane.report.sections.valleys import write_valleys
 
     claim = beside.with_material(material.material)
     measurement = curve.read()
@@ -54,7 +54,7 @@ def verb(
 
 def show(found: Valleys | BesideValleys, title: str) -> None:
     """The valleys, what is said of them, and what would shorten them, on the terminal."""
-    from bayesmembrane.report.sections.valleys.section import valley_table
+    from bayesmembrane.report.sections.valleys.tables import valley_table
     from bayesmembrane.valleys.beside import Beside as BesideValleys
 
     parts = [found.without, found.added] if isinstance(found, BesideValleys) else [found]

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from emcee.autocorr import integrated_time
 
-from bayesmembrane.calibration.draws import arviz
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.quiet import arviz
 
 LEAST_TAUS = 50
 BURN_TAUS = 10

@@ -128,7 +128,7 @@ class Effect(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class FilmState:
     """The film at all points of a path, before what it remembers acts on its force.
 
     path : the protocol
@@ -189,7 +189,7 @@ class Carried(Effect, ABC):
     stage = "material and multiplicative history"
 
     @abstractmethod
-    def carried(self, p: Array, force: Array, state: State) -> Array:
+    def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         """(B, N) N: the force, from that (B, N) before this effect."""
 
 

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array, HalfNormal
-from bayesmembrane.physics.effects.base import Carried, EffectParameter, State
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class OffCentreDisc(Carried):
         ),
     )
 
-    def carried(self, p: Array, force: Array, state: State) -> Array:
+    def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         with np.errstate(all="ignore"):
             n = np.where(state.force > 0, state.slope * state.deflection / state.force, 0.0)
         return np.asarray(force * (1.0 + 0.25 * p[:, :1] * n * (n + 1.0)))

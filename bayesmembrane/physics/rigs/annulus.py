@@ -48,6 +48,9 @@ class Annulus(Rig):
     def size(self) -> float:
         return self.outer_radius
 
+    def ring(self) -> tuple[float, float]:
+        return self.inner_radius, self.outer_radius
+
     @classmethod
     def example(cls) -> Self:
         """The rig of the paper."""

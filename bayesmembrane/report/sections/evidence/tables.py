@@ -1,4 +1,4 @@
-"""A comparison in a report: its tables, and its sentences beside the paper's ranking."""
+"""The tables of a comparison: evidence and prediction, convexity modes, prior widths, rankings."""
 
 from __future__ import annotations
 
@@ -9,15 +9,9 @@ import numpy as np
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED
 from bayesmembrane.comparison.result import Comparison, Row
 from bayesmembrane.physics.convexity import MODES
-from bayesmembrane.report.sentences import listed
-from bayesmembrane.report.style import title
-from bayesmembrane.report.tables import Column, Table, Value
-
-Paper = Mapping[str, Mapping[str, float]]
-"""By range and material: the loss of the paper's optimum, N."""
-
-LEVEL = 0.1  # losses that differ by less than this part rank the same
-DECIDED = 2.0
+from bayesmembrane.report.blocks import Column, Table, Value
+from bayesmembrane.words.beside_paper import PaperLosses
+from bayesmembrane.words.hypothesis import material_title, spoken, spoken_apart
 
 _EVIDENCE = (
     Column("range", "range"),
@@ -38,7 +32,11 @@ _EVIDENCE = (
 
 def evidence_table(found: Mapping[str, Comparison]) -> Table:
     """One row for each range and hypothesis."""
-    rows = tuple(_evidence(name, r) for name, c in found.items() for r in c.rows)
+    rows = tuple(
+        _evidence(name, words, r)
+        for name, c in found.items()
+        for words, r in zip(spoken_apart([r.hypothesis for r in c.rows]), c.rows, strict=True)
+    )
     caption = (
         "Evidence ln Z by two estimators, divided by the prior mass that convexity leaves, each with its standard "
         "error; expected log predictive density of points left out, with exact refits where importance weights fail; "
@@ -47,11 +45,11 @@ def evidence_table(found: Mapping[str, Comparison]) -> Table:
     return Table("evidence", caption, _EVIDENCE, rows)
 
 
-def _evidence(name: str, row: Row) -> tuple[Value, ...]:
+def _evidence(name: str, words: str, row: Row) -> tuple[Value, ...]:
     e, loo = row.evidence, row.loo
     return (
         name,
-        spoken_label(row),
+        words,
         e.log_evidence[NESTED] if e else None,
         e.log_evidence_sd[NESTED] if e else None,
         e.log_evidence[BRIDGE] if e else None,
@@ -66,12 +64,6 @@ def _evidence(name: str, row: Row) -> tuple[Value, ...]:
     )
 
 
-def spoken_label(row: Row) -> str:
-    """Material and effects for people."""
-    h = row.hypothesis
-    return " + ".join([title(h.material.name), *(e.name.replace("_", " ") for e in h.effects)])
-
-
 def modes_table(found: Mapping[str, Comparison]) -> Table | None:
     """ln Z under every convexity mode; None if nobody asked for it."""
     columns = [Column("range", "range"), Column("hypothesis", "hypothesis")]
@@ -82,7 +74,7 @@ def modes_table(found: Mapping[str, Comparison]) -> Table | None:
     for name, c in found.items():
         for r in (r for r in c.rows if r.modes):
             by_mode = {m.mode: m for m in r.modes}
-            cells: list[Value] = [name, spoken_label(r)]
+            cells: list[Value] = [name, spoken(r.hypothesis)]
             for mode in MODES:
                 m = by_mode[mode]
                 cells += [m.log_evidence, m.sd, m.mass]
@@ -115,7 +107,7 @@ def widths_table(found: Mapping[str, Comparison]) -> Table:
             for parameter in dict.fromkeys(w.parameter for w in r.widths):
                 half, twice = by.get((parameter, 0.5)), by.get((parameter, 2.0))
                 cells = [v for w in (half, twice) for v in ((w.change, w.sd) if w else (None, None))]
-                rows.append((name, spoken_label(r), parameter, *cells))
+                rows.append((name, spoken(r.hypothesis), parameter, *cells))
     caption = (
         "Change of ln Z when the prior of one coordinate is half or twice as wide, by reweighting the draws; a dash "
         "where the draws cannot tell."
@@ -123,7 +115,7 @@ def widths_table(found: Mapping[str, Comparison]) -> Table:
     return Table("prior widths", caption, columns, tuple(rows))
 
 
-def ranking_table(found: Mapping[str, Comparison], paper: Paper) -> Table | None:
+def ranking_table(found: Mapping[str, Comparison], paper: PaperLosses) -> Table | None:
     """Our ranking beside the paper's, by range; None if the paper says nothing of these ranges."""
     columns = (
         Column("range", "range"),
@@ -138,69 +130,10 @@ def ranking_table(found: Mapping[str, Comparison], paper: Paper) -> Table | None
         fitted = [r for r in c.rows if r.evidence is not None]
         if not losses or not fitted:
             continue
-        ours = [spoken_label(r) for r in c.ranking] or ["no ranking"] * len(fitted)
-        loo = [spoken_label(r) for r in sorted(fitted, key=lambda r: -r.loo.elpd if r.loo else np.inf)]
-        theirs = [f"{title(m)} ({losses[m]:.3g} N)" for m in sorted(losses, key=lambda m: losses[m])]
+        ours = [spoken(r.hypothesis) for r in c.ranking] or ["no ranking"] * len(fitted)
+        loo = [spoken(r.hypothesis) for r in sorted(fitted, key=lambda r: -r.loo.elpd if r.loo else np.inf)]
+        theirs = [f"{material_title(m)} ({losses[m]:.3g} N)" for m in sorted(losses, key=lambda m: losses[m])]
         for i in range(max(len(ours), len(theirs))):
             row = [names[i] if i < len(names) else "-" for names in (ours, loo, theirs)]
             rows.append((name, i + 1, *row))
     return Table("rankings", "Our rankings beside the paper's.", columns, tuple(rows)) if rows else None
-
-
-def comparison_sentences(found: Mapping[str, Comparison], paper: Paper) -> list[str]:
-    """What each range says, whether it survives other priors, and every difference to the paper's ranking."""
-    told = []
-    for name, c in found.items():
-        start = f"{name}: "
-        told += [start + s for s in (c.reason, c.sentence, c.survival) if s]
-        told += [start + s for s in _differences(c, paper.get(name, {}))]
-    return told
-
-
-def _differences(c: Comparison, losses: Mapping[str, float]) -> list[str]:
-    """A sentence for every pair that evidence and the paper's losses put in another order, and one if there is none."""
-    ranking = [r for r in c.ranking if r.hypothesis.material.name in losses and not r.hypothesis.effects]
-    told = []
-    for i, better in enumerate(ranking):
-        for worse in ranking[i + 1 :]:
-            a, b = losses[better.hypothesis.material.name], losses[worse.hypothesis.material.name]
-            if a > b:
-                told.append(_difference(better, worse, a, b))
-    if len(ranking) > 1 and not told:
-        told.append("the evidence puts the materials in the same order as the paper's losses.")
-    return told
-
-
-def _difference(better: Row, worse: Row, a: float, b: float) -> str:
-    assert better.evidence is not None
-    assert worse.evidence is not None
-    (za, sa), (zb, sb) = better.evidence.best, worse.evidence.best
-    gap, sd = za - zb, float(np.hypot(sa, sb))
-    names = spoken_label(better), spoken_label(worse)
-    start = (
-        f"the evidence puts {names[0]} before {names[1]} by {gap:.1f} +- {sd:.2g} in ln Z, and the paper has them the "
-        f"other way round, with losses of {a:.3g} and {b:.3g} N"
-    )
-    if gap < DECIDED * sd or gap < 1.0:
-        return f"{start}; neither order is decided."
-    extra = worse.hypothesis.curve_size - better.hypothesis.curve_size
-    if extra > 0 and a < (1 + LEVEL) * b:
-        return (
-            f"{start}: the losses are level within {100 * LEVEL:.0f} %, and the {extra} more parameters of {names[1]} "
-            "do not pay for themselves."
-        )
-    if extra > 0:
-        return (
-            f"{start}: the loss counts the fit of the best point alone; the evidence also counts the {extra} more "
-            f"parameters of {names[1]}, most of whose prior the data rule out."
-        )
-    return (
-        f"{start}: the paper's losses weigh every point alike and come from optima without our convexity prior; the "
-        "evidence weighs each point by its noise and averages over the prior."
-    )
-
-
-def alternative_text(found: Mapping[str, Comparison]) -> str:
-    """What the figure shows, for those who cannot see it."""
-    names = listed(dict.fromkeys(spoken_label(r) for c in found.values() for r in c.rows))
-    return f"Evidence and leave-one-out prediction of {names}, relative to the best, for {listed(found)}"

@@ -3,10 +3,11 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from bayesmembrane.report import sentences
-from bayesmembrane.report.sentences import Case, LossPair
+from bayesmembrane.words import calibration as sentences
+from bayesmembrane.words.calibration import Case
 
 GOOD = Case(
     name="Yeoh",
@@ -135,44 +136,14 @@ def test_parameters_that_the_data_leave_open_are_named() -> None:
     assert sentences.unknown([GOOD]) == ""
 
 
-def test_losses_of_ours_above_the_papers_are_called_a_missed_minimum() -> None:
-    assert "missed a minimum" in sentences.losses([LossPair("Gent", "OP1", 0.3, 0.2)])
-    fine = sentences.losses([LossPair("Gent", "OP1", 0.19, 0.2), LossPair("Ogden", "OP2", 0.04, 2.3)])
-    assert fine.startswith("No loss of ours lies above")
-    assert "less than half of it for Ogden over OP2 (40.0 mN against 2.30 N)" in fine
-    assert sentences.losses([LossPair("Gent", "OP1", 0.3, None)]) == ""
-
-
 def test_two_solvers_that_agree_are_no_warning() -> None:
     assert sentences.disagreement("Yeoh", 0.0351, 3e-8) == ""
     assert "3.0e-05" in sentences.disagreement("Yeoh", 0.0351, 3e-5)
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (0.0, "0 mN"),
-        (4e-3, "4.00 mN"),
-        (0.0994, "99.4 mN"),
-        (0.2, "0.200 N"),
-        (18.04, "18.0 N"),
-        (math.inf, "no force"),
-    ],
-)
-def test_forces_in_words(value: float, text: str) -> None:
-    assert sentences.newtons(value) == text
-
-
-@pytest.mark.parametrize(
-    ("share", "text"),
-    [(0.0, "0 %"), (1.0, "100 %"), (0.0002, "less than 0.1 %"), (0.9999, "more than 99.9 %"), (0.123, "12 %")],
-)
-def test_shares_are_never_rounded_to_none_or_all(share: float, text: str) -> None:
-    assert sentences.percent(share) == text
-
-
-def test_an_interval_has_the_digits_that_its_width_deserves() -> None:
-    assert sentences.interval(17.21, 17.68, 18.1, "N/m") == "17.7 N/m (90 %: 17.2 to 18.1)"
-    assert sentences.interval(3.9, 17.68, 17.9, "N/m") == "17.7 N/m (90 %: 3.9 to 17.9)"
-    assert sentences.interval(1.0, 1.0, 1.0, "") == "1"
-    assert sentences.interval(math.nan, 1.0, 1.0, "") == "unknown"
+def test_points_beyond_the_fitted_range_are_counted() -> None:
+    residual = np.array([[-1.0, 1.0, np.nan], [0.5, 2.0, np.nan], [1.0, 3.0, np.nan]])
+    told = sentences.held_out("Yeoh", residual)
+    assert told.startswith("Yeoh: of the 3 points beyond the fitted range 1 lie in the 90 % band")
+    assert "by up to 2.00 N, and 1 points have no prediction." in told
+    assert "no force can be predicted at any of the 3" in sentences.held_out("Yeoh", np.full((3, 3), np.nan))

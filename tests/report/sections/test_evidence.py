@@ -1,6 +1,8 @@
 """What a report says of a comparison, beside the ranking of somebody else."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,16 +12,12 @@ from bayesmembrane.comparison.evidence.target import Estimate
 from bayesmembrane.comparison.leave_out.score import LeaveOneOut
 from bayesmembrane.comparison.prior_widths import Widened
 from bayesmembrane.comparison.result import Comparison, Row, ranked
+from bayesmembrane.data.published import read_published_table
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.report.sections.comparison.figures import comparison_picture
-from bayesmembrane.report.sections.comparison.section import (
-    alternative_text,
-    comparison_sentences,
-    evidence_table,
-    modes_table,
-    ranking_table,
-    widths_table,
-)
+from bayesmembrane.report.page import TWIN, write_report
+from bayesmembrane.report.sections.evidence import sentences
+from bayesmembrane.report.sections.evidence.figures import comparison_picture
+from bayesmembrane.report.sections.evidence.tables import evidence_table, modes_table, ranking_table, widths_table
 
 
 def row(material: str, z: float, elpd: float, off: float = 0.0) -> Row:
@@ -50,12 +48,12 @@ def test_every_hypothesis_has_a_row_and_the_unfitted_one_its_reason():
 
 
 def test_every_difference_to_the_other_ranking_has_its_sentence():
-    told = [s for s in comparison_sentences(compared(), PAPER) if "the paper has them" in s]
+    told = [s for s in sentences(compared(), PAPER) if "the paper has them" in s]
     assert len(told) == 1
     assert "neo-Hookean before Gent by 1.1" in told[0]
     assert "losses of 0.23 and 0.2 N" in told[0]
     assert "1 more parameters of Gent" in told[0]
-    same = comparison_sentences(compared(), {"OP1": {"yeoh": 0.1, "neo_hookean": 0.2, "gent": 0.3}})
+    same = sentences(compared(), {"OP1": {"yeoh": 0.1, "neo_hookean": 0.2, "gent": 0.3}})
     assert any("same order as the paper" in s for s in same)
 
 
@@ -69,7 +67,7 @@ def test_rankings_stand_side_by_side():
 def test_without_agreement_there_is_no_ranking():
     found = compared(off=2.0)
     assert [r["ours"] for r in ranking_table(found, PAPER).records()][:3] == ["no ranking"] * 3
-    assert any("There is no ranking" in s for s in comparison_sentences(found, PAPER))
+    assert any("There is no ranking" in s for s in sentences(found, PAPER))
 
 
 def test_changes_that_cannot_be_told_are_dashes():
@@ -82,5 +80,20 @@ def test_changes_that_cannot_be_told_are_dashes():
 def test_the_picture_is_drawn_with_and_without_a_ranking(off):
     picture = comparison_picture(compared(off))
     assert picture.data.startswith(b"<?xml")
-    assert "Yeoh" in alternative_text(compared())
     assert picture.data == comparison_picture(compared(off)).data
+
+
+def test_a_comparison_stands_alone_and_beside_the_published_table(tmp_path: Path) -> None:
+    alone = json.loads((write_report([compared()["OP1"]], tmp_path / "a").parent / TWIN).read_text())
+    assert alone["tables"]["glance"][0]["found"] == "Yeoh first"
+    assert any("prefers yeoh" in s for s in alone["answer"])
+    beside = json.loads((write_report([compared(), read_published_table()], tmp_path / "b").parent / TWIN).read_text())
+    assert "rankings" in beside["tables"]
+    assert "rankings" not in alone["tables"]
+
+
+def test_two_hypotheses_of_one_name_are_told_apart() -> None:
+    one = compared()["OP1"]
+    twice = replace(one, rows=(one.rows[0], replace(one.rows[0], hypothesis=hypothesis("neo_hookean", noise="ar1"))))
+    told = [c[1] for c in evidence_table({"OP1": twice}).cells()]
+    assert told == ["neo-Hookean (white, reached)", "neo-Hookean (ar1, reached)"]

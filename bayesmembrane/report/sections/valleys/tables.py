@@ -1,24 +1,15 @@
-"""Valleys in a report: the table, the sentences of a section, and files on their own."""
+"""The tables of valleys: one row for each range, and what to measure next."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from pathlib import Path
 
-from bayesmembrane.ground.errors import StorageError
-from bayesmembrane.ground.plain import plain
 from bayesmembrane.physics.convexity import RESTRICTING
-from bayesmembrane.report.canvas import Picture
-from bayesmembrane.report.sections.valleys.beside import beside_picture
-from bayesmembrane.report.sections.valleys.figures import valley_picture
-from bayesmembrane.report.tables import Column, Table, Value
-from bayesmembrane.valleys.beside import Beside
+from bayesmembrane.report.blocks import Column, Table, Value
 from bayesmembrane.valleys.next_tests import ASSUMPTION
 from bayesmembrane.valleys.result import Valley, Valleys
-from bayesmembrane.valleys.sentences import titled
+from bayesmembrane.words.hypothesis import spoken
 
-ANSWER, PICTURE, BESIDE = "valleys.json", "valleys.png", "valleys_beside.png"
 TESTS = 5
 
 _COLUMNS = (
@@ -56,7 +47,7 @@ def _row(v: Valley) -> tuple[Value, ...]:
     opened = " and ".join(f"{name} to {e.value:.2g}" for e in (low, high) if e.open)
     first = v.next_tests[0] if v.next_tests else None
     return (
-        titled(v),
+        spoken(v.hypothesis),
         1e3 * v.end,
         v.best_loss,
         f"({names}) = ({ends[0]}) ... ({ends[1]})",
@@ -82,30 +73,3 @@ def next_table(v: Valley) -> Table:
     name = f"next measurements {v.hypothesis.material.name} {1e3 * v.end:.4g} mm"
     caption = f"{v.hypothesis.material.title}, fitted up to {1e3 * v.end:.4g} mm: what to measure next. {ASSUMPTION}"
     return Table(name, caption, columns, rows)
-
-
-def alternative_text(found: Valleys) -> str:
-    """What the picture shows, for those who do not see it."""
-    ends = ", ".join(f"{1e3 * v.end:.4g}" for v in found.ranges)
-    return f"Valleys of the loss of {found.hypothesis.material.title} over its parameters for the ranges {ends} mm"
-
-
-def write_valleys(found: Valleys | Beside, out: Path) -> tuple[Path, ...]:
-    """Write ``valleys.json`` and ``valleys.png`` into ``out``, with effects also ``valleys_beside.png``.
-
-    Raises `StorageError` if that cannot be done.
-    """
-    pictures: dict[str, Picture] = {}
-    if isinstance(found, Beside):
-        pictures[BESIDE] = beside_picture(found)
-    pictures[PICTURE] = valley_picture(found.added if isinstance(found, Beside) else found)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / ANSWER).write_text(json.dumps(plain(found.summary()), allow_nan=False), encoding="utf-8")
-        for name, picture in pictures.items():
-            (out / name).write_bytes(picture.data)
-    except OSError as error:
-        raise StorageError(
-            f"the valleys cannot be written ({error.strerror})", str(out), "choose another folder"
-        ) from None
-    return (out / ANSWER, *(out / name for name in pictures))

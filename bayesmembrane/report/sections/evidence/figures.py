@@ -11,9 +11,10 @@ from matplotlib.ticker import FuncFormatter
 
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED
 from bayesmembrane.comparison.result import Comparison, Row
-from bayesmembrane.report.canvas import Picture, _encoded, _figure, _style
-from bayesmembrane.report.sections.comparison.section import spoken_label
+from bayesmembrane.report.blocks import Picture
+from bayesmembrane.report.canvas import encoded, new_figure, style
 from bayesmembrane.report.style import FAINT, INK, MUTED, SHADE, colour
+from bayesmembrane.words.hypothesis import spoken_apart
 
 _FILLED = {NESTED: False, BRIDGE: True}
 LINEAR = 3.0  # differences up to here are drawn to scale, larger ones by their logarithm
@@ -27,15 +28,15 @@ def comparison_picture(found: Mapping[str, Comparison], kind: str = "svg") -> Pi
     """
     names = list(found)
     most = max(len(c.rows) for c in found.values())
-    with _style():
-        figure = _figure(0.9 + len(names) * (0.75 + 0.3 * most))
+    with style():
+        figure = new_figure(0.9 + len(names) * (0.75 + 0.3 * most))
         axes = figure.subplots(len(names), 2, squeeze=False, sharey="row")
         for i, name in enumerate(names):
             rows = found[name].rows
             _evidence(axes[i, 0], rows, found[name].agreed)
             _prediction(axes[i, 1], rows)
             axes[i, 0].set_title(f"Fitted {name}" if name.startswith("up to") else name)
-            axes[i, 0].set_yticks(range(len(rows)), [spoken_label(r) for r in rows])
+            axes[i, 0].set_yticks(range(len(rows)), spoken_apart([r.hypothesis for r in rows]))
             axes[i, 0].set_ylim(len(rows) - 0.5, -0.5)
         axes[-1, 0].set_xlabel("ln Z minus that of the best (-)")
         axes[-1, 1].set_xlabel("elpd minus that of the best (-)")
@@ -45,7 +46,7 @@ def comparison_picture(found: Mapping[str, Comparison], kind: str = "svg") -> Pi
             Line2D([], [], color=INK, marker="s", linewidth=1.2, label="leave one out"),
         ]
         figure.legend(handles=handles, loc="outside upper center", ncols=3)
-        return _encoded(figure, kind)
+        return encoded(figure, kind)
 
 
 def _evidence(ax: Axes, rows: Sequence[Row], agreed: bool) -> None:

@@ -1,12 +1,20 @@
-"""What the numbers say, in words. Every function takes numbers and gives sentences; none of them knows files or
-pages.
+"""What calibrations say, in words: what describes the curve, how stiff the film is, what lies beyond, what to trust.
+
+Every function takes the few numbers of `Case` and gives sentences; none of them knows files or pages.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+
+import numpy as np
+
+from bayesmembrane.calibration.fit import Fit
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.language import digits, interval, listed, millimetres, newtons, percent, spoken_parameter
 
 P_VALUE = 0.01
 """Below this the residuals are larger than the measurement's own noise allows."""
@@ -76,59 +84,6 @@ class Case:
     def converged(self) -> bool:
         """Whether sampling reached its goals."""
         return self.status == "converged"
-
-
-# ---- numbers in words ------------------------------------------------------------------------------------------------
-
-
-def newtons(value: float) -> str:
-    """A force with three digits: mN below 0.1 N."""
-    if not math.isfinite(value):
-        return "no force"
-    if abs(value) < 0.0995:
-        return f"{_digits(1e3 * value)} mN"
-    return f"{_digits(value)} N" if abs(value) < 1e4 else f"{value:.2g} N"
-
-
-def millimetres(value: float) -> str:
-    """A length in mm with three digits."""
-    return f"{1e3 * value:.4g} mm"
-
-
-def percent(share: float) -> str:
-    """A share in per cent; never 0 or 100 unless it is."""
-    if 0 < share < 0.001:
-        return "less than 0.1 %"
-    if 0.995 < share < 1:
-        return f"more than {'99.9' if share > 0.999 else '99.5'} %"
-    return f"{100 * share:.{2 if share < 0.995 else 3}g} %"
-
-
-def interval(low: float, middle: float, high: float, unit: str) -> str:
-    """``17.7 N/m (90 %: 17.2 to 18.1)``, with as many digits as the width deserves."""
-    width = high - low
-    if not math.isfinite(width):
-        return "unknown"
-    if width <= 0:
-        return f"{middle:.6g} {unit}".strip()
-    half = max(min(high - middle, middle - low), width / 50)  # a long tail must not hide how sharp the other side is
-    decimals = min(9, max(0, -math.floor(math.log10(half / 2))))
-    own = f"{middle:.{decimals}f}{' ' + unit if unit else ''}"
-    return f"{own} (90 %: {low:.{decimals}f} to {high:.{decimals}f})"
-
-
-def listed(words: Iterable[str]) -> str:
-    """``a, b and c``."""
-    found = list(words)
-    return found[0] if len(found) == 1 else ", ".join(found[:-1]) + f" and {found[-1]}" if found else ""
-
-
-def _digits(value: float) -> str:
-    """Three significant digits without an exponent."""
-    if value == 0:
-        return "0"
-    decimals = max(0, 2 - math.floor(math.log10(abs(value))))
-    return f"{value:.{min(decimals, 6)}f}"
 
 
 # ---- the answer ------------------------------------------------------------------------------------------------------
@@ -213,7 +168,7 @@ def stiffness(group: Sequence[Case]) -> str:
     good = [c for c in group if c.verdict in GOOD] or [min(group, key=lambda c: c.rmse)]
     told = [f"{interval(*c.modulus, 'N/m')} by {c.name}" for c in good]
     modulus = [1e-6 * c.modulus[1] / c.thickness for c in good]
-    low, high = _digits(min(modulus)), _digits(max(modulus))
+    low, high = digits(min(modulus)), digits(max(modulus))
     span = low if low == high else f"{low} to {high}"
     return f"The initial shear modulus times thickness is {listed(told)}, that is a shear modulus of {span} MPa."
 
@@ -321,34 +276,7 @@ def disagreement(name: str, end: float, largest: float) -> str:
     return f"{name} up to {millimetres(end)}: the two solvers disagree by up to {size}."
 
 
-# ---- losses ----------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class LossPair:
-    """Ours and the paper's loss of one material over one range, N, on the same curve."""
-
-    name: str
-    range: str
-    ours: float
-    paper: float | None
-
-
-def losses(pairs: Sequence[LossPair]) -> str:
-    """How our optima compare with the paper's parameters on the same curve."""
-    known = [(p, p.paper) for p in pairs if p.paper is not None]
-    if not known:
-        return ""
-    above = [p for p, paper in known if p.ours > paper * (1 + 1e-6)]
-    far = [(p, paper) for p, paper in known if p.ours < 0.5 * paper]
-    if above:
-        told = listed(f"{p.name} over {p.range}" for p in above)
-        return f"Our optimum has a larger loss than the paper's parameters for {told}: the search missed a minimum."
-    sentence = "No loss of ours lies above that of the paper's parameters on the same curve."
-    if far:
-        told = listed(f"{p.name} over {p.range} ({newtons(p.ours)} against {newtons(paper)})" for p, paper in far)
-        sentence += f" Ours is less than half of it for {told}."
-    return sentence
+# ---- beyond the fitted points ----------------------------------------------------------------------------------------
 
 
 def break_points(name: str, end: float, observed: Sequence[float], low: Sequence[float], high: Sequence[float]) -> str:
@@ -357,3 +285,59 @@ def break_points(name: str, end: float, observed: Sequence[float], low: Sequence
     none = sum(not math.isfinite(a) for a in low)
     missing = f"; for {none} no force can be predicted" if none else ""
     return f"{name} fitted up to {millimetres(end)}: {inside} of {len(observed)} inside the 90 % interval{missing}."
+
+
+def held_out(name: str, residual: Array) -> str:
+    """What a calibration says of points that it has not seen: ``residual`` (3, R) N, at 5, 50 and 95 %; nan where no
+    force can be predicted.
+    """
+    known = np.isfinite(residual[1])
+    n = residual.shape[1]
+    if not np.any(known):
+        return f"{name}: no force can be predicted at any of the {n} points beyond the fitted range."
+    inside = int(np.sum((residual[0] <= 0) & (residual[2] >= 0)))
+    worst = newtons(float(np.nanmax(np.abs(residual[1]))))
+    missing = f", and {n - int(known.sum())} points have no prediction" if not np.all(known) else ""
+    return (
+        f"{name}: of the {n} points beyond the fitted range {inside} lie in the 90 % band; the median misses them by "
+        f"up to {worst}{missing}."
+    )
+
+
+def overview(cases: Sequence[Case]) -> str:
+    """How many calibrations there are, of what, and over which ranges."""
+    ends = sorted({c.end for c in cases})
+    materials = list(dict.fromkeys(c.name for c in cases))
+    runs = f"{len(cases)} calibrations" if len(cases) > 1 else "One calibration"
+    return f"{runs}: {listed(materials)}, fitted up to {listed(f'{1e3 * e:.4g}' for e in ends)} mm of deflection."
+
+
+VERDICTS = {"adequate": "describes the curve", "strained": "close, not within noise", "misses": "misses something"}
+"""`Case.verdict` in a table; without a stated noise there is none."""
+
+
+def verdict(case: Case) -> str:
+    """The verdict of one calibration in a few words."""
+    return VERDICTS.get(case.verdict, "noise not stated")
+
+
+def fit_sentence(found: Fit) -> str:
+    """The optimum of one fit: how far it misses the data, and whether it can be trusted as one."""
+    end = millimetres(float(np.max(found.deflection)))
+    told = f"{spoken(found.hypothesis)} fitted up to {end} misses the forces by {newtons(found.rmse_N)} rms"
+    told += f", at most {newtons(found.max_N)}"
+    if found.at_bound:
+        names = listed(spoken_parameter(n) for n in found.at_bound)
+        told += f"; there is no optimum inside the bounds for {names}: the loss falls, or is flat, up to it"
+    held = found.constrained
+    if not found.convex:
+        least = (
+            "no film that meets the convexity prior was found"
+            if held is None
+            else (
+                f"among films that meet the convexity prior the least loss is {held.loss_N:.4g} instead of "
+                f"{found.loss_N:.4g} N"
+            )
+        )
+        told += f"; its energy is not convex where the film goes, and {least}"
+    return f"{told}."

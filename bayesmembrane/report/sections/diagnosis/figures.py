@@ -1,10 +1,11 @@
-"""Pictures of a closed loop: the residual before and after, and what is left without a name."""
+"""Pictures of residuals: before and after, and what is left without a name."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,10 +14,11 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.report.canvas import Picture, _encoded, _figure, _style
-from bayesmembrane.report.style import FAINT, INK, MUTED
+from bayesmembrane.report.blocks import Picture
+from bayesmembrane.report.canvas import encoded, new_figure, style
+from bayesmembrane.report.style import FAINT, INK, MUTED, RANGE_COLOURS
 
-LEGS = ((1, "loading", "#0072B2", "o"), (-1, "unloading", "#D55E00", "v"))
+LEGS = ((1, "loading", RANGE_COLOURS[0], "o"), (-1, "unloading", RANGE_COLOURS[1], "v"))
 PARTS = 24  # means that make a line against deflection or time
 ENLARGED = 6.0  # how much smaller what is left must be before it gets an axis of its own
 BAND = "#c9ced4"
@@ -35,14 +37,14 @@ class Residual:
 class Place:
     """Where the N points lie, and how much noise they have.
 
-    deflection : (N,) m
+    deflection : (N,) m, or None where only the order of the points is known
     time : (N,) s or None
     leg, cycle : (N,) +1 loading, -1 unloading; number of the cycle
     held_out : (N,) True where a point was set aside
     sd : (N,) N, the measurement's own noise
     """
 
-    deflection: Array
+    deflection: Array | None
     time: Array | None
     leg: NDArray[np.int8]
     cycle: NDArray[np.int64]
@@ -53,7 +55,7 @@ class Place:
     def along(self) -> tuple[Array, str]:
         """Time, or the number of the point where there are no times, with the label of its axis."""
         if self.time is None:
-            return np.arange(1.0, self.deflection.size + 1), "point (-)"
+            return np.arange(1.0, self.sd.size + 1), "point (-)"
         return self.time, "time (s)"
 
 
@@ -62,48 +64,58 @@ def residual_picture(place: Place, rows: Sequence[Residual], kind: str = "png") 
 
     All rows have one scale, unless the last one would vanish in it; then its title says how much it is enlarged.
     """
-    cyclic = np.unique(place.cycle).size > 1
     tops = [1.06 * max(float(np.max(np.abs(r.residual))), 2.5 * float(np.median(place.sd))) for r in rows]
-    apart = len(rows) > 1 and tops[0] > ENLARGED * tops[-1]
-    with _style():
-        figure = _figure(0.7 + 2.9 * len(rows))
+    enlarged = len(rows) > 1 and tops[0] > ENLARGED * tops[-1]
+    with style():
+        figure = new_figure(0.7 + 2.9 * len(rows))
         # A figure for each row: a title as long as the row is wide must not push its panels apart.
         parts = figure.subfigures(len(rows), 1, squeeze=False)[:, 0]
-        ratios = (4, 4, 2.2)[: 2 + cyclic]
-        axes = np.array([part.subplots(1, len(ratios), width_ratios=ratios) for part in parts])
-        for i, row in enumerate(rows):
-            top = 1e3 * (tops[i] if apart else max(tops))
-            enlarged = f" (axis enlarged {tops[0] / tops[i]:.2g} times)" if apart and i else ""
-            _against_deflection(axes[i, 0], place, row.residual)
-            _along(axes[i, 1], place, row.residual)
-            for ax in axes[i, :2]:
-                ax.set_ylim(-top, top)
-            axes[i, 0].set_ylabel("measured less fitted (mN)")
-            axes[i, 1].tick_params(labelleft=False)
-            if cyclic:
-                _by_cycle(axes[i, 2], place, row.residual)
-            parts[i].suptitle(fill(row.title + enlarged, LONGEST), x=0.01, ha="left", fontsize=11.5, fontweight="bold")
-        if cyclic:
-            largest = max(ax.get_ylim()[1] for ax in axes[:, 2])
-            for ax in axes[:, 2] if not apart else ():
-                ax.set_ylim(0, largest)
-            axes[-1, 2].set_xlabel("cycle (-)")
-        axes[-1, 0].set_xlabel("deflection (mm)")
-        axes[-1, 1].set_xlabel(place.along[1])
+        panels = []
+        for i, (part, row) in enumerate(zip(parts, rows, strict=True)):
+            panels.append(_row(part, place, row.residual, 1e3 * (tops[i] if enlarged else max(tops))))
+            more = f" (axis enlarged {tops[0] / tops[i]:.2g} times)" if enlarged and i else ""
+            part.suptitle(fill(row.title + more, LONGEST), x=0.01, ha="left", fontsize=11.5, fontweight="bold")
+        cycles = [p["cycle (-)"] for p in panels if "cycle (-)" in p]
+        for ax in cycles if not enlarged else ():
+            ax.set_ylim(0, max(c.get_ylim()[1] for c in cycles))
+        for name, ax in panels[-1].items():
+            ax.set_xlabel(name)
         figure.legend(
             handles=_handles(place), loc="outside upper center", ncols=6, handletextpad=0.4, columnspacing=1.3
         )
-        return _encoded(figure, kind)
+        return encoded(figure, kind)
+
+
+def _row(part: Any, place: Place, residual: Array, top: float) -> dict[str, Axes]:
+    """The panels of one model by the name of their horizontal axis, up to ``top`` mN."""
+    names = [place.along[1]] if place.deflection is None else ["deflection (mm)", place.along[1]]
+    if np.unique(place.cycle).size > 1:
+        names.append("cycle (-)")
+    ratios = [2.2 if name == "cycle (-)" else 4.0 for name in names]
+    panels = dict(zip(names, part.subplots(1, len(names), width_ratios=ratios, squeeze=False)[0], strict=True))
+    for i, (name, ax) in enumerate(panels.items()):
+        if name == "cycle (-)":
+            _by_cycle(ax, place, residual)
+            continue
+        if name == "deflection (mm)":
+            _against_deflection(ax, place, residual)
+        else:
+            _along(ax, place, residual)
+        ax.set_ylim(-top, top)
+        ax.tick_params(labelleft=i == 0)
+        if i == 0:
+            ax.set_ylabel("measured less fitted (mN)")
+    return panels
 
 
 def discrepancy_picture(place: Place, residual: Array, mean: Array, sd: Array, kind: str = "png") -> Picture:
     """What is left (N,) N with the mean and two standard deviations of the process kept for it, both (N,) N."""
-    with _style():
-        figure = _figure(3.6)
+    with style():
+        figure = new_figure(3.6)
         axes = figure.subplots(1, 2, sharey=True)
         at, label = place.along
         shade = 0.25 if len(_legs(place.leg)) <= 3 else 0.12
-        for ax, x, name in ((axes[0], 1e3 * place.deflection, "deflection (mm)"), (axes[1], at, label)):
+        for ax, x, name in ((axes[0], _millimetres(place), "deflection (mm)"), (axes[1], at, label)):
             _noise(ax, x, place.sd)
             for sign, _, colour, symbol in LEGS:
                 own = place.leg == sign
@@ -122,14 +134,18 @@ def discrepancy_picture(place: Place, residual: Array, mean: Array, sd: Array, k
         ]
         handles.append(Patch(color=BAND, label="the load cell's own noise, 2 sd"))
         figure.legend(handles=handles, loc="outside upper center", ncols=3)
-        return _encoded(figure, kind)
+        return encoded(figure, kind)
 
 
 # ---- panels ----------------------------------------------------------------------------------------------------------
 
 
+def _millimetres(place: Place) -> Array:
+    return 1e3 * np.asarray(place.deflection)
+
+
 def _against_deflection(ax: Axes, place: Place, residual: Array) -> None:
-    x = 1e3 * place.deflection
+    x = _millimetres(place)
     _noise(ax, x, place.sd)
     _points(ax, x, place, residual)
     for sign, _, colour, _ in LEGS:

@@ -1,4 +1,4 @@
-"""The page on a homogeneous test: no disc, no radii, and said what its forces and deflections stand for."""
+"""One run on a page: a homogeneous test: no disc, no radii, and said what its forces and deflections stand for."""
 
 import json
 from pathlib import Path

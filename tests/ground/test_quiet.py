@@ -11,7 +11,7 @@ IMPORT = """
 import warnings
 warnings.simplefilter("error")
 before = list(warnings.filters)
-from bayesmembrane.calibration.draws import arviz
+from bayesmembrane.ground.quiet import arviz
 assert warnings.filters == before
 assert arviz.ess
 """
@@ -28,7 +28,7 @@ def gone(part, target):
     return replace(part, target)
 
 pathlib.Path.replace = gone
-from bayesmembrane.calibration.draws import arviz
+from bayesmembrane.ground.quiet import arviz
 assert times and arviz.ess
 """
 

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from bayesmembrane.report.tables import Column, Table, facts_table, hdi
-from bayesmembrane.report.tables import fits_table as fits
-from bayesmembrane.report.view import Shown
+from bayesmembrane.report.blocks import Column, Table, facts_table
+from bayesmembrane.report.runs import Shown
+from bayesmembrane.report.sections.calibrations import fits_table as fits
+from bayesmembrane.report.sections.run.tables import hdi
 
 
 @pytest.mark.parametrize(
