@@ -9,7 +9,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from bayesmembrane.calibration.descent import descend
-from bayesmembrane.calibration.objective import Objective, apart
+from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.whitening import OwnNoise
 from bayesmembrane.ground.parameters import Array, HalfNormal, Parameter
@@ -91,7 +91,7 @@ class Search:
         objective = Objective(plain, self.measurement, "euclidean", self.solve)
         pool, _ = objective.pool(np.random.default_rng(self.seed))
         nothing = np.concatenate([np.empty(0), *(e.null for e in hypothesis.effects)])
-        return [np.concatenate([x, nothing]) for x in apart(pool, objective.spread, SANE)]
+        return [np.concatenate([x, nothing]) for x in separated(pool, objective.spread, SANE)]
 
     def fit(self, hypothesis: Hypothesis, starts: Sequence[Array]) -> Candidate | None:
         """The best of the searches from ``starts`` (k,); None if no film of this hypothesis reaches the data.
@@ -124,7 +124,7 @@ class Search:
                 np.concatenate([root * j, pull], axis=1),
             )
 
-        return descend(residuals, starts, objective.low, objective.high, ITERATIONS, behind=BEHIND)
+        return descend(residuals, starts, (objective.low, objective.high), ITERATIONS, behind=BEHIND)
 
     def _white(self, objective: Objective, x: Array) -> tuple[Array, Array]:
         """Whitened residuals (B, N) and slopes (B, N, k); a start without a curve is nan, and only that one."""
