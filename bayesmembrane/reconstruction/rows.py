@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 from scipy.interpolate import CubicSpline
 
-from bayesmembrane.data.published import PublishedTable, Row
+from bayesmembrane.data.published import PrintedSet, PublishedTable
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.reconstruction.fit import Mode, again, find_mode
 from bayesmembrane.reconstruction.model import Model, Simulate
@@ -149,7 +149,7 @@ def suspect(table: PublishedTable, model: Model, mode: Mode, check: RowCheck, si
     )
 
 
-def _reason(table: PublishedTable, row: Row, check: RowCheck) -> str:
+def _reason(table: PublishedTable, row: PrintedSet, check: RowCheck) -> str:
     if not np.all(np.isfinite(check.excess)):
         return "the forward model has no force over the whole range for the printed parameters"
     told = ", ".join(
@@ -159,7 +159,7 @@ def _reason(table: PublishedTable, row: Row, check: RowCheck) -> str:
     return f"the other rows contradict its losses: {told}"
 
 
-def _loss_corrections(table: PublishedTable, row: Row, check: RowCheck) -> tuple[Correction, ...]:
+def _loss_corrections(table: PublishedTable, row: PrintedSet, check: RowCheck) -> tuple[Correction, ...]:
     """The losses that disagree, replaced by what the other rows predict."""
     found = []
     for name, printed, loss, excess, sd in zip(table.ranges, row.losses, row.loss, check.excess, check.sd, strict=True):
@@ -169,7 +169,9 @@ def _loss_corrections(table: PublishedTable, row: Row, check: RowCheck) -> tuple
     return tuple(found)
 
 
-def _parameter_corrections(row: Row, model: Model, mode: Mode, check: RowCheck, simulate: Simulate) -> list[Correction]:
+def _parameter_corrections(
+    row: PrintedSet, model: Model, mode: Mode, check: RowCheck, simulate: Simulate
+) -> list[Correction]:
     """Single parameters whose change makes all losses agree."""
     state = model.evaluate(mode.theta[None], mode.knobs)
     order = np.argsort(state.x[0])

@@ -27,7 +27,6 @@ from bayesmembrane.report.style import INK, MUTED, colour, marker
 WIDTH = 9.0  # inches: 900 px at 100 dpi
 DPI = 120
 LINE = 112  # letters of a legend that fit into the width
-MOST_POINTS = 300  # of a line that is drawn
 _RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 11,
@@ -76,7 +75,8 @@ def encoded(figure: Figure, kind: str) -> Picture:
     out = io.BytesIO()
     metadata = {"Date": None} if kind == "svg" else {"Software": None}
     with style():
-        figure.savefig(out, format=kind, dpi=DPI, metadata=metadata)
+        extra: dict[str, Any] = {"pil_kwargs": {"optimize": True}} if kind == "png" else {}
+        figure.savefig(out, format=kind, dpi=DPI, metadata=metadata, **extra)
     data = out.getvalue()
     return Picture(_PATH.sub(_rounded, data) if kind == "svg" else data, kind)
 

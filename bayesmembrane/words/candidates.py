@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from bayesmembrane.diagnosis.candidates import Candidate
-from bayesmembrane.diagnosis.diagnose import Diagnosis
-from bayesmembrane.diagnosis.separation import CLEAR
-from bayesmembrane.diagnosis.wording import size_in_words
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.diagnosis.thresholds import NEXT_TEST
+from bayesmembrane.words.diagnosis import experiment_sentence, set_aside, size_in_words
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed, spoken_parameter
 
@@ -39,9 +39,10 @@ def rivals(d: Diagnosis) -> list[str]:
         words = "the most probable" if behind == 0 else f"{behind:.1f} behind in ln of the evidence"
         size = ", ".join(sizes(j.candidate, d.null))
         told.append(f"{candidate_title(j.candidate, d.null)}{f' ({size})' if size else ''}: {words}.")
-    clear = [e for e in d.experiments if e.separation >= CLEAR]
-    rest = [f"{e.what} ({e.separation:.1f} standard deviations)" for e in d.experiments if e.separation < CLEAR]
-    told += [f"To tell them apart: {e.sentence}." for e in clear]
+    clear = [e for e in d.experiments if e.separation >= NEXT_TEST.clear]
+    dim = [e for e in d.experiments if e.separation < NEXT_TEST.clear]
+    rest = [f"{e.what} ({e.separation:.1f} standard deviations)" for e in dim]
+    told += [f"To tell them apart: {experiment_sentence(e)}." for e in clear]
     if not clear:
         told.append("None of the further tests that were simulated would tell them apart.")
     if rest:
@@ -64,7 +65,7 @@ def validation_sentence(d: Diagnosis) -> str:
         else f"the others choose {chosen} instead: the choice rests on the points left out"
     )
     fall = f"their root mean square goes from {1e3 * v.before.rmse_N:.3g} to {1e3 * v.after.rmse_N:.3g} mN"
-    return f"Set aside before looking: {v.where}. Without these points {same}; {fall}."
+    return f"Set aside before looking: {set_aside(v)}. Without these points {same}; {fall}."
 
 
 def bounds(d: Diagnosis) -> list[str]:

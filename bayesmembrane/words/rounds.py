@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesmembrane.diagnosis.diagnose import Diagnosis
 from bayesmembrane.diagnosis.loop import Loop, Stage
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.words.candidates import bounds, validation_sentence
+from bayesmembrane.words.diagnosis import sentence
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.moved import modulus_of, moved_sentences
 
 
 def answer(found: Loop) -> list[str]:
     """What was found and added, with the size, and how it ended."""
-    told = [r.diagnosis.sentence for r in found.rounds]
+    told = [sentence(r.diagnosis) for r in found.rounds]
     told = [told[0], *(f"With that: {s}" for s in told[1:])]
     last = found.rounds[-1]
-    if last.after is not last.before:
+    if last.changed:
         told.append(
             f"The loop stops after {len(found.rounds)} round{'s' if len(found.rounds) > 1 else ''}: whether "
             f"{spoken(last.after.run.hypothesis)} is adequate has not been asked."
@@ -47,7 +48,7 @@ def bound_sentences(found: Loop) -> list[str]:
 def moved(found: Loop) -> list[str]:
     """How the material moved from the first posterior to the last, and why that matters."""
     before, after = stages(found)
-    return [] if after is before else moved_sentences(before.run, after.run)
+    return moved_sentences(before.run, after.run) if any(r.changed for r in found.rounds) else []
 
 
 def rival_sentences(found: Loop) -> list[str]:

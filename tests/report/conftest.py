@@ -57,7 +57,7 @@ def show(material: str, center: tuple[float, ...], measurement: Measurement, dom
         burn=100,
         evaluations=57600,
         seconds=3.0,
-        means=np.random.default_rng(0).normal(size=(2, 200, k)),
+        means=np.cumsum(np.random.default_rng(0).normal(size=(2, 200, k)), axis=1),
         steps_at=np.linspace(1, 900, 200),
         draws=x.reshape(2, -1, k),
         draws_at=np.linspace(100, 900, len(x) // 2),

@@ -40,13 +40,15 @@ def verb(
     only = [] if used.max_deflection_mm is None else [1e-3 * used.max_deflection_mm]
     ranges = ranges_of(curve.read(), several.ends or only)
     with resumable(stored.folder), lines() as tell:
-        found = analyses.compare(ranges, claims, ess=sampling.ess, seed=output.seed, out=stored.folder, progress=tell)
+        work = analyses.Work(output.seed, stored.folder, sampling.ess, tell)
+        found = analyses.compare(ranges, claims, work)
     answer(found.document, output.as_json, lambda: show(found.result))
 
 
 def show(found: dict[str, Comparison]) -> None:
     """Evidence and prediction of each range, on the terminal."""
     from bayesmembrane.report.sections.evidence.tables import evidence_table
+    from bayesmembrane.words.comparison import remark, sentences
 
     for name, comparison in found.items():
         shown = evidence_table({name: comparison})
@@ -55,8 +57,7 @@ def show(found: dict[str, Comparison]) -> None:
             rows = [[row[i] for i in columns] for row in shown.cells()]
             table(f"{name}: {text}", [shown.columns[i].head for i in columns], rows)
         for row in comparison.rows:
-            if row.reason:
-                say(f"{row.label}: {row.reason}")
-        for sentence in (comparison.reason, comparison.sentence, comparison.survival):
-            if sentence:
-                say(sentence)
+            if reason := remark(row):
+                say(f"{row.label}: {reason}")
+        for sentence in sentences(comparison):
+            say(sentence)

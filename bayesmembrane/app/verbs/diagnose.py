@@ -23,16 +23,19 @@ def verb(curve: Curve, material: Material, beside: Beside, used: Range, stored: 
     measurement = used.of(curve.read())
     say_thinning(measurement)
     with status(f"Diagnosing {claim.label()}") as tell:
-        found = analyses.diagnose(measurement, claim, seed=output.seed, out=stored.folder, tell=tell)
+        work = analyses.Work(output.seed, stored.folder, tell=lambda _, text: tell(text))
+        found = analyses.diagnose(measurement, claim, work)
     answer(found.document, output.as_json, lambda: show(found.document, measurement))
 
 
 def say_thinning(measurement: Measurement) -> None:
     """On stderr, before the work: that not all readings will be used."""
-    from bayesmembrane.data.thinning import thinned, thinning_sentence
+    from bayesmembrane.data.thinning import thinned
+    from bayesmembrane.diagnosis.result import thinning
+    from bayesmembrane.words.diagnosis import thinning_sentence
 
-    if sentence := thinning_sentence(measurement, thinned(measurement)):
-        note(sentence.replace("were diagnosed", "are diagnosed"))
+    if (found := thinning(measurement, thinned(measurement))) is not None:
+        note(thinning_sentence(found).replace("were diagnosed", "are diagnosed"))
 
 
 def show(document: dict[str, Any], measurement: Measurement) -> None:

@@ -11,11 +11,12 @@ import pytest
 from bayesmembrane.calibration.run import sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
-from bayesmembrane.diagnosis.discrepancy import discrepancy
+from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.left.discrepancy import discrepancy
 from bayesmembrane.diagnosis.loop import Loop, Round, Stage
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.separation import Experiment
-from bayesmembrane.diagnosis.wording import size_in_words
+from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.report.blocks import Figure, Points, Table
@@ -26,7 +27,10 @@ from bayesmembrane.report.sections.diagnosis.tables import confounded_table, pow
 from bayesmembrane.report.sections.loop import LoopSection, place_of, residual_rows
 from bayesmembrane.report.sections.loop.tables import errors_table, moved_table, scores_table
 from bayesmembrane.report.sections.loop.way import waypoints
+from bayesmembrane.words import diagnosis as diagnosis_words
+from bayesmembrane.words import loop as loop_words
 from bayesmembrane.words.candidates import candidate_title
+from bayesmembrane.words.diagnosis import set_aside, size_in_words
 from bayesmembrane.words.moved import Change, changes, modulus_sentence
 from bayesmembrane.words.rounds import answer, bound_sentences, moved, rival_sentences, validation_sentences
 from tests.generator.datasets import THICKNESS, generate
@@ -61,7 +65,7 @@ def named() -> Loop:
 def unknown(named: Loop) -> Loop:
     """The same curve, had nothing explained it."""
     r = named.rounds[0]
-    d = replace(r.diagnosis, verdict="unknown", effects=(), members=(), best=r.diagnosis.null, sentence="no name.")
+    d = replace(r.diagnosis, verdict="unknown", effects=(), members=(), best=r.diagnosis.null)
     left = discrepancy(r.before.run.measurement, d.null.residual, d.noise)
     return Loop((Round(d, r.before, r.before),), left)
 
@@ -72,7 +76,7 @@ def ambiguous(named: Loop) -> Loop:
     r = named.rounds[0]
     nexts = (Experiment("a blank run", math.inf), Experiment("unloading", 0.7))
     members = tuple(j for j in r.diagnosis.ranking if j.candidate.names)[:2]
-    d = replace(r.diagnosis, verdict="ambiguous", members=members, experiments=nexts, sentence="either.")
+    d = replace(r.diagnosis, verdict="ambiguous", members=members, experiments=nexts)
     return Loop((Round(d, r.before, r.before),), None)
 
 
@@ -113,7 +117,7 @@ def test_sampled_rivals_stand_side_by_side_and_are_not_added(sampled: Loop) -> N
     assert [r["heldout_coverage_90"] is None for r in errors] == [False, False, True]
     (sentence,) = rival_sentences(sampled)
     assert sentence.count("MPa") == 3
-    assert sampled.rounds[0].summary()["leaders"][1]["log_evidence"] == 550.0
+    assert loop_words.round_document(sampled.rounds[0])["leaders"][1]["log_evidence"] == 550.0
 
 
 def test_candidates_are_ranked_against_the_model_as_it_was(named: Loop) -> None:
@@ -186,11 +190,13 @@ def test_the_answer_tells_every_round(named: Loop) -> None:
 
 
 def test_what_was_changed_is_said_before_how_it_ended(named: Loop, unknown: Loop) -> None:
-    assert named.sentence == f"Changed: friction in the guide. {named.rounds[-1].diagnosis.sentence}"
-    assert unknown.sentence == "no name."
+    ends = diagnosis_words.sentence(named.rounds[-1].diagnosis)
+    assert loop_words.sentence(named) == f"Changed: friction in the guide. {ends}"
+    assert loop_words.sentence(unknown) == diagnosis_words.sentence(unknown.rounds[0].diagnosis)
     r = named.rounds[0]
     gent = replace(r.after, run=replace(r.after.run, settings={"hypothesis": hypothesis("gent").settings()}))
-    assert Loop((replace(r, after=gent),), None).sentence.startswith("Changed: Gent instead of neo-Hookean. ")
+    told = loop_words.sentence(Loop((replace(r, after=gent),), None))
+    assert told.startswith("Changed: Gent instead of neo-Hookean. ")
 
 
 def test_a_loop_that_stops_early_says_so(named: Loop) -> None:
@@ -201,7 +207,7 @@ def test_a_loop_that_stops_early_says_so(named: Loop) -> None:
 def test_the_choice_without_the_held_out_points_is_said(named: Loop) -> None:
     d = only(named, "named")
     assert d.validation is not None
-    assert any("choose the same model" in s and d.validation.where in s for s in validation_sentences(named))
+    assert any("choose the same model" in s and set_aside(d.validation) in s for s in validation_sentences(named))
     other = replace(d.validation, chosen="neo_hookean")
     r = replace(named.rounds[0], diagnosis=replace(d, validation=other))
     assert "choose neo-Hookean instead" in validation_sentences(Loop((r,), None))[0]
@@ -248,7 +254,7 @@ def test_without_a_name_the_rest_is_drawn_and_nothing_is_added(unknown: Loop) ->
     assert unknown.left is not None
     captions = [b.caption for b in section.blocks if isinstance(b, Figure)]
     assert len(captions) == 2
-    assert unknown.left.sentence in captions[1]
+    assert loop_words.left_sentence(unknown.left) in captions[1]
     assert [r.title.partition(":")[0] for r in residual_rows(waypoints(unknown))] == ["As given"]
     assert not any(r["in_answer"] for r in ranking_table(unknown.rounds[0].diagnosis, "r").records())
 
@@ -318,8 +324,16 @@ def test_a_loop_and_a_diagnosis_stand_alone(tmp_path: Path, named: Loop) -> None
     page = write_report([d, named.rounds[-1].diagnosis], tmp_path / "diagnosis").read_text()
     twin = json.loads((tmp_path / "diagnosis" / TWIN).read_text())
     assert 'id="diagnosis1"' in page
-    assert twin["answer"] == [d.sentence, named.rounds[-1].diagnosis.sentence]
+    assert twin["answer"] == [diagnosis_words.sentence(x) for x in (d, named.rounds[-1].diagnosis)]
     before, after = twin["tables"]["diagnosis errors 1"]
     assert (before["model"], after["model"]) == ("neo-Hookean", "neo-Hookean with friction in the guide")
     assert after["heldout_rmse_mN"] < before["heldout_rmse_mN"]
     assert twin["tables"]["glance"][0]["found"] == "named: neo-Hookean with friction in the guide"
+
+
+def test_a_stored_diagnosis_gives_the_same_page(tmp_path: Path, named: Loop) -> None:
+    d = only(named, "named")
+    store(tmp_path / "answer", "diagnosis", d, {})
+    assert write_report([tmp_path / "answer"], tmp_path / "a").read_text() == (
+        write_report([d], tmp_path / "b").read_text()
+    )

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.diagnosis.diagnose import Diagnosis
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.stored import read
 from bayesmembrane.report.blocks import Block, Figure, Heading, Part, Text, points
 from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
@@ -19,6 +19,7 @@ from bayesmembrane.report.sections.diagnosis.tables import (
     power_table,
     ranking_table,
 )
+from bayesmembrane.words import diagnosis as words
 from bayesmembrane.words.candidates import bounds, rivals, validation_sentence
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import sentence
@@ -44,7 +45,7 @@ class DiagnosisSection(Section):
         return [_part(d, f" {number}" if several else "") for number, d in enumerate(found, 1)]
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
-        return [d.sentence for d in of_kind(results, Diagnosis)]
+        return [words.sentence(d) for d in of_kind(results, Diagnosis)]
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
         return [Glance("diagnosis", spoken(d.null.hypothesis), finding(d)) for d in of_kind(results, Diagnosis)]
@@ -56,13 +57,13 @@ class DiagnosisSection(Section):
 
 def finding(d: Diagnosis) -> str:
     """The verdict, and the model that it names."""
-    return f"{d.verdict}: {spoken(d.hypothesis)}" if d.verdict in ("named", "material") else d.verdict
+    return f"{d.verdict}: {spoken(d.hypothesis)}" if d.explains else d.verdict
 
 
 def _part(d: Diagnosis, end: str) -> Part:
     told = [*(s for s in [validation_sentence(d)] if s), *bounds(d)]
     blocks: list[Block] = [
-        Text(d.sentence),
+        Text(words.sentence(d)),
         *points(told),
         _residuals(d),
         before_and_after(d, f"diagnosis errors{end}"),
@@ -104,7 +105,7 @@ def limits(d: Diagnosis, last: Diagnosis, names: tuple[str, str]) -> list[Block]
         out.append(confounded_table(d, names[0]))
     if d.absorbed:
         out.append(Text("The material absorbs without trace, so that no residual shows it:"))
-        out += points([sentence(s) for s in d.absorbed])
+        out += points([sentence(s) for s in words.absorbed_sentences(d)])
     if last.power:
         out.append(power_table(last, names[1]))
     return [Heading("What this measurement cannot tell"), *out] if out else []

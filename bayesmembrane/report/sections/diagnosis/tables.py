@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from bayesmembrane.diagnosis.diagnose import Diagnosis
-from bayesmembrane.diagnosis.heldout import Error
-from bayesmembrane.diagnosis.trace import UNEXPLAINED
-from bayesmembrane.diagnosis.wording import size_in_words
+from bayesmembrane.diagnosis.left.heldout import Misfit
+from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.diagnosis.thresholds import EXPLANATION
 from bayesmembrane.ground.registry import components
 from bayesmembrane.report.blocks import Column, Table, Value
 from bayesmembrane.words.candidates import candidate_title, sizes
+from bayesmembrane.words.diagnosis import set_aside, size_in_words
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import spoken_parameter
 
@@ -36,7 +36,7 @@ def errors_caption(where: str) -> str:
     )
 
 
-def error_cells(error: Error | None) -> tuple[Value, ...]:
+def error_cells(error: Misfit | None) -> tuple[Value, ...]:
     """An error in three cells."""
     return (None, None, None) if error is None else (1e3 * error.rmse_N, 1e3 * error.max_N, error.reduced_chi2)
 
@@ -61,7 +61,7 @@ def before_and_after(d: Diagnosis, name: str) -> Table:
                 v.covered_after if v else None,
             )
         )
-    return Table(name, errors_caption("nothing" if v is None else v.where), ERRORS, tuple(rows))
+    return Table(name, errors_caption(set_aside(v)), ERRORS, tuple(rows))
 
 
 def ranking_table(d: Diagnosis, name: str) -> Table:
@@ -75,7 +75,7 @@ def ranking_table(d: Diagnosis, name: str) -> Table:
         Column("at_bound", "at a bound"),
         Column("in_answer", "in the answer"),
     )
-    members = {id(j.candidate) for j in d.members} if d.verdict != "unknown" else set()
+    members = {j.candidate.label for j in d.members} if d.verdict != "unknown" else set()
     rows = []
     for j in d.ranking[:MOST_CANDIDATES]:
         c = j.candidate
@@ -87,14 +87,14 @@ def ranking_table(d: Diagnosis, name: str) -> Table:
                 j.unexplained,
                 j.explains,
                 ", ".join(spoken_parameter(n) for n in c.at_bound) or "-",
-                id(c) in members,
+                c.label in members,
             )
         )
     caption = (
         f"What could explain the residual of {spoken(d.null.hypothesis)}: each candidate was refitted with "
         "the material. ln Bayes factor: against the model as it was (Laplace approximation). Unexplained: part of the "
         "lack of fit that is left; a candidate explains the curve if that is noise, or at most "
-        f"{100 * UNEXPLAINED:g} %."
+        f"{100 * EXPLANATION.unexplained:g} %."
     )
     if len(d.ranking) > MOST_CANDIDATES:
         caption += f" The {MOST_CANDIDATES} most probable of {len(d.ranking)}."

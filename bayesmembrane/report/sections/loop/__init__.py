@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.diagnosis.diagnose import Diagnosis
-from bayesmembrane.diagnosis.heldout import held_out
+from bayesmembrane.diagnosis.left.heldout import held_out
 from bayesmembrane.diagnosis.loop import Loop
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.stored import read
 from bayesmembrane.report.blocks import Block, Figure, Heading, Part, Text, points
 from bayesmembrane.report.runs import Shown
@@ -19,8 +19,10 @@ from bayesmembrane.report.sections.diagnosis import explanations, finding, limit
 from bayesmembrane.report.sections.diagnosis.figures import Place, Residual, discrepancy_picture, residual_picture
 from bayesmembrane.report.sections.loop.tables import errors_table, moved_table, scores_table
 from bayesmembrane.report.sections.loop.way import Waypoint, waypoints
+from bayesmembrane.words.diagnosis import set_aside
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed
+from bayesmembrane.words.loop import left_sentence
 from bayesmembrane.words.moved import changes
 from bayesmembrane.words.rounds import (
     answer,
@@ -74,14 +76,14 @@ def _part(found: Loop, number: int) -> Part:
     end = f" {number}" if number else ""
     first, last = found.rounds[0].diagnosis, found.rounds[-1].diagnosis
     way = waypoints(found)
-    where = "nothing" if first.validation is None else first.validation.where
+    where = set_aside(first.validation)
     blocks: list[Block] = [Text(text) for text in answer(found)]
     blocks += points([*validation_sentences(found), *bound_sentences(found), *moved(found), *rival_sentences(found)])
     blocks.append(_residuals(found, way))
     blocks += [errors_table(way, where, f"loop errors{end}"), scores_table(way, f"loop scores{end}")]
     blocks += _left(found, last)
     before, after = stages(found)
-    if after is not before:
+    if any(r.changed for r in found.rounds):
         blocks.append(Heading("How the parameters moved"))
         blocks.append(moved_table(changes(before.run, after.run), f"loop parameters{end}"))
     rounds = [r.diagnosis for r in found.rounds if r.diagnosis.verdict != "adequate"]
@@ -95,7 +97,7 @@ def _part(found: Loop, number: int) -> Part:
 def place_of(found: Loop) -> Place:
     """Where the points lie, which were set aside, and their noise as the last diagnosis has it."""
     m, d = found.rounds[0].before.run.measurement, found.rounds[-1].diagnosis
-    mask = held_out(m)[0] if d.validation is not None else np.zeros(len(m), dtype=bool)
+    mask = held_out(m) if d.validation is not None else np.zeros(len(m), dtype=bool)
     return Place(m.deflection, m.time, m.leg, m.cycle, mask, d.noise.each)
 
 
@@ -134,8 +136,8 @@ def _left(found: Loop, last: Diagnosis) -> list[Block]:
     if found.left is None:
         return []
     caption = (
-        f"{found.left.sentence} Lines and bands: mean and two standard deviations of the process that is kept for it "
-        "along the way of the disc; it has no name, and predicts nothing for another test."
+        f"{left_sentence(found.left)} Lines and bands: mean and two standard deviations of the process that is kept "
+        "for it along the way of the disc; it has no name, and predicts nothing for another test."
     )
     picture = discrepancy_picture(place_of(found), last.null.residual, found.left.mean, found.left.sd)
     model = spoken(last.null.hypothesis)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from bayesmembrane.diagnosis.candidates import Candidate
-from bayesmembrane.diagnosis.diagnose import Diagnosis
-from bayesmembrane.diagnosis.heldout import Error, error_of
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.left.heldout import Misfit, misfit_of
 from bayesmembrane.diagnosis.loop import Loop, Round, Stage
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.words.hypothesis import spoken
 
 
@@ -25,8 +25,8 @@ class Waypoint:
 
     title: str
     candidate: Candidate
-    error: Error
-    held_out: Error | None
+    error: Misfit
+    held_out: Misfit | None
     stage: Stage | None
     added: bool = True
     covered: float | None = None
@@ -41,8 +41,8 @@ def waypoints(loop: Loop) -> list[Waypoint]:
         d = r.diagnosis
         if d.verdict == "ambiguous":
             out += _undecided(r)
-        elif d.best is not d.null and d.verdict in ("named", "material"):
-            stage = r.after if r.after is not r.before else None
+        elif d.explains:
+            stage = r.after if r.changed else None
             out.append(replace(_waypoint(d, d.best, d.after, stage, before=False), added=stage is not None))
     return out
 
@@ -59,7 +59,7 @@ def _undecided(r: Round) -> list[Waypoint]:
             Waypoint(
                 spoken(j.candidate.hypothesis),
                 j.candidate,
-                error_of(j.candidate.residual, sd, j.candidate.x.size),
+                misfit_of(j.candidate.residual, sd, j.candidate.x.size),
                 None,
                 stage,
                 added=False,
@@ -69,7 +69,7 @@ def _undecided(r: Round) -> list[Waypoint]:
     ]
 
 
-def _waypoint(d: Diagnosis, candidate: Candidate, error: Error, stage: Stage | None, before: bool) -> Waypoint:
+def _waypoint(d: Diagnosis, candidate: Candidate, error: Misfit, stage: Stage | None, before: bool) -> Waypoint:
     v, title = d.validation, spoken(candidate.hypothesis)
     if v is None:
         return Waypoint(title, candidate, error, None, stage)

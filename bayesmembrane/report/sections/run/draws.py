@@ -19,11 +19,12 @@ from matplotlib.ticker import MaxNLocator
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.report.blocks import Picture
-from bayesmembrane.report.canvas import MOST_POINTS, WIDTH, encoded, new_figure, style
+from bayesmembrane.report.canvas import WIDTH, encoded, new_figure, style
 from bayesmembrane.report.runs import Replicas
 from bayesmembrane.report.style import ALARM, FAINT, INK, MUTED, RANGE_COLOURS, colour, with_unit
 
 ENSEMBLES = (*RANGE_COLOURS, "#E69F00")
+MOST_MEANS = 150  # of a line of means
 
 
 def corner_plot(
@@ -141,14 +142,13 @@ def traces(walk: Walk, kind: str = "png") -> Picture:
     """Density and trace of the draws of each ensemble, by arviz, with the means over the walkers on top."""
     count, k = walk.means.shape[0], len(walk.names)
     colours = [ENSEMBLES[e % len(ENSEMBLES)] for e in range(count)]
-    keep = np.unique(np.linspace(0, len(walk.steps) - 1, min(len(walk.steps), MOST_POINTS)).astype(int))
+    keep = np.unique(np.linspace(0, len(walk.steps) - 1, min(len(walk.steps), MOST_MEANS)).astype(int))
     with style():
         figure = new_figure(0.8 + 1.3 * k)
         axes = figure.subplots(k, 2, squeeze=False, width_ratios=(1, 2.3))
         _arviz_trace(walk, axes, colours)
         for i, (left, right) in enumerate(axes):
             for e, c in enumerate(colours):
-                right.plot(walk.steps[keep], walk.means[e, keep, i], color="white", linewidth=2.4, zorder=4)
                 right.plot(walk.steps[keep], walk.means[e, keep, i], color=c, linewidth=1.3, zorder=5)
             if walk.burn > walk.steps[0]:
                 right.axvspan(float(walk.steps[0]), walk.burn, color=FAINT, zorder=0)
@@ -181,7 +181,7 @@ def _arviz_trace(walk: Walk, axes: Any, colours: Sequence[str]) -> None:
             compact=False,
             divergences=None,
             chain_prop={"color": list(colours)},
-            trace_kwargs={"linewidth": 0.6, "alpha": 0.25},
+            trace_kwargs={"linewidth": 0.6, "alpha": 0.3, "antialiased": False},  # a third of the bytes
             plot_kwargs={"linewidth": 1.4},
             show=False,
         )
