@@ -167,11 +167,12 @@ def reconstruct(
     from bayesmembrane.data.published import read_published_table
     from bayesmembrane.reconstruction.files import write_reconstruction
     from bayesmembrane.reconstruction.reconstruct import reconstruct as run
+    from bayesmembrane.words.reconstruction import document as words
 
     printed = read_published_table()
     with log.status("Locating the curve from 30 losses"):
         found = run(printed, seed=seed)
-    document = found.to_json_dict()
+    document = words(found)
     if out_folder is not None:
         document["files"] = [str(f) for f in write_reconstruction(found, printed, out_folder)]
 
@@ -302,13 +303,14 @@ def valleys(
     from bayesmembrane.report.sections.valleys.section import valley_table, write_valleys
     from bayesmembrane.valleys.beside import Beside, valleys_beside
     from bayesmembrane.valleys.follow import valleys as run
+    from bayesmembrane.words import valleys as words
 
     measurement, claim = _asked(curve, specimen, material, effects, None, convexity, noise)
     ends = [1e-3 * end for end in numbers(ranges_mm, "--ranges-mm")] if ranges_mm else []
     with log.status(f"Following the valleys of {claim.label()}"):
         how = valleys_beside if claim.effects else run
         found = how(measurement, claim, ends, rise=loss_rise, seed=seed)
-    document = found.summary()
+    document = words.document(found)
     parts = [found.without, found.added] if isinstance(found, Beside) else [found]
     if out_folder is not None:
         document["files"] = [str(f) for f in write_valleys(found, out_folder)]
@@ -325,7 +327,7 @@ def valleys(
             [whole.columns[i].head for i in shown],
             [[row[i] for i in shown] for row in whole.cells()],
         )
-        for sentence in found.sentences:
+        for sentence in words.sentences(found):
             out.print(sentence)
         for valley in parts[-1].ranges:
             rows = [[t.test, f"{100 * t.reduction:.0f} %"] for t in valley.next_tests[:5]]

@@ -39,6 +39,7 @@ from bayesmembrane.reconstruction.reconstruct import reconstruct
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.report.page import write_report
 from bayesmembrane.valleys.follow import Valleys, valleys_of
+from bayesmembrane.words.reconstruction import document as reconstruction_document
 
 RANGES = ("OP1", "OP2")
 # The slowest first, two materials at a time: the others fill the gaps, and no solver is compiled twice.
@@ -135,7 +136,7 @@ def demo(out: Path, chains: Path, seed: int = 0, ess: float = 1000.0) -> dict[st
         "report": str(page),
         "verdicts": [{"verdict": c.rounds[0].diagnosis.verdict, "sentence": c.sentence} for c in loops],
         "runs": [str(d.run) for d in ordered],
-        "suspect_rows": found.to_json_dict()["suspect_rows"],
+        "suspect_rows": reconstruction_document(found)["suspect_rows"],
         "seconds": time.perf_counter() - began,
     }
 

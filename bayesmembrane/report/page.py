@@ -36,6 +36,8 @@ from bayesmembrane.report.style import title as material_title
 from bayesmembrane.report.tables import Table
 from bayesmembrane.report.view import Shown, Specimen
 from bayesmembrane.valleys.result import Valleys
+from bayesmembrane.words import valleys as valley_words
+from bayesmembrane.words.reconstruction import contradiction
 
 GENERATOR = "bayesmembrane report"
 PAGE, TWIN = "index.html", "report.json"
@@ -348,7 +350,7 @@ def _valleys(found: Sequence[Valleys]) -> Section:
         )
         picture = valley_picture(f)
         blocks.append(Block("figure", picture=picture, alt=alternative_text(f), caption=caption))
-        blocks.append(Block("list", lines=f.sentences))
+        blocks.append(Block("list", lines=valley_words.sentences(f)))
         blocks += [_table(next_table(v)) for v in f.ranges if v.next_tests]
     return Section("valleys", "Valleys of the loss", tuple(blocks))
 
@@ -390,7 +392,7 @@ def _reconstruction(found: Reconstruction) -> Section:
 def _suspect_line(found: Any) -> str:
     changes = sentences.listed(f"{c.entry} {c.printed} to {c.consistent:g}" for c in found.corrections)
     mend = f"; smallest change that mends it: {changes}" if changes else ""
-    return f"{material_title(found.material)} {found.column}: {found.reason}{mend}."
+    return f"{material_title(found.material)} {found.column}: {contradiction(found)}{mend}."
 
 
 def _run(s: Shown, compared: Compared | None) -> Section:

@@ -16,7 +16,7 @@ from bayesmembrane.report.tables import Column, Table, Value
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.next_tests import ASSUMPTION
 from bayesmembrane.valleys.result import Valley, Valleys
-from bayesmembrane.valleys.sentences import titled
+from bayesmembrane.words.valleys import document, limit_title, titled
 
 ANSWER, PICTURE, BESIDE = "valleys.json", "valleys.png", "valleys_beside.png"
 TESTS = 5
@@ -63,7 +63,7 @@ def _row(v: Valley) -> tuple[Value, ...]:
         v.length(v.metric),
         v.metric.unit if v.metric.unit != "-" else "ln",
         v.spectra[0].condition_number,
-        (f"{opened}: {v.limit or 'no end'}" if opened else "no"),
+        (f"{opened}: {limit_title(v) or 'no end'}" if opened else "no"),
         ", ".join(f"{100 * v.share(m.name):.3g} %" for m in RESTRICTING),
         inside,
         "-" if first is None else f"{first.test}: {100 * first.reduction:.0f} %",
@@ -101,7 +101,7 @@ def write_valleys(found: Valleys | Beside, out: Path) -> tuple[Path, ...]:
     pictures[PICTURE] = valley_picture(found.added if isinstance(found, Beside) else found)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        (out / ANSWER).write_text(json.dumps(plain(found.summary()), allow_nan=False), encoding="utf-8")
+        (out / ANSWER).write_text(json.dumps(plain(document(found)), allow_nan=False), encoding="utf-8")
         for name, picture in pictures.items():
             (out / name).write_bytes(picture.data)
     except OSError as error:
