@@ -8,9 +8,8 @@ from pathlib import Path
 from bayesmembrane.app.demo import shipped_measurement
 from bayesmembrane.calibration.run import load_run
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.report.canvas import first_look
-from bayesmembrane.report.page import look_of
-from bayesmembrane.report.reading import read
+from bayesmembrane.report.runs import read
+from bayesmembrane.report.sections.curves import first_look, look_of
 from bayesmembrane.report.sections.valleys.figures import valley_picture
 from bayesmembrane.valleys.follow import valleys_of
 

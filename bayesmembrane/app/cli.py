@@ -300,7 +300,8 @@ def valleys(
 
     With --effects also the valley without them, and how far the two lie apart.
     """
-    from bayesmembrane.report.sections.valleys.section import valley_table, write_valleys
+    from bayesmembrane.report.sections.valleys import write_valleys
+    from bayesmembrane.report.sections.valleys.tables import valley_table
     from bayesmembrane.valleys.beside import Beside, valleys_beside
     from bayesmembrane.valleys.follow import valleys as run
     from bayesmembrane.words import valleys as words
@@ -363,7 +364,7 @@ def compare(
     """Which materials the data support, by two estimators of the evidence, with prediction beside it."""
     from bayesmembrane.comparison.compare import claimed, compare_ranges, ranges_of
     from bayesmembrane.comparison.jobs import Judging
-    from bayesmembrane.report.sections.comparison.section import evidence_table
+    from bayesmembrane.report.sections.evidence.tables import evidence_table
     from bayesmembrane.words.comparison import document_of_ranges, remark, sentences
 
     claims = claimed(materials, effects, noise, convexity)
@@ -409,12 +410,13 @@ def diagnose(
 ) -> None:
     """Whether the model misses something, which effect or energy explains it, or that this cannot be told."""
     from bayesmembrane.diagnosis.diagnose import diagnose as run
+    from bayesmembrane.words.diagnosis import document as words
 
     measurement, claim = _asked(curve, specimen, material, effects, max_deflection_mm, convexity, noise)
     _say_thinning(measurement)
     with log.status(f"Diagnosing {claim.label()}") as status:
         found = run(measurement, claim, seed=seed, tell=status.update)
-    document = found.summary()
+    document = words(found)
     answer(document, as_json, lambda: _shown(document, measurement))
 
 
@@ -436,8 +438,10 @@ def loop(
     seed: Seed = 0,
 ) -> None:
     """Calibrate, diagnose, add what is missing, calibrate again, until adequate or abstaining; and report."""
+    from bayesmembrane.diagnosis.loop import LoopSettings
     from bayesmembrane.diagnosis.loop import loop as run
     from bayesmembrane.report.page import write_report
+    from bayesmembrane.words.loop import document as words
 
     adapt = noise == "auto"
     measurement, claim = _asked(
@@ -446,26 +450,14 @@ def loop(
     _say_thinning(measurement)
     try:
         with lines() as tell:
-            found = run(
-                measurement,
-                claim,
-                seed=seed,
-                out=out_folder,
-                ess=ess,
-                tell=lambda text: tell(claim.label(), text),
-                adapt_noise=adapt,
-            )
+            settings = LoopSettings(seed, out_folder, ess, adapt)
+            found = run(measurement, claim, settings, tell=lambda text: tell(claim.label(), text))
     except KeyboardInterrupt:
         log.print(f"Interrupted; the runs are stored in {out_folder}. The same command resumes: {_command()}")
         raise typer.Exit(130) from None
     runs = list({str(s.run.path): s.run for r in found.rounds for s in (r.before, r.after)}.values())
-    page = write_report([r.path for r in runs if r.path is not None], report_folder, loops=[found])
-    document: dict[str, Any] = {
-        "rounds": [r.summary() for r in found.rounds],
-        "sentence": found.sentence,
-        "left": None if found.left is None else found.left.sentence,
-        "report": str(page),
-    }
+    page = write_report([*runs, found], report_folder)
+    document: dict[str, Any] = {**words(found), "report": str(page)}
 
     def show() -> None:
         for number, round_ in enumerate(document["rounds"], 1):
@@ -517,7 +509,7 @@ def report(
 
     found = [path for folder in folders for path in run_folders(folder)]
     runs = [load_run(path) for path in found]
-    page = write_report(runs, out_folder, title=title)
+    page = write_report(runs, out_folder, title)
     document = {"report": str(page), "runs": [str(path) for path in found]}
     answer(document, as_json, lambda: out.print(f"The report lies in {page}"))
 
@@ -549,10 +541,12 @@ def _measurement(curve: Path, specimen: Path) -> Measurement:
 
 def _say_thinning(measurement: Measurement) -> None:
     """On stderr, before the work: that not all readings will be used."""
-    from bayesmembrane.data.thinning import thinned, thinning_sentence
+    from bayesmembrane.data.thinning import thinned
+    from bayesmembrane.diagnosis.result import thinning
+    from bayesmembrane.words.diagnosis import thinning_sentence
 
-    if sentence := thinning_sentence(measurement, thinned(measurement)):
-        log.print(sentence.replace("were diagnosed", "are diagnosed"), markup=False)
+    if (found := thinning(measurement, thinned(measurement))) is not None:
+        log.print(thinning_sentence(found).replace("were diagnosed", "are diagnosed"), markup=False)
 
 
 def _asked(

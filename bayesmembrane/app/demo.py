@@ -30,7 +30,7 @@ from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement, read_measurement
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.data.shipped import shipped
-from bayesmembrane.diagnosis.loop import Loop, loop
+from bayesmembrane.diagnosis.loop import Loop, LoopSettings, loop
 from bayesmembrane.ground.jobs import Tell, silent
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.cache import CachedSolver, Tally
@@ -39,6 +39,7 @@ from bayesmembrane.reconstruction.reconstruct import reconstruct
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.report.page import write_report
 from bayesmembrane.valleys.follow import Valleys, valleys_of
+from bayesmembrane.words.loop import sentence
 from bayesmembrane.words.reconstruction import document as reconstruction_document
 
 RANGES = ("OP1", "OP2")
@@ -120,21 +121,12 @@ def demo(out: Path, chains: Path, seed: int = 0, ess: float = 1000.0) -> dict[st
     with lines() as tell:
         comparison = compare(chains, seed, ess, tell)
     ordered = [done[name, range_name] for name in materials() for range_name in RANGES if (name, range_name) in done]
-    page = write_report(
-        [d.run for d in ordered],
-        out,
-        reconstruction=found,
-        fits=[c for d in ordered for c in d.compared],
-        title=TITLE,
-        cache=_sum([d.tally for d in ordered]),
-        valleys=valleys,
-        comparison=comparison,
-        paper=paper_losses(),
-        loops=loops,
-    )
+    compared = [c for d in ordered for c in d.compared]
+    shown = [*(d.run for d in ordered), found, *compared, _sum([d.tally for d in ordered]), *valleys, comparison]
+    page = write_report([*shown, read_published_table(), *loops], out, TITLE)
     return {
         "report": str(page),
-        "verdicts": [{"verdict": c.rounds[0].diagnosis.verdict, "sentence": c.sentence} for c in loops],
+        "verdicts": [{"verdict": c.rounds[0].diagnosis.verdict, "sentence": sentence(c)} for c in loops],
         "runs": [str(d.run) for d in ordered],
         "suspect_rows": reconstruction_document(found)["suspect_rows"],
         "seconds": time.perf_counter() - began,
@@ -164,15 +156,6 @@ def shipped_ranges() -> dict[str, Range]:
     }
 
 
-def paper_losses() -> dict[str, dict[str, float]]:
-    """Losses of the paper's optima over the range that they were fitted to, N, by range and material."""
-    table = read_published_table()
-    return {
-        name: {row.material: float(row.loss[i]) for row in table.rows if row.column == name}
-        for i, name in enumerate(table.ranges)
-    }
-
-
 @contextmanager
 def _workers() -> Iterator[tuple[ProcessPoolExecutor, Any]]:
     """Fresh processes, one for each core, and a queue on which they tell how far they are."""
@@ -194,7 +177,7 @@ def _in_worker(name: str, range_name: str, chains: Path, seed: int, ess: float, 
 def _loop_in_worker(name: str, stem: str, chains: Path, seed: int, ess: float, queue: Any) -> Loop:
     queue.put((f"loop, {stem}", None))
     measurement = read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
-    found = loop(measurement, hypothesis(name), seed=seed, out=chains, ess=ess, adapt_noise=True)
+    found = loop(measurement, hypothesis(name), LoopSettings(seed, chains, ess, adapt_noise=True))
     queue.put((f"loop, {stem}", FINISHED))
     return found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
-from bayesmembrane.calibration.objective import Objective, apart
+from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.calibration.prior import JointPrior
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.mechanics.solution import Status
@@ -25,8 +25,8 @@ def constrained_optimum(objective: Objective, pool: Array, free: Array, containe
     if not len(feasible) + len(simple):
         return None
     anchor = feasible[0] if len(feasible) else simple[0]
-    starts = [*apart(feasible, objective.spread, STARTS - 1), _pulled(objective, free, anchor), *simple]
-    found = [_pulled(objective, _constrained_search(objective, s), anchor) for s in starts]
+    starts = [*separated(feasible, objective.spread, STARTS - 1), _pulled_inside(objective, free, anchor), *simple]
+    found = [_pulled_inside(objective, _constrained_search(objective, s), anchor) for s in starts]
     found += list(simple)
     sizes = objective.many(objective.forward(np.array(found), reached=False))
     best = int(np.argmin(sizes))
@@ -79,7 +79,7 @@ def _margins(objective: Objective, x: Array) -> Array:
     return np.where(np.isnan(values), 1.0, np.clip(values, -1e3, 1e3))
 
 
-def _pulled(objective: Objective, x: Array, anchor: Array) -> Array:
+def _pulled_inside(objective: Objective, x: Array, anchor: Array) -> Array:
     """The point nearest to x on the way to ``anchor`` that meets the convexity prior and has a curve."""
     prior = JointPrior(objective.hypothesis)
     low, high = 0.0, 1.0

@@ -47,9 +47,9 @@ def crosscheck(forward: Forward, x: Array, seed: int = 0, draws: int = DRAWS) ->
     missing = int(np.sum(first.ok != second.ok))
     if not np.any(both):
         return CrossCheck(len(films), np.nan, np.nan, 0, missing)
-    apart = np.where(both, np.abs(second.force - first.force) / np.where(both, np.abs(first.force), 1.0), -1.0)
-    _, column = np.unravel_index(int(np.argmax(apart)), apart.shape)
-    return CrossCheck(len(films), float(np.max(apart)), 1e3 * float(at[column]), int(np.sum(both)), missing)
+    difference = np.where(both, np.abs(second.force - first.force) / np.where(both, np.abs(first.force), 1.0), -1.0)
+    _, column = np.unravel_index(int(np.argmax(difference)), difference.shape)
+    return CrossCheck(len(films), float(np.max(difference)), 1e3 * float(at[column]), int(np.sum(both)), missing)
 
 
 def _sample(forward: Forward) -> Array:

@@ -21,13 +21,12 @@ CRAWL, CRAWLS = 1e-3, 4  # the same of a search that is far behind the best one
 def descend(
     residuals: Residuals,
     start: Array,
-    low: Array,
-    high: Array,
+    bounds: tuple[Array, Array],
     iterations: int,
     held: NDArray[np.bool_] | None = None,
     behind: float = np.inf,
 ) -> tuple[Array, Array]:
-    """min |r(x)|^2 within low <= x <= high from each row of start (M, k), by Marquardt's damped steps
+    """min |r(x)|^2 with x between ``bounds`` (k,) from each row of start (M, k), by Marquardt's damped steps
 
         (J^T J + m diag(J^T J)) s = -J^T r,
 
@@ -38,6 +37,7 @@ def descend(
 
     D. W. Marquardt, J. SIAM 11 (1963) 431; a row that finds no better point with any damping is done.
     """
+    low, high = bounds
     x = np.clip(start, low, high)
     free = np.ones(x.shape, bool) if held is None else ~held
     r, jacobian = residuals(x)
@@ -48,7 +48,7 @@ def descend(
         rows = np.flatnonzero(going)
         if not rows.size:
             break
-        step = _step(x[rows], r[rows], jacobian[rows], damping[rows], free[rows], low, high)
+        step = _step(x[rows], r[rows], jacobian[rows], damping[rows], free[rows], bounds)
         trial = np.clip(x[rows] + step, low, high)
         new_r, new_jacobian = residuals(trial)
         new_size = _square(new_r, new_jacobian)
@@ -80,8 +80,9 @@ def _square(r: Array, jacobian: Array) -> Array:
 
 
 def _step(
-    x: Array, r: Array, jacobian: Array, damping: Array, free: NDArray[np.bool_], low: Array, high: Array
+    x: Array, r: Array, jacobian: Array, damping: Array, free: NDArray[np.bool_], bounds: tuple[Array, Array]
 ) -> Array:
+    low, high = bounds
     gradient = np.einsum("mnk,mn->mk", jacobian, r)
     moves = free & ~((x <= low) & (gradient > 0)) & ~((x >= high) & (gradient < 0))
     j = np.where(moves[:, None, :], jacobian, 0.0)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.ground.fingerprint import ROOT, digest, majors, reached
+from bayesmembrane.ground.fingerprint import digest, majors, reached
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 SAMPLING = ("bayesmembrane.calibration.sampling.walk", "bayesmembrane.calibration.outcome")
@@ -20,17 +19,19 @@ def fingerprint(
     measurements: Measurement | Iterable[Measurement],
     settings: Mapping[str, Any],
     seed: int,
+    also: Iterable[type[Any]] = (),
 ) -> str:
     """SHA-256 over the code that ``entries`` reach, and over hypotheses, data, plain ``settings`` and ``seed``.
 
-    ``entries`` are dotted names of the modules whose functions make the answer. Equal fingerprints mean equal answers;
+    ``entries`` are dotted names of the modules whose functions make the answer; ``also`` are components that it looks
+    at besides those of the hypotheses: every effect, where it seeks one. Equal fingerprints mean equal answers;
     a comment, a new component or a sentence elsewhere changes nothing. See `code_of` for what counts as code.
     """
     claims = (hypotheses,) if isinstance(hypotheses, Hypothesis) else tuple(hypotheses)
     data = (measurements,) if isinstance(measurements, Measurement) else tuple(measurements)
     return digest(
         {
-            "code": code_of(entries, claims, data),
+            "code": code_of(entries, claims, data, also),
             "hypotheses": [h.settings() for h in claims],
             "data": [m.data_hash for m in data],
             "settings": dict(settings),
@@ -43,21 +44,21 @@ def code_of(
     entries: str | Iterable[str],
     hypotheses: Iterable[Hypothesis],
     measurements: Iterable[Measurement],
-    root: Path = ROOT,
+    also: Iterable[type[Any]] = (),
 ) -> str:
     """SHA-256 of what the modules ``entries`` reach for these hypotheses on these measurements.
 
-    That is the statements of the modules that they import, of the own material, effects, noise and rig and of what
-    these import, but of no other component; every prior and its bounds as values; and the major versions of the
+    That is the statements of the modules that they import, of the own material, effects, noise and rig, of components
+    named in ``also``, and of what these import; every prior and its bounds as values; and the major versions of the
     packages that do the numerical work.
     """
     claims = tuple(hypotheses)
     names = (entries,) if isinstance(entries, str) else tuple(entries)
-    components = {part for h in claims for part in _components(h)} | {type(m.rig) for m in measurements}
+    components = set(also) | {part for h in claims for part in _components(h)} | {type(m.rig) for m in measurements}
     ordered = sorted(components, key=lambda c: (c.__module__, c.__qualname__))
     return digest(
         {
-            "modules": reached(names, ordered, root),
+            "modules": reached(names, ordered),
             "priors": [[p.name, repr(p.prior), repr(p.bounds)] for h in claims for p in h.parameters],
             "majors": majors(),
         }

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bayesmembrane.calibration.constrained import constrained_optimum
 from bayesmembrane.calibration.descent import descend
-from bayesmembrane.calibration.objective import Objective, apart
+from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.calibration.posterior import enough_points
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
@@ -32,7 +32,7 @@ LOWER = 1e-9  # a simpler energy's optimum is taken where it leads lower by more
 
 
 @dataclass(frozen=True)
-class Estimate:
+class FittedParameter:
     """A fitted parameter; ``sd`` is None where the data set no scale (at a bound, or no degree of freedom left)."""
 
     value: float
@@ -64,7 +64,7 @@ class Fit:
     loss: str
     coordinates: Array
     covariance: Array
-    parameters: dict[str, Estimate]
+    parameters: dict[str, FittedParameter]
     deflection: Array
     force: Array
     loss_N: float  # noqa: N815 - the unit is part of the name that users read
@@ -134,7 +134,7 @@ def fit(
     pool, size = objective.pool(rng)
     contained = _contained(objective, seed)
     published = [np.asarray(s, dtype=float) for s in starts]
-    x, status = _global(objective, pool[size < HOPEFUL * size[0]], published, contained)
+    x, status = _best_of_starts(objective, pool[size < HOPEFUL * size[0]], published, contained)
     free = _result(objective, x, status)
     if not hypothesis.convexity.restricts or free.convex or not np.isfinite(free.objective):
         return replace(free, constrained=free)
@@ -159,16 +159,18 @@ def _contained(objective: Objective, seed: int) -> list[Array]:
     return [] if material is None else [np.concatenate([material, found.coordinates[1:]])]
 
 
-def _global(objective: Objective, pool: Array, published: list[Array], contained: list[Array]) -> tuple[Array, str]:
+def _best_of_starts(
+    objective: Objective, pool: Array, published: list[Array], contained: list[Array]
+) -> tuple[Array, str]:
     """The best of all polished starts, (x, status)."""
     h = objective.hypothesis
-    starts = apart(pool, objective.spread * APART, STARTED)
+    starts = separated(pool, objective.spread * APART, STARTED)
     for films in published:
         start = h.material.to_coordinates(h.material.from_vector(films).vector)
         if np.all(np.isfinite(start)):
             starts.append(np.concatenate([start, starts[0][h.material_size :]]))
     first = sorted((objective.polish(s, FEW, ROUGH) for s in starts if np.all(np.isfinite(objective(s)[0]))), key=_size)
-    best = apart(np.array([x for x, size, _ in first if np.isfinite(size)]), objective.spread * DISTINCT, POLISHED)
+    best = separated(np.array([x for x, size, _ in first if np.isfinite(size)]), objective.spread * DISTINCT, POLISHED)
     found = min((objective.polish(b) for b in best), key=_size, default=(pool[0], np.inf, ""))
     for x in contained:
         # At a bound a search keeps off it, and may end higher than it was told to start.
@@ -204,7 +206,7 @@ def _result(objective: Objective, x: Array, status: str) -> Fit:
         loss=objective.loss,
         coordinates=x,
         covariance=covariance,
-        parameters=_estimates(objective, x, covariance),
+        parameters=_fitted_parameters(objective, x, covariance),
         deflection=objective.measurement.deflection,
         force=force,
         loss_N=float(np.linalg.norm(misfit)),
@@ -234,12 +236,12 @@ def _at_bound(objective: Objective, x: Array, size: float) -> NDArray[np.bool_]:
         moved, held = np.tile(x, (2 * open_.size, 1)), np.zeros((2 * open_.size, x.size), bool)
         for row, (i, bound) in enumerate((i, b[i]) for i in open_ for b in (objective.low, objective.high)):
             moved[row, i], held[row, i] = bound, True
-        _, reached = descend(objective.batch, moved, objective.low, objective.high, TO_BOUND, held)
+        _, reached = descend(objective.batch, moved, (objective.low, objective.high), TO_BOUND, held)
         near[open_] = np.min(reached.reshape(-1, 2), axis=1) < size * (1 + FLAT)
     return np.asarray(near)
 
 
-def _estimates(objective: Objective, x: Array, covariance: Array) -> dict[str, Estimate]:
+def _fitted_parameters(objective: Objective, x: Array, covariance: Array) -> dict[str, FittedParameter]:
     """Natural parameters, with errors by d natural / d x."""
     h, n = objective.hypothesis, objective.hypothesis.material_size
     values = h.films(x[None, :])[0]
@@ -251,7 +253,7 @@ def _estimates(objective: Objective, x: Array, covariance: Array) -> dict[str, E
     sd[np.any((np.abs(jacobian) > 1e-9 * np.abs(values[:, None])) & held[:n], axis=1)] = np.nan
     every = np.concatenate([values, x[n:]]), np.concatenate([sd, np.sqrt(np.diag(covariance))[n:]])
     return {
-        name: Estimate(float(value), float(s) if np.isfinite(s) else None, unit)
+        name: FittedParameter(float(value), float(s) if np.isfinite(s) else None, unit)
         for name, value, s, unit in zip(h.natural_names, *every, h.natural_units, strict=False)
     }
 

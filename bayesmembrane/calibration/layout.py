@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-import arviz
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen
 from bayesmembrane.data.motion import Path as Motion
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.ground.registry import component
 
 MOTION = ("deflection", "time", "across")

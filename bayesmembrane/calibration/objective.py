@@ -177,7 +177,7 @@ class Objective:
         return jacobian
 
 
-def apart(pool: Array, distance: Array, count: int) -> list[Array]:
+def separated(pool: Array, distance: Array, count: int) -> list[Array]:
     """The first ``count`` rows of pool (M, k) that lie further from each other than ``distance`` (k,)."""
     chosen: list[Array] = []
     for x in pool:

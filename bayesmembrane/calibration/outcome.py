@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import arviz
 import numpy as np
 
 from bayesmembrane.calibration.crosscheck import crosscheck
@@ -15,6 +14,7 @@ from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.walk import Sampled
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 MOST_DRAWS, LONG, DRAWS_IF_LONG = 4000, 100, 1000

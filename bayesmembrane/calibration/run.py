@@ -36,6 +36,7 @@ from bayesmembrane.calibration.store import (
     write_run,
 )
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.cache import CachedSolver, Tally
 from bayesmembrane.physics.forward import Solve
@@ -96,6 +97,20 @@ class Run:
     def draws_name(self) -> str:
         """What tells these draws from others: an interrupted run that went on has more evaluations."""
         return f"{self.settings['fingerprint']} {self.status['evaluations']}"
+
+    def to_stored(self) -> dict[str, Any]:
+        """Where it lies and which draws those are: what is kept of a run in an answer that rests on it."""
+        if self.path is None:
+            raise StorageError(f'the run "{self.name}" is not stored', remedy="sample with out=")
+        return {"folder": self.path, "draws": self.draws_name}
+
+    @classmethod
+    def from_stored(cls, value: dict[str, Any]) -> Run:
+        """The inverse of `to_stored`; raises `StorageError` if the run has gone, or was sampled anew."""
+        run = load_run(value["folder"])
+        if run.draws_name != value["draws"]:
+            raise StorageError("the run was sampled anew", str(run.path), "ask for the answer that rests on it again")
+        return run
 
     def summary(self) -> dict[str, Any]:
         """Plain values of the JSON answer of ``sample``."""

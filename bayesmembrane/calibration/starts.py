@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 
 from bayesmembrane.calibration.descent import descend
-from bayesmembrane.calibration.objective import Objective, apart
+from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.calibration.posterior import Posterior, tally
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.ground.errors import SettingsError
@@ -101,9 +101,9 @@ def _around_valleys(objective: Objective, pool: Array, rms: float, rng: np.rando
             np.concatenate([j / sigma, wide], axis=1),
         )
 
-    x = np.array(apart(pool, objective.spread, VALLEYS))
+    x = np.array(separated(pool, objective.spread, VALLEYS))
     for _ in range(2):
-        x, size = descend(residuals, x, low, high, ITERATIONS)
+        x, size = descend(residuals, x, (low, high), ITERATIONS)
         best = x[int(np.argmin(size))]
         sigma = max(float(np.sqrt(np.mean(objective(best)[0] ** 2))), floor)
     x, size = x[np.isfinite(size)], size[np.isfinite(size)]

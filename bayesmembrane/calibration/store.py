@@ -11,7 +11,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-import arviz
 import numpy as np
 import tomli_w
 
@@ -23,6 +22,7 @@ from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.files import write_text, write_whole
 from bayesmembrane.ground.fingerprint import digest
 from bayesmembrane.ground.plain import json_text
+from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 ASKED, POSTERIOR, STATUS, CHAINS = "run.toml", "posterior.nc", "status.json", "chains.npz"

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
-import arviz
 import numpy as np
 
 from bayesmembrane.calibration.posterior import Posterior
@@ -15,6 +14,7 @@ from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array, Prior, Uniform
 from bayesmembrane.ground.plain import plain
+from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api

@@ -30,17 +30,6 @@ def thinned(measurement: Measurement, most: int = MOST) -> Measurement:
     return measurement.select(np.union1d(must, _even(n, most - must.size)))
 
 
-def thinning_sentence(whole: Measurement, part: Measurement) -> str:
-    """What is to be said where ``part`` has fewer readings than ``whole``; else ""."""
-    if len(part) == len(whole):
-        return ""
-    return (
-        f"{len(part)} of the {len(whole)} readings were diagnosed, one in {len(whole) / len(part):.2g}: evenly along "
-        "the test, with its first and last, its turning points and the ends of its holds; effects of history still "
-        "follow all of them."
-    )
-
-
 def _kept(measurement: Measurement) -> NDArray[np.intp]:
     """Both ends, the last reading of each leg, and of each hold both ends and enough readings to tell it."""
     last = len(measurement) - 1

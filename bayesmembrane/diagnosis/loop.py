@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,18 +16,18 @@ from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.target import PosteriorTarget
 from bayesmembrane.comparison.leave_out.score import leave_one_out
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.thinning import thinned, thinning_sentence
-from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
-from bayesmembrane.diagnosis.discrepancy import Discrepancy, discrepancy
+from bayesmembrane.data.thinning import thinned
+from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.explanation.case import Tell
+from bayesmembrane.diagnosis.left.discrepancy import Discrepancy, discrepancy
+from bayesmembrane.diagnosis.result import Diagnosis, Thinned, thinning
+from bayesmembrane.diagnosis.thresholds import LOOP, TINY
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.noise.ar1 import AR1
 from bayesmembrane.physics.noise.ar1_readings import AR1Readings
-
-MOST_ROUNDS, LEADERS = 3, 3
-BAND = 0.9
-"""Part of new readings that a predictive band is to cover."""
+from bayesmembrane.physics.noise.base import Noise
 
 Watch = Callable[[str], Callback | None]
 """What is told of the sampling of one hypothesis, by its label."""
@@ -50,21 +49,6 @@ class Stage:
     loo_se: float
     coverage: float
 
-    def summary(self) -> dict[str, Any]:
-        """Plain values: the run's, and what the loop adds."""
-        status = self.run.status
-        return {
-            "run": str(self.run.path) if self.run.path else self.run.name,
-            "posterior": status["posterior"],
-            "ess_bulk": status["ess_bulk"],
-            "r_hat": status["r_hat"],
-            "log_evidence": self.log_evidence,
-            "log_evidence_sd": self.log_evidence_sd,
-            "elpd_loo": self.elpd_loo,
-            "loo_se": self.loo_se,
-            "coverage_90": self.coverage,
-        }
-
 
 @dataclass(frozen=True, eq=False)
 class Round:
@@ -78,100 +62,114 @@ class Round:
     after: Stage
     leaders: tuple[Stage, ...] = ()
 
-    def summary(self) -> dict[str, Any]:
-        """The answer of ``diagnose`` with both posteriors and how the material moved."""
-        return {
-            **self.diagnosis.summary(),
-            "before": self.before.summary(),
-            "after": self.after.summary(),
-            "leaders": [{"model": s.run.hypothesis.label(), **s.summary()} for s in self.leaders],
-            "moved": moved(self.before.run, self.after.run),
-        }
+    @property
+    def changed(self) -> bool:
+        """True if something was added, and sampled."""
+        return self.after.run.hypothesis.label() != self.before.run.hypothesis.label()
 
 
 @dataclass(frozen=True, eq=False)
 class Loop:
     """All rounds, the last one being adequate or abstaining; ``left`` is kept, unnamed, where it abstains.
 
-    thinning : what is said of readings that were left out, since there were too many; else ""
+    thinned : what was taken of a measurement with too many readings; else None
     """
 
     rounds: tuple[Round, ...]
     left: Discrepancy | None
-    thinning: str = ""
+    thinned: Thinned | None = None
 
-    @property
-    def sentence(self) -> str:
-        """How it ended."""
-        steps = []
-        for r in self.rounds:
-            if r.after is r.before:
-                continue
-            old, new = r.before.run.hypothesis, r.after.run.hypothesis
-            if new.material is not old.material:
-                steps.append(f"{new.material.title} instead of {old.material.title}")
-            steps += [e.title for e in new.effects if e.name not in {e.name for e in old.effects}]
-        start = f"Changed: {', '.join(steps)}. " if steps else ""
-        return f"{start}{self.rounds[-1].diagnosis.sentence} {self.thinning}".rstrip()
+
+@dataclass(frozen=True)
+class LoopSettings:
+    """How a loop is closed.
+
+    seed : of all draws
+    out : folder in which every run is stored; None: nothing is
+    ess : independent draws that each posterior is to be worth
+    adapt_noise : True: all are sampled with AR(1) noise where the readings turn out to be correlated, for white noise
+        would make the posterior too narrow
+    most_rounds : after which it stops
+    solve : what solves films
+    """
+
+    seed: int = 0
+    out: str | Path | None = None
+    ess: float = 1000.0
+    adapt_noise: bool = False
+    most_rounds: int = LOOP.most_rounds
+    solve: Solve = api.solve
 
 
 def loop(
     measurement: Measurement,
     hypothesis: Hypothesis,
+    settings: LoopSettings | None = None,
     *,
-    seed: int = 0,
-    out: str | Path | None = None,
-    ess: float = 1000.0,
-    solve: Solve = api.solve,
-    tell: Callable[[str], None] | None = None,
+    tell: Tell | None = None,
     watch: Watch | None = None,
-    most_rounds: int = MOST_ROUNDS,
-    adapt_noise: bool = False,
 ) -> Loop:
-    """Diagnose, sample, add what is named, and again; every run is stored in the folder ``out``.
+    """Diagnose, sample, add what is named, and again.
 
-    A named effect or a better energy makes the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop, and
-    so does a hypothesis that was there before. Of an ambiguous answer the first `LEADERS` are sampled. With
-    ``adapt_noise`` all are sampled with AR(1) noise where the readings turn out to be correlated: white noise would
-    make the posterior too narrow. More readings than `thinning.MOST` are thinned, for all of it. Raises what
-    `sample` and `diagnose` raise.
+    A named effect or a better energy makes the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop,
+    and so does a hypothesis that was there before. Of an ambiguous answer the first few are sampled. More readings
+    than `thinning.MOST` are thinned, for all of it. Raises what `sample` and `diagnose` raise.
     """
-    say = tell or (lambda _: None)
-    whole, measurement = measurement, thinned(measurement)
-
-    def staged(claim: Hypothesis) -> Stage:
-        say(f"sampling {claim.label()}")
-        progress = watch(claim.label()) if watch is not None else None
-        run = sample(measurement, claim, seed=seed, out=out, ess=ess, progress=progress, solve=solve)
-        if run.interrupted:
-            raise KeyboardInterrupt
-        return _stage(run, solve, seed)
-
-    def diagnosed(claim: Hypothesis) -> Diagnosis:
-        return diagnose(measurement, claim, seed=seed, solve=solve, tell=tell)
-
-    rounds: list[Round] = []
-    found = diagnosed(hypothesis)
-    noise = hypothesis.noise
-    if adapt_noise and found.noise.remembers:
-        noise = AR1Readings() if found.noise.clock == "readings" else AR1()
-    stage = staged(replace(hypothesis, noise=noise))
-    seen = {stage.run.hypothesis.label()}
+    part = thinned(measurement)
+    closing = _Closing(part, settings or LoopSettings(), tell or (lambda _: None), watch)
+    found = closing.diagnosed(hypothesis)
+    noise = _noise_for(found, hypothesis) if closing.settings.adapt_noise else hypothesis.noise
+    stage = closing.sampled(replace(hypothesis, noise=noise))
+    seen, rounds = {stage.run.hypothesis.label()}, list[Round]()
     while True:
         following = replace(found.hypothesis, noise=noise)
-        goes_on = found.verdict in ("named", "material") and following.label() not in seen
-        after = staged(following) if goes_on else stage
-        leaders = found.members[:LEADERS] if found.verdict == "ambiguous" else ()
-        sampled = tuple(staged(replace(j.candidate.hypothesis, noise=noise)) for j in leaders)
-        rounds.append(Round(found, stage, after, sampled))
-        if not goes_on or len(rounds) >= most_rounds:
+        goes_on = found.explains and following.label() not in seen
+        after = closing.sampled(following) if goes_on else stage
+        leaders = found.members[: LOOP.leaders] if found.verdict == "ambiguous" else ()
+        rivals = [closing.sampled(replace(j.candidate.hypothesis, noise=noise)) for j in leaders]
+        rounds.append(Round(found, stage, after, tuple(rivals)))
+        if not goes_on or len(rounds) >= closing.settings.most_rounds:
             break
         seen.add(following.label())
-        stage, found = after, diagnosed(following)
-    last = rounds[-1].diagnosis
-    abstains = last.verdict in ("unknown", "ambiguous")
-    left = discrepancy(measurement, last.null.residual, last.noise) if abstains else None
-    return Loop(tuple(rounds), left, thinning_sentence(whole, measurement))
+        stage, found = after, closing.diagnosed(following)
+    return Loop(tuple(rounds), closing.left(rounds[-1].diagnosis), thinning(measurement, part))
+
+
+@dataclass(frozen=True, eq=False)
+class _Closing:
+    """One loop while it is being closed."""
+
+    measurement: Measurement
+    settings: LoopSettings
+    tell: Tell
+    watch: Watch | None
+
+    def diagnosed(self, claim: Hypothesis) -> Diagnosis:
+        """What ``claim`` misses."""
+        return diagnose(self.measurement, claim, seed=self.settings.seed, solve=self.settings.solve, tell=self.tell)
+
+    def sampled(self, claim: Hypothesis) -> Stage:
+        """The posterior of ``claim``; raises `KeyboardInterrupt` if it was stopped from outside."""
+        self.tell(f"sampling {claim.label()}")
+        progress = self.watch(claim.label()) if self.watch is not None else None
+        s = self.settings
+        run = sample(self.measurement, claim, seed=s.seed, out=s.out, ess=s.ess, progress=progress, solve=s.solve)
+        if run.interrupted:
+            raise KeyboardInterrupt
+        return _stage(run, s.solve, s.seed)
+
+    def left(self, last: Diagnosis) -> Discrepancy | None:
+        """What is kept without a name, where the loop abstains."""
+        if last.verdict not in ("unknown", "ambiguous"):
+            return None
+        return discrepancy(self.measurement, last.null.residual, last.noise)
+
+
+def _noise_for(found: Diagnosis, hypothesis: Hypothesis) -> Noise:
+    """AR(1) by the clock that the readings follow, if they remember."""
+    if not found.noise.remembers:
+        return hypothesis.noise
+    return AR1Readings() if found.noise.clock == "readings" else AR1()
 
 
 def moved(before: Run, after: Run) -> dict[str, dict[str, float]]:
@@ -180,7 +178,7 @@ def moved(before: Run, after: Run) -> dict[str, dict[str, float]]:
     if before.hypothesis.material is not after.hypothesis.material:
         return {}
     return {
-        n: {"change": b[n]["mean"] - a[n]["mean"], "in_sd": (b[n]["mean"] - a[n]["mean"]) / max(a[n]["sd"], 1e-300)}
+        n: {"change": b[n]["mean"] - a[n]["mean"], "in_sd": (b[n]["mean"] - a[n]["mean"]) / max(a[n]["sd"], TINY)}
         for n in a
         if n in b
     }
@@ -207,6 +205,6 @@ def coverage(run: Run) -> float:
     """Part of the measured points inside the central 90 % of the posterior predictive."""
     draws = run.data.posterior_predictive["force"].values
     draws = draws.reshape(-1, draws.shape[-1])
-    low, high = np.quantile(draws, [(1 - BAND) / 2, (1 + BAND) / 2], axis=0)
+    low, high = np.quantile(draws, [(1 - LOOP.band) / 2, (1 + LOOP.band) / 2], axis=0)
     y = run.measurement.force
     return float(np.mean((y >= low) & (y <= high)))

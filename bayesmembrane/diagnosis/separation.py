@@ -10,17 +10,13 @@ import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.motion import Path
-from bayesmembrane.diagnosis.candidates import Candidate
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.thresholds import NEXT_TEST
 from bayesmembrane.ground.errors import BayesmembraneError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Compliance
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.rigs.annulus import Annulus
-
-POINTS = 240
-FASTER = 10.0
-WIDER = 1.5
-CLEAR = 5.0  # a separation beyond so many standard deviations settles it
 
 
 @dataclass(frozen=True)
@@ -32,12 +28,6 @@ class Experiment:
 
     what: str
     separation: float
-
-    @property
-    def sentence(self) -> str:
-        if np.isinf(self.separation):
-            return f"{self.what}: shows one of them directly"
-        return f"{self.what}: {self.separation:.1f} standard deviations apart"
 
 
 def experiments(measurement: Measurement, rivals: Sequence[Candidate], sd: float, solve: Solve) -> list[Experiment]:
@@ -65,8 +55,8 @@ def _protocols(m: Measurement) -> list[tuple[str, Path, Annulus | None]]:
     """(in words, path, rig if it is another one)."""
     d, t = m.path.deflection, m.path.time
     top = float(np.max(d))
-    up = np.linspace(top / POINTS, top, POINTS)
-    speed = 1e-3 if t is None else float(np.median(m.path.speed))
+    up = np.linspace(top / NEXT_TEST.points, top, NEXT_TEST.points)
+    speed = NEXT_TEST.usual_speed if t is None else float(np.median(m.path.speed))
     full = m.full_range
 
     def path(points: Array, factor: float = 1.0) -> Path:
@@ -77,16 +67,15 @@ def _protocols(m: Measurement) -> list[tuple[str, Path, Annulus | None]]:
     cyclic = np.any(m.leg < 0)
     if not cyclic:
         found.append(("unloading after the same loading", path(np.concatenate([up, up[::-1]])), None))
-    peaks = [0.5, 0.75, 1.0, 1.0]
-    stairs = np.concatenate([np.concatenate([up[up <= p * top], up[up <= p * top][::-1]]) for p in peaks])
+    stairs = np.concatenate([np.concatenate([up[up <= p * top], up[up <= p * top][::-1]]) for p in NEXT_TEST.peaks])
     found.append(("unloading cycles to rising peaks", path(stairs), None))
     again = np.concatenate([up, up[::-1]]) if cyclic else up
     if t is not None:
-        found.append((f"the same test {FASTER:g} times faster", path(again, FASTER), None))
+        found.append((f"the same test {NEXT_TEST.faster:g} times faster", path(again, NEXT_TEST.faster), None))
     if isinstance(m.rig, Annulus):
-        disc = replace(m.rig, inner_radius=WIDER * m.rig.inner_radius)
-        if disc.inner_radius < 0.8 * disc.outer_radius:
-            found.append((f"the same test with a disc {WIDER:g} times as wide", path(again), disc))
+        disc = replace(m.rig, inner_radius=NEXT_TEST.wider * m.rig.inner_radius)
+        if disc.inner_radius < NEXT_TEST.widest * disc.outer_radius:
+            found.append((f"the same test with a disc {NEXT_TEST.wider:g} times as wide", path(again), disc))
     return found
 
 
@@ -117,5 +106,5 @@ def _separation(m: Measurement, trial: Measurement, a: Candidate, b: Candidate, 
     if not (np.all(np.isfinite(difference)) and np.all(np.isfinite(slope))):
         return np.inf
     scale = np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
-    fit = np.linalg.lstsq(slope / scale, difference, rcond=1e-9)[0]
+    fit = np.linalg.lstsq(slope / scale, difference, rcond=NEXT_TEST.rank)[0]
     return float(np.linalg.norm(difference - slope / scale @ fit)) / sd

@@ -1,9 +1,8 @@
 """What a computation reaches of the source, so that a stored answer knows when the code that made it has changed.
 
 Only statements count: comments, docstrings, layout, and imports for type checkers alone change nothing. A module
-reaches the modules of this package, and of its own, that it imports at any place in it. Component files (a folder with
-a ``base.py`` holds them) are found by the registry and not by imports: only those that are named are reached, with
-what they import.
+reaches the modules of this package, and of its own, that it imports at any place in it. What the registry finds by
+folder is not imported: of the components only those that are named are reached, and those that code names itself.
 """
 
 from __future__ import annotations
@@ -56,7 +55,7 @@ def reached(entries: Iterable[str], components: Iterable[type[Any]] = (), root: 
         if name in found or path is None:
             continue
         found[name], imports = memory.module(name, path)
-        ahead += _followed(path, (*imports, *_parents(name)), folders)
+        ahead += (i for i in (*imports, *_parents(name)) if i != PACKAGE)
     memory.keep()
     return dict(sorted(found.items()))
 
@@ -92,10 +91,6 @@ def _parents(name: str) -> Iterator[str]:
     yield from (".".join(parts[:i]) for i in range(2, len(parts)))
 
 
-def _is_component(path: Path) -> bool:
-    return path.stem != "base" and not path.stem.startswith("_") and (path.parent / "base.py").is_file()
-
-
 def _own_classes(component: type[Any]) -> Iterator[type[Any]]:
     """The class and its bases, but for those of the standard library."""
     for part in component.__mro__:
@@ -116,15 +111,6 @@ def _stands_in_a_module(part: type[Any], folders: dict[str, Path]) -> bool:
     folders.setdefault(part.__module__.partition(".")[0], place.parents[depth])
     found = _path(part.__module__, folders)
     return found is not None and (part.__module__.startswith(f"{PACKAGE}.") or found.resolve() == place)
-
-
-def _followed(path: Path, imports: Iterable[str], folders: Mapping[str, Path]) -> Iterator[str]:
-    """Those of the ``imports`` of the file ``path`` that count: components only for another component."""
-    from_component = _is_component(path)
-    for name in imports:
-        place = _path(name, folders)
-        if place is not None and name != PACKAGE and (from_component or not _is_component(place)):
-            yield name
 
 
 def _class_digest(part: type[Any]) -> str:

@@ -1,30 +1,16 @@
-"""How everything in a report looks and is called: colours, line styles, names of parameters."""
+"""How everything in a picture looks: colours, line styles, markers, and the names of parameters on axes."""
 
 from __future__ import annotations
 
 import hashlib
 import re
+from dataclasses import dataclass
 from typing import Literal
 
-LineStyle = Literal["-"] | tuple[float, tuple[float, ...]]
+from bayesmembrane.ground.registry import components
+from bayesmembrane.words.language import short
 
-# Okabe and Ito's palette, which colour-blind readers can tell apart; the line style says the same again.
-_COLOURS = {
-    "neo_hookean": "#0072B2",
-    "mooney_rivlin": "#E69F00",
-    "gent": "#009E73",
-    "yeoh": "#D55E00",
-    "ogden": "#CC79A7",
-}
-_OTHERS = ("#56B4E9", "#7A6A00", "#6A3D9A", "#8C564B", "#4D4D4D")
-_DASHES: dict[str, tuple[float, ...]] = {
-    "neo_hookean": (),
-    "mooney_rivlin": (7, 2),
-    "gent": (7, 2, 1.5, 2),
-    "yeoh": (),
-    "ogden": (3, 1.5),
-}
-_MARKERS = {"neo_hookean": "o", "mooney_rivlin": "s", "gent": "^", "yeoh": "D", "ogden": "v"}
+LineStyle = Literal["-"] | tuple[float, tuple[float, ...]]
 
 INK = "#1a1a1a"
 MUTED = "#5f6b76"
@@ -32,46 +18,62 @@ FAINT = "#d7dce1"
 SHADE = "#eef1f4"
 ALARM = "#B00020"
 
-_TITLES = {
-    "neo_hookean": "neo-Hookean",
-    "mooney_rivlin": "Mooney-Rivlin",
-    "gent": "Gent",
-    "yeoh": "Yeoh",
-    "ogden": "Ogden",
-}
+RANGE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9")
+"""Of ranges, legs and ensembles, in this order."""
 
 
-def title(material: str) -> str:
-    """How a material is printed; third-party names with spaces for underscores."""
-    return _TITLES.get(material, material.replace("_", " "))
+@dataclass(frozen=True)
+class Look:
+    """Colour, dashes and gaps in points (none: a solid line), marker: each says which curve it is."""
+
+    colour: str
+    dashes: tuple[float, ...]
+    marker: str
 
 
-def colour(material: str) -> str:
-    """One fixed colour per material; of a third party's, one that depends on its name alone."""
-    return _COLOURS.get(material) or _OTHERS[_number(material) % len(_OTHERS)]
+# Okabe and Ito's palette, which colour-blind readers can tell apart, and darker tones that go with it.
+PALETTE = (
+    Look("#0072B2", (), "o"),
+    Look("#E69F00", (7, 2), "s"),
+    Look("#009E73", (7, 2, 1.5, 2), "^"),
+    Look("#D55E00", (), "D"),
+    Look("#CC79A7", (3, 1.5), "v"),
+    Look("#56B4E9", (5, 1.5, 1.5, 1.5, 1.5, 1.5), "P"),
+    Look("#7A6A00", (5, 1.5, 1.5, 1.5, 1.5, 1.5), "X"),
+    Look("#6A3D9A", (9, 3), "<"),
+    Look("#8C564B", (2, 1), ">"),
+    Look("#4D4D4D", (9, 2, 2, 2), "p"),
+)
+STRANGERS = PALETTE[5:]  # what the materials of this package leave
 
 
-def linestyle(material: str) -> LineStyle:
-    """One fixed line style per material: "-", or (offset, lengths of dashes and gaps in points)."""
-    lengths = _DASHES.get(material, (5, 1.5, 1.5, 1.5, 1.5, 1.5))
-    return (0.0, lengths) if lengths else "-"
+def look(name: str) -> Look:
+    """The look of a material, by name: that of the colour it declares, else one that depends on its name alone.
+
+    So does that of a hypothesis with effects (``yeoh+zero_offset``), which must not look like its bare material.
+    """
+    declared = str(getattr(components("materials").get(name), "colour", ""))
+    own = next((kind for kind in PALETTE if kind.colour == declared), None)
+    if own is not None:
+        return own
+    chosen = STRANGERS[int(hashlib.sha256(name.encode()).hexdigest()[:8], 16) % len(STRANGERS)]
+    return Look(declared, chosen.dashes, chosen.marker) if declared else chosen
 
 
-def marker(material: str) -> str:
-    """One fixed marker per material."""
-    return _MARKERS.get(material, "P")
+def colour(name: str) -> str:
+    """One fixed colour per material or hypothesis."""
+    return look(name).colour
 
 
-def _number(name: str) -> int:
-    return int(hashlib.sha256(name.encode()).hexdigest()[:8], 16)
+def linestyle(name: str) -> LineStyle:
+    """One fixed line style for each name: "-", or (offset, lengths of dashes and gaps in points)."""
+    dashes = look(name).dashes
+    return (0.0, dashes) if dashes else "-"
 
 
-def short(name: str) -> str:
-    """``yeoh.c1`` -> ``c1``; the noise and the effects keep what tells them from the material."""
-    block, _, own = name.partition(".")
-    if block == "noise":
-        return {"sd": "extra noise", "ln_sd": "ln extra noise"}.get(own, f"noise {own}")
-    return own or block
+def marker(name: str) -> str:
+    """One fixed marker for each name."""
+    return look(name).marker
 
 
 def symbol(name: str) -> str:
@@ -94,14 +96,3 @@ def symbol(name: str) -> str:
 def with_unit(name: str, unit: str) -> str:
     """Symbol and unit for an axis; a pure number carries ``(-)``."""
     return f"{symbol(name)} ({unit or '-'})"
-
-
-def spoken(name: str) -> str:
-    """The name of a parameter in running text: ``gent.ln_jm`` -> ``ln Jm``, ``yeoh.c2_c1`` -> ``c2/c1``."""
-    own = short(name)
-    ratio = re.fullmatch(r"([a-z]\d+)_([a-z]\d+)", own)
-    if ratio:
-        return f"{ratio[1]}/{ratio[2]}"
-    for raw, shown in (("ln_gd", "ln Gd"), ("ln_jm", "ln Jm"), ("ln_", "ln ")):
-        own = own.replace(raw, shown)
-    return own.replace("_", " ")

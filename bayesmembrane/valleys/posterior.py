@@ -156,7 +156,7 @@ class NormalPosterior:
         for _ in range(ROUNDS):
             self.noise_covariance = self._noise(self.objective.batch(x)[0][0])
             self.whitening = np.linalg.inv(np.linalg.cholesky(self.noise_covariance))
-            x, _ = descend(self._residuals, x, self.objective.low, self.objective.high, ITERATIONS)
+            x, _ = descend(self._residuals, x, (self.objective.low, self.objective.high), ITERATIONS)
         self.x = x[0]
 
     def _noise(self, residual: Array) -> Array:

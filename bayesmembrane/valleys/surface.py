@@ -186,7 +186,7 @@ class Surface:
         if np.all(held):
             return start, self.loss(start)
         low, high = np.minimum(low, np.min(start, axis=0)), np.maximum(high, np.max(start, axis=0))
-        z, size = descend(self.batch, start, low, high, iterations, held)
+        z, size = descend(self.batch, start, (low, high), iterations, held)
         single = np.flatnonzero((np.sum(~held, axis=1) == 1) & np.isfinite(size))
         if single.size:
             z[single], size[single] = self._rooted(z[single], size[single], np.argmin(held[single], axis=1))

@@ -11,6 +11,7 @@ from bayesmembrane.comparison.convexity_modes import ByMode, Missing
 from bayesmembrane.comparison.evidence.estimate import WIDEST, Disagreement, Evidence
 from bayesmembrane.comparison.prior_widths import Unknown, Widened
 from bayesmembrane.comparison.result import Comparison, Row
+from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.sampling import sentences as quality_sentences
 
 DECIDED = 2.0  # standard errors of a difference, below which it is none
@@ -49,6 +50,12 @@ def _row(answer: Mapping[str, Any], row: Row) -> dict[str, Any]:
 def sentences(found: Comparison) -> list[str]:
     """All that is to be said of one range: why there is no ranking, what is preferred, whether that survives."""
     return [s for s in (no_ranking(found), preferred(found), survival(found)) if s]
+
+
+def called(row: Row) -> str:
+    """The hypothesis in words; with noise model and convexity prior where its label has them to tell it apart."""
+    own = row.hypothesis.label()
+    return spoken(row.hypothesis) + row.label.removeprefix(own) if row.label.startswith(own) else row.label
 
 
 # ---- why there is no number ------------------------------------------------------------------------------------------
@@ -108,7 +115,7 @@ def no_ranking(found: Comparison) -> str:
     doubtful = found.doubtful
     if not doubtful:
         return ""
-    told = " ".join(f"{r.label}: {doubt(r.evidence)}" for r in doubtful if r.evidence)
+    told = " ".join(f"{called(r)}: {doubt(r.evidence)}" for r in doubtful if r.evidence)
     return f"There is no ranking, because ln Z is not known well enough of {len(doubtful)} of them. {told}"
 
 
@@ -125,24 +132,26 @@ def preferred(found: Comparison) -> str:
     if not found.agreed:
         gap, se = _elpd_gap(predicts, next_best)
         return (
-            f"The evidence gives no ranking; leave-one-out prefers {predicts.label} to {next_best.label} by {gap:.1f} "
+            f"The evidence gives no ranking; leave-one-out prefers {called(predicts)} to {called(next_best)} by {gap:.1f} "
             f"+- {se:.1f}{_weak(gap, se)}."
         )
     by_z = sorted(both, key=lambda r: -_best(r)[0])
     gap = _best(by_z[0])[0] - _best(by_z[1])[0]
     sd = float(np.hypot(_best(by_z[0])[1], _best(by_z[1])[1]))
-    start = f"The evidence prefers {by_z[0].label} to {by_z[1].label} by {gap:.1f} +- {sd:.2g} in ln Z{_bayes(gap)}"
+    start = f"The evidence prefers {called(by_z[0])} to {called(by_z[1])} by {gap:.1f} +- {sd:.2g} in ln Z{_bayes(gap)}"
     if predicts is by_z[0]:
         d, se = _elpd_gap(predicts, next_best)
-        return f"{start}, and leave-one-out prefers it too, to {next_best.label} by {d:.1f} +- {se:.1f}{_weak(d, se)}."
+        return (
+            f"{start}, and leave-one-out prefers it too, to {called(next_best)} by {d:.1f} +- {se:.1f}{_weak(d, se)}."
+        )
     d, se = _elpd_gap(predicts, by_z[0])
     if d > DECIDED * se:
         return (
-            f"{start}, but leave-one-out prefers {predicts.label} to it by {d:.1f} +- {se:.1f}: evidence and "
+            f"{start}, but leave-one-out prefers {called(predicts)} to it by {d:.1f} +- {se:.1f}: evidence and "
             "prediction disagree, and of the two the evidence is the one that depends on the width of the priors."
         )
     return (
-        f"{start}, and leave-one-out puts {predicts.label} before it by {d:.1f} +- {se:.1f}{_weak(d, se)}: prediction "
+        f"{start}, and leave-one-out puts {called(predicts)} before it by {d:.1f} +- {se:.1f}{_weak(d, se)}: prediction "
         "does not contradict the evidence."
     )
 
@@ -172,12 +181,12 @@ def survival(found: Comparison) -> str:
     rest = f" {unknown} of the changes cannot be told from these draws." if unknown else ""
     if worst > 0:
         return (
-            f"{first.label} stays first when any one prior is half or twice as wide: its lead of {lead:.1f} in ln Z "
+            f"{called(first)} stays first when any one prior is half or twice as wide: its lead of {lead:.1f} in ln Z "
             f"falls to {worst:.1f} at worst, with the prior of {which.parameter} {which.factor:g} times as wide.{rest}"
         )
     return (
         f"The first place depends on the priors: with the prior of {which.parameter} {which.factor:g} times as wide, "
-        f"the lead of {first.label} of {lead:.1f} in ln Z is lost by {-worst:.1f}.{rest}"
+        f"the lead of {called(first)} of {lead:.1f} in ln Z is lost by {-worst:.1f}.{rest}"
     )
 
 

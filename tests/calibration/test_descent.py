@@ -15,7 +15,7 @@ def rosenbrock(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_curved_valley_is_followed_from_every_start() -> None:
     start = np.random.default_rng(1).uniform(-4, 4, (20, 2))
-    x, size = descend(rosenbrock, start, LOW, HIGH, 200)
+    x, size = descend(rosenbrock, start, (LOW, HIGH), 200)
     assert x == pytest.approx(np.ones((20, 2)), abs=1e-6)
     assert size == pytest.approx(np.zeros(20), abs=1e-6)
 
@@ -25,7 +25,7 @@ def test_walls_of_nan_are_not_crossed() -> None:
         r, j = rosenbrock(x)
         return np.where(x[:, :1] > 0.5, np.nan, r), j
 
-    x, size = descend(walled, np.array([[-1.0, 1.0], [2.0, 2.0]]), LOW, HIGH, 200)
+    x, size = descend(walled, np.array([[-1.0, 1.0], [2.0, 2.0]]), (LOW, HIGH), 200)
     assert x[0, 0] <= 0.5
     assert size[0] < 0.75
     assert size[1] == np.inf
@@ -39,7 +39,7 @@ def test_no_start_and_no_step_goes_where_slopes_are_missing() -> None:
         j[x[:, 0] > 0.5, 1] = np.nan
         return r, j
 
-    x, size = descend(walled, np.array([[-1.0, 1.0], [2.0, 2.0]]), LOW, HIGH, 200)
+    x, size = descend(walled, np.array([[-1.0, 1.0], [2.0, 2.0]]), (LOW, HIGH), 200)
     assert np.all(np.isfinite(x))
     assert x[0, 0] <= 0.5
     assert size[0] < 0.75
@@ -48,7 +48,7 @@ def test_no_start_and_no_step_goes_where_slopes_are_missing() -> None:
 
 def test_bounds_and_held_coordinates_are_kept() -> None:
     start = np.array([[-3.0, 2.0]])
-    x, _ = descend(rosenbrock, start, LOW, np.array([0.5, 5.0]), 200)
+    x, _ = descend(rosenbrock, start, (LOW, np.array([0.5, 5.0])), 200)
     assert x[0] == pytest.approx([0.5, 0.25], abs=1e-5)
-    x, _ = descend(rosenbrock, start, LOW, HIGH, 200, held=np.array([[True, False]]))
+    x, _ = descend(rosenbrock, start, (LOW, HIGH), 200, held=np.array([[True, False]]))
     assert x[0] == pytest.approx([-3.0, 5.0], abs=1e-6)

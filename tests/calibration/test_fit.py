@@ -1,5 +1,7 @@
 """The optimum: recovery from another solver's curves, linear cases in closed form, constraints, open ends."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from bayesmembrane.calibration.fit import fit
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
+from bayesmembrane.ground.stored import answer, read, store
 from bayesmembrane.physics.forward import predict
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import request, solve
@@ -118,6 +121,17 @@ def test_seeds_agree(film) -> None:  # type: ignore[no-untyped-def]
     curve = film("yeoh", (8.0, -0.2, 0.03), noise=0.02, seed=8)
     one, two = (fit(curve, hypothesis("yeoh"), seed=s) for s in (1, 2))
     assert one.loss_N == pytest.approx(two.loss_N, rel=1e-6)
+
+
+def test_a_fit_is_a_value_that_is_stored_and_read_back(film, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    found = fit(film("gent", (5.3, 30.0), noise=0.01, seed=4), hypothesis("gent", ["zero_offset"]))
+    store(tmp_path, "fit", found, found.summary())
+    again = read(tmp_path, "fit")
+    assert again.summary() == found.summary() == answer(tmp_path, "fit")
+    assert again.hypothesis == found.hypothesis
+    assert again.parameters == found.parameters
+    for name in ("coordinates", "covariance", "deflection", "force"):
+        assert np.array_equal(getattr(again, name), getattr(found, name), equal_nan=True), name
 
 
 def test_bad_questions_are_refused(film) -> None:  # type: ignore[no-untyped-def]

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from bayesmembrane.calibration.run import Run, load_run, run_folders, sample
 from bayesmembrane.calibration.sampling.walk import Progress, Settings
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.registry import material
+from bayesmembrane.ground.stored import read, store
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.forward import predict
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -85,6 +87,24 @@ def test_a_run_is_read_back_as_it_was(stored: Run) -> None:
     assert again.quality == stored.quality
 
 
+def test_an_answer_that_rests_on_a_run_finds_it_again(stored: Run, tmp_path: Path) -> None:
+    """Also where both folders have moved; but not once other draws lie there."""
+    assert stored.path is not None
+    moved = tmp_path / "one" / "run"
+    shutil.copytree(stored.path, moved)
+    store(tmp_path / "one" / "answer", "loop", load_run(moved), {})
+    (tmp_path / "one").rename(tmp_path / "other")
+    again = read(tmp_path / "other" / "answer", "loop")
+    assert again.path.resolve() == (tmp_path / "other" / "run").resolve()
+    assert np.array_equal(again.draws(), stored.draws())
+    status = tmp_path / "other" / "run" / "status.json"
+    status.write_text(json.dumps({**stored.status, "evaluations": 1}))
+    with pytest.raises(StorageError, match="sampled anew"):
+        read(tmp_path / "other" / "answer", "loop")
+    with pytest.raises(StorageError, match="is not stored"):
+        store(tmp_path / "answer", "loop", replace(stored, path=None), {})
+
+
 def test_inference_data_is_complete(stored: Run) -> None:
     data = stored.data
     groups = {"posterior", "prior", "log_likelihood", "posterior_predictive", "observed_data", "sample_stats"}
@@ -126,8 +146,9 @@ def test_the_whole_walk_is_stored_in_means(stored: Run) -> None:
 def test_what_the_cache_did_is_stored(film, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     curve, short = film("neo_hookean", (7.5,), noise=0.02, seed=1), Settings(ess=1.0, chunk=30, most_steps=30)
     cached = CachedSolver()
-    first = sample(curve, hypothesis("neo_hookean"), settings=short, solve=cached, out=tmp_path)
-    again = sample(curve, hypothesis("neo_hookean"), settings=short, solve=cached, seed=1)
+    options = {"settings": short, "solve": cached, "predictions": False}
+    first = sample(curve, hypothesis("neo_hookean"), out=tmp_path, **options)  # type: ignore[arg-type]
+    again = sample(curve, hypothesis("neo_hookean"), seed=1, **options)  # type: ignore[arg-type]
     plain = sample(curve, hypothesis("neo_hookean"), settings=short)
     assert "cache" not in plain.status
     assert first.status["cache"]["misses"] > 0

@@ -57,7 +57,7 @@ def test_the_right_material_wins_and_every_field_is_there(compared):
     assert rows["gent"].posterior_probability > 0.9
     assert rows["gent"].prior_mass.value > 0.5
     assert rows["gent"].rest.rmse_N < rows["neo_hookean"].rest.rmse_N
-    assert preferred(found).startswith("The evidence prefers gent to neo_hookean by ")
+    assert preferred(found).startswith("The evidence prefers Gent to neo-Hookean by ")
     assert {label for label, _ in told} == set(rows)
     assert any("nested sampling" in text for _, text in told)
     document = comparison_words.document(found)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.data.thinning import MOST, thinned, thinning_sentence
+from bayesmembrane.data.thinning import MOST, thinned
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -65,12 +65,10 @@ def test_the_film_remembers_what_was_left_out() -> None:
 def test_a_short_measurement_stays_itself_and_many_turns_stay_within_the_limit() -> None:
     short = cyclic(MOST)
     assert thinned(short) is short
-    assert thinning_sentence(short, short) == ""
     time = np.arange(9000.0)
     d = 0.02 + 0.02 * np.sin(time)
     shaken = Measurement(d, d, Uniaxial(), Specimen("strip", 1e-3), time=time)
     assert MOST / 2 < len(thinned(shaken)) <= MOST
-    assert f"{len(thinned(shaken))} of the 9000 readings" in thinning_sentence(shaken, thinned(shaken))
 
 
 def test_states_of_a_biaxial_test_keep_their_stretch_across() -> None:

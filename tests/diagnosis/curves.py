@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.diagnosis.whitening import OwnNoise
+from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.noise.ar1 import gaps_of
 from bayesmembrane.physics.rigs.annulus import Annulus

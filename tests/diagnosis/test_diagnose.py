@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen, read_measurement
-from bayesmembrane.diagnosis.diagnose import VERDICTS, Diagnosis, diagnose
+from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.result import VERDICTS, Diagnosis
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.ogden import Ogden
 from bayesmembrane.physics.rigs.equibiaxial import Equibiaxial
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from bayesmembrane.words.diagnosis import document, sentence
 from tests.diagnosis.curves import measured
 from tests.generator.datasets import Dataset, generate
 
@@ -34,7 +36,7 @@ def test_nothing_is_missing_where_nothing_is(tmp_path, material, protocol, noise
     assert found.hypothesis.effects == ()
     assert found.noise.sd == pytest.approx(data.truth["noise"]["sd"], rel=0.2)
     assert found.noise.rho == pytest.approx(data.truth["noise"]["rho"], abs=0.2)
-    assert "Nothing is seen to be missing" in found.sentence
+    assert "Nothing is seen to be missing" in sentence(found)
     assert all(size > 0 for size in found.power.values())
 
 
@@ -51,7 +53,7 @@ def test_a_clear_effect_is_named_and_explains_the_residual(tmp_path, kind, mater
     assert data.identifiable
     assert found.verdict == "named"
     assert found.effects == (kind,)
-    assert components("effects")[kind]().title in found.sentence
+    assert components("effects")[kind]().title in sentence(found)
     assert [e.name for e in found.hypothesis.effects] == [kind]
     sd = data.truth["noise"]["sd"]
     assert found.after.rmse_N < 1.1 * sd < found.before.rmse_N
@@ -82,7 +84,7 @@ def test_what_is_not_in_the_library_gets_no_name(tmp_path) -> None:
     _, found = answered(tmp_path, "ripple", "gent", "staircase", "white", 521)
     assert found.verdict == "unknown"
     assert found.effects == ()
-    assert "repeats every" in found.sentence
+    assert "repeats every" in sentence(found)
 
 
 def test_a_wrongly_declared_family_is_not_blamed_on_the_instrument(tmp_path) -> None:
@@ -94,11 +96,11 @@ def test_a_wrongly_declared_family_is_not_blamed_on_the_instrument(tmp_path) -> 
 
 def test_the_summary_is_plain_json(tmp_path) -> None:
     _, found = answered(tmp_path, "force_offset", "neo_hookean", "staircase", "white", 541)
-    document = json.loads(json.dumps(found.summary()))
-    assert document["verdict"] in VERDICTS
-    assert document["verdict"] == found.verdict
-    assert document["ranking"][0]["log_bayes_factor"] >= document["ranking"][-1]["log_bayes_factor"]
-    assert "force_offset" in document["effects"]
+    answer = json.loads(json.dumps(document(found)))
+    assert answer["verdict"] in VERDICTS
+    assert answer["verdict"] == found.verdict
+    assert answer["ranking"][0]["log_bayes_factor"] >= answer["ranking"][-1]["log_bayes_factor"]
+    assert "force_offset" in answer["effects"]
 
 
 def test_too_few_points_are_refused() -> None:
@@ -120,9 +122,9 @@ def test_the_moment_of_a_sudden_change_is_told_even_where_a_tear_explains_it(
 ) -> None:
     data, found = answered(tmp_path, "temperature_step", material, protocol, noise, seed)
     assert (found.verdict, found.effects) == (verdict, () if verdict == "unknown" else ("tearing",))
-    assert "A sudden" in found.sentence
+    assert "A sudden" in sentence(found)
     moment = data.truth["effects"]["temperature_step"]["when"] * data.time_s[-1]
-    assert float(found.sentence.split(" % at ")[-1].split(" s")[0]) == pytest.approx(moment, abs=6)
+    assert float(sentence(found).split(" % at ")[-1].split(" s")[0]) == pytest.approx(moment, abs=6)
 
 
 def test_what_the_form_of_a_named_effect_leaves_is_no_further_effect(tmp_path) -> None:
@@ -133,7 +135,7 @@ def test_what_the_form_of_a_named_effect_leaves_is_no_further_effect(tmp_path) -
     second = diagnose(m, first.hypothesis)
     assert second.verdict == "adequate"
     assert second.detection.p_value < 0.01
-    assert "form" in second.sentence
+    assert "form" in sentence(second)
 
 
 def test_a_relaxation_test_shows_relaxation() -> None:
@@ -161,7 +163,7 @@ def test_a_stated_deviation_that_the_readings_contradict_raises_no_alarm(tmp_pat
     assert found.verdict == "adequate"
     assert not found.noise.stated
     assert found.noise.excess == pytest.approx(1.5, rel=0.2)
-    assert "Of the noise" in found.sentence
+    assert "Of the noise" in sentence(found)
 
 
 def test_points_as_few_as_a_model_with_an_effect_has_coordinates_are_diagnosed() -> None:

@@ -13,8 +13,7 @@ from bayesmembrane.physics.cache import Tally
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.mechanics.api import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
-from bayesmembrane.report import view
-from bayesmembrane.report.view import Sampling, Shown
+from bayesmembrane.report.runs import Film, Sampling, Shown
 
 TRUTH = (8.8, -0.6, 0.05)
 SD = 0.004
@@ -58,17 +57,17 @@ def show(material: str, center: tuple[float, ...], measurement: Measurement, dom
         burn=100,
         evaluations=57600,
         seconds=3.0,
-        means=np.random.default_rng(0).normal(size=(2, 200, k)),
+        means=np.cumsum(np.random.default_rng(0).normal(size=(2, 200, k)), axis=1),
         steps_at=np.linspace(1, 900, 200),
+        draws=x.reshape(2, -1, k),
+        draws_at=np.linspace(100, 900, len(x) // 2),
     )
     best = force_curve(material, center, measurement.deflection)[0]
     fit = goodness(measurement, best, claim.curve_size).summary()
     return Shown(
         folder="chains/tiny",
         hypothesis=claim,
-        specimen=view.Specimen(
-            measurement.specimen.name, 50e-6, Annulus(0.010, 0.035), "bench <2> & 3", ("curve.csv",), ()
-        ),
+        film=Film(measurement.specimen.name, 50e-6, Annulus(0.010, 0.035), "bench <2> & 3", ("curve.csv",), ()),
         data_hash=measurement.data_hash,
         digest=found,
         x=x,

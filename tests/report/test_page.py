@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -17,9 +18,8 @@ from bayesmembrane.ground.errors import SettingsError, StorageError
 from bayesmembrane.physics.cache import Tally
 from bayesmembrane.reconstruction.result import Influence, LossCheck, RangeResult, Reconstruction
 from bayesmembrane.reconstruction.rows import Correction, PredictedLoss, Suspect
-from bayesmembrane.report.page import PAGE, TWIN, write_report, write_shown
-from bayesmembrane.report.reading import read
-from bayesmembrane.report.view import Shown
+from bayesmembrane.report.page import PAGE, TWIN, write_report
+from bayesmembrane.report.runs import Shown, read
 
 COMPARED = (
     Compared("yeoh", "OP1", 0.035, 0.01, 0.01, 0.1, 0.09, 0.09, {"c1": 8.8}, {"c1": 8.8}, {"c1": 8.9}, ("c3_c1",)),
@@ -73,7 +73,7 @@ def reconstruction() -> Reconstruction:
 def whole(tmp_path_factory: pytest.TempPathFactory, yeoh: Shown, neo_hookean: Shown) -> Path:
     """A page about two runs with everything on it."""
     out = tmp_path_factory.mktemp("report")
-    return write_shown([yeoh, neo_hookean], out, reconstruction(), COMPARED, None, Tally(hits=2, misses=1))
+    return write_report([yeoh, neo_hookean, reconstruction(), *COMPARED, Tally(hits=2, misses=1)], out)
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +128,7 @@ def test_the_answer_comes_first_and_the_warning_before_it(page: Page) -> None:
 
 
 def test_a_converged_run_has_no_warning(tmp_path: Path, yeoh: Shown) -> None:
-    page = Page(write_shown([yeoh], tmp_path).read_text(encoding="utf-8"))
+    page = Page(write_report([yeoh], tmp_path).read_text(encoding="utf-8"))
     assert "Not to be relied on" not in page.text
     assert not [a for _, a in page.tags if a.get("role") == "alert"]
     assert "Sampling converged" in page.text
@@ -136,7 +136,7 @@ def test_a_converged_run_has_no_warning(tmp_path: Path, yeoh: Shown) -> None:
 
 def test_numerical_failures_and_solvers_that_disagree_are_in_the_box(tmp_path: Path, yeoh: Shown) -> None:
     poor = replace(yeoh, outcomes={"ok": 900, "unresolved": 100}, crosscheck={**yeoh.crosscheck, "largest": 2e-4})
-    text = Page(write_shown([poor], tmp_path).read_text(encoding="utf-8")).text
+    text = Page(write_report([poor], tmp_path).read_text(encoding="utf-8")).text
     box = text[text.index("Not to be relied on") : text.index("Up to 35 mm, Yeoh")]
     assert "10 % of the films could not be computed" in box
     assert "disagree by up to 2.0e-04" in box
@@ -155,7 +155,7 @@ def test_a_run_without_prior_draws_or_states_is_still_shown(tmp_path: Path, yeoh
         break_lost=np.ones_like(d.break_lost),
     )
     bare = replace(yeoh, prior=np.empty((0, yeoh.x.shape[1])), digest=lost)
-    text = Page(write_shown([bare], tmp_path).read_text(encoding="utf-8")).text
+    text = Page(write_report([bare], tmp_path).read_text(encoding="utf-8")).text
     assert "nothing can be said by Yeoh (locked for 100 % of the draws)" in text
     assert "nan" not in text.lower().replace("nano", "")
 
@@ -183,7 +183,7 @@ def test_the_cache_is_told(whole: Path, page: Page) -> None:
 def test_a_stored_run_is_reported_twice_into_the_same_folder(tmp_path: Path, stored: Run) -> None:
     assert stored.path is not None
     first = write_report([stored.path], tmp_path / "report").read_bytes()
-    second = write_report([stored], tmp_path / "report", title="again & again").read_bytes()
+    second = write_report([stored], tmp_path / "report", "again & again").read_bytes()
     assert b"<title>again &amp; again</title>" in second
     assert len(first) > 100_000
     assert sorted(p.name for p in (tmp_path / "report").iterdir()) == [PAGE, TWIN]
@@ -195,7 +195,7 @@ def test_what_is_read_is_what_was_stored(stored: Run) -> None:
     assert shown.case.status == stored.status["status"]
     assert shown.sampling.means.shape[0] == 2
     assert shown.facts["seed"] == 0
-    assert shown.specimen.name == '<b>&"film'
+    assert shown.film.name == '<b>&"film'
 
 
 def test_predictions_are_read_back_unless_something_else_is_asked(stored: Run) -> None:
@@ -206,17 +206,57 @@ def test_predictions_are_read_back_unless_something_else_is_asked(stored: Run) -
     assert again.specimens == ("1", "2")
 
 
-def test_folders_that_are_no_runs_are_named(tmp_path: Path, stored: Run) -> None:
-    with pytest.raises(StorageError, match="no such run folder"):
+def test_folders_with_nothing_to_show_are_named(tmp_path: Path, stored: Run) -> None:
+    with pytest.raises(StorageError, match="nothing: there is no such folder"):
         write_report([tmp_path / "nothing"], tmp_path / "report")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(StorageError, match=r"empty: there is no complete run"):
+    with pytest.raises(StorageError, match=r"empty: nothing that a report can show"):
         write_report([tmp_path / "empty"], tmp_path / "report")
-    with pytest.raises(SettingsError, match="needs a run"):
+    with pytest.raises(SettingsError, match="needs something to show"):
         write_report([], tmp_path / "report")
     with pytest.raises(SettingsError, match="not stored"):
         write_report([replace(stored, path=None)], tmp_path / "report")
+    with pytest.raises(SettingsError, match="no section of the report shows a float"):
+        write_report([1.0], tmp_path / "report")
     assert not (tmp_path / "report").exists()
+
+
+def test_a_damaged_run_is_named_and_not_passed_over(tmp_path: Path, stored: Run) -> None:
+    assert stored.path is not None
+    copy = tmp_path / "chains" / "run"
+    shutil.copytree(stored.path, copy)
+    (copy / "posterior.nc").write_bytes(b"no posterior")
+    with pytest.raises(StorageError, match="run"):
+        write_report([tmp_path / "chains"], tmp_path / "report")
+
+
+def test_a_folder_of_runs_shows_each_once(tmp_path: Path, stored: Run) -> None:
+    assert stored.path is not None
+    for name in ("a", "b"):
+        shutil.copytree(stored.path, tmp_path / "chains" / name)
+    write_report([tmp_path / "chains"], tmp_path / "report")
+    twin = json.loads((tmp_path / "report" / TWIN).read_text(encoding="utf-8"))
+    assert [row["what"] for row in twin["tables"]["glance"]] == ["calibration"] * 2
+    assert len(twin["tables"]["fits"]) == 2
+    # Two runs of one hypothesis have tables of the same name: neither hides the other.
+    assert sum(name.startswith("parameters neo_hookean-35mm") for name in twin["tables"]) == 2
+    anchors = re.findall(r'<section id="([^"]*)"', (tmp_path / "report" / PAGE).read_text(encoding="utf-8"))
+    assert len(anchors) == len(set(anchors))
+
+
+def test_the_general_table_comes_first_and_has_a_row_for_every_answer(whole: Path, page: Page) -> None:
+    rows = json.loads((whole.parent / TWIN).read_text(encoding="utf-8"))["tables"]["glance"]
+    assert sorted(r["what"] for r in rows) == ["calibration", "calibration", "reconstruction"]
+    assert next(r["found"] for r in rows if "neo-Hookean" in r["about"]).endswith("misses something; step limit")
+    assert (
+        page.text.index("Contents") < page.text.index("one row for each answer") < page.text.index("Force (N) against")
+    )
+
+
+def test_a_reconstruction_stands_alone(tmp_path: Path) -> None:
+    page = Page(write_report([reconstruction()], tmp_path).read_text(encoding="utf-8"))
+    assert page.text.count("The curve is not raw data") == 2  # at the top, and in its section
+    assert [a["id"] for t, a in page.tags if t == "section"] == ["answer", "glance", "reconstruction"]
 
 
 @pytest.mark.parametrize("name", [PAGE, TWIN])
@@ -231,4 +271,4 @@ def test_a_foreign_file_is_never_overwritten(tmp_path: Path, stored: Run, name: 
 def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path, yeoh: Shown) -> None:
     (tmp_path / "file").write_text("x")
     with pytest.raises(StorageError, match="cannot be written"):
-        write_shown([yeoh], tmp_path / "file" / "report")
+        write_report([yeoh], tmp_path / "file" / "report")

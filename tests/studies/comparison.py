@@ -14,21 +14,17 @@ from pathlib import Path
 
 import numpy as np
 
-from bayesmembrane.app.demo import paper_losses, shipped_ranges
+from bayesmembrane.app.demo import shipped_ranges
 from bayesmembrane.comparison.compare import compare_ranges
 from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.report.sections.comparison.section import (
-    comparison_sentences,
-    evidence_table,
-    modes_table,
-    ranking_table,
-    widths_table,
-)
-from bayesmembrane.report.tables import Table
+from bayesmembrane.report.blocks import Table
+from bayesmembrane.report.sections.evidence import sentences
+from bayesmembrane.report.sections.evidence.tables import evidence_table, modes_table, ranking_table, widths_table
+from bayesmembrane.words.beside_paper import paper_losses
 
 TARGET = Path(__file__).resolve().parents[2] / "docs" / "studies" / "comparison.md"
 
@@ -49,7 +45,7 @@ def losses() -> dict[str, dict[str, float]]:
     both: dict[str, float] = {}
     for row in read_published_table().rows:
         both[row.material] = min(both.get(row.material, np.inf), float(np.linalg.norm(row.loss)))
-    return {**paper_losses(), "OP1 and OP2": both}
+    return {**paper_losses(read_published_table()), "OP1 and OP2": both}
 
 
 def tell(label: str, text: str) -> None:
@@ -66,7 +62,7 @@ def page(found: Mapping[str, Comparison], paper: Mapping[str, Mapping[str, float
         f"Made by `python -m tests.studies.comparison --seed {seed}`; the reconstructed curve with its covariance. OP1 "
         "is the paper's first range, to 35.1 mm, OP2 its second, to 91.5 mm. The paper fitted each of them, not both "
         "together; its loss over both is the least root of the sum of squares that one of its parameter sets has.",
-        "\n".join(f"- {sentence}" for sentence in comparison_sentences(found, paper)),
+        "\n".join(f"- {sentence}" for sentence in sentences(found, paper)),
         *(f"{t.caption}\n\n{markdown(t)}" for t in tables if t is not None),
     ]
     return "\n\n".join(parts) + "\n"

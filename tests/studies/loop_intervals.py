@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.diagnosis.candidates import Candidate, Search
-from bayesmembrane.diagnosis.diagnose import Diagnosis
-from bayesmembrane.diagnosis.trace import effective_weight
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.search import Search, effective_weight
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.physics.mechanics import api
 from tests.generator.datasets import Dataset
 

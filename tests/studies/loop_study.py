@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from bayesmembrane.data.measurement import read_measurement
-from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
+from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.errors import BayesmembraneError
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.hypothesis import Hypothesis

@@ -14,11 +14,12 @@ import numpy as np
 
 from bayesmembrane.data.measurement import Measurement, read_measurement
 from bayesmembrane.data.shipped import shipped
-from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
-from bayesmembrane.diagnosis.trace import Judged
-from bayesmembrane.diagnosis.wording import size_in_words
+from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.explanation.case import Judged
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.words.diagnosis import sentence, size_in_words
 
 TARGET = Path(__file__).resolve().parents[2] / "docs" / "studies" / "paper_curve.md"
 CURVES = {"to 35.1 mm": "elastosil_50um_op1", "both ranges": "elastosil_50um_first_loading"}
@@ -36,7 +37,7 @@ def main() -> None:
         for name in materials():
             found = diagnose(measurement, hypothesis(name), seed=seed)
             rows += list(lines(words, name, found, measurement))
-            sentences.append(f"- {name}, {words}: {found.sentence}")
+            sentences.append(f"- {name}, {words}: {sentence(found)}")
             print(sentences[-1], flush=True)
     TARGET.write_text(page(rows, sentences, seed), encoding="utf-8")
 

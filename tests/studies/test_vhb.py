@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.diagnosis.candidates import Candidate
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis

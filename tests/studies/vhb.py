@@ -15,11 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.diagnosis.candidates import Candidate
-from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.words.diagnosis import sentence
 from tests.studies.vhb_data import FOLDER, RIG, Cycle, cycles, fast_cycle, kPa
 
 TARGET = Path(__file__).resolve().parents[2] / "docs" / "studies" / "vhb.md"
@@ -192,7 +194,7 @@ def quick(fast: Measurement, slower: Cycle, seed: int) -> Quick:
     best = next(j for j in own.ranking if j.candidate.names)
     return Quick(
         own.verdict,
-        own.sentence,
+        sentence(own),
         _tried(own.null, own, None, [], False),
         _tried(best.candidate, own, None, [], best.explains),
         1 + end / RIG.length,

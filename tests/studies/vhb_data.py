@@ -11,8 +11,8 @@ import pandas as pd
 
 from bayesmembrane.data.measurement import Measurement, Specimen, curve_columns
 from bayesmembrane.data.tables import parse_table, read_text
-from bayesmembrane.diagnosis.saturated import reference_basis
-from bayesmembrane.diagnosis.whitening import orthonormal
+from bayesmembrane.diagnosis.reference.noise import orthonormal
+from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
@@ -71,7 +71,7 @@ def kPa(force: Array | float) -> Array:
 
 def scatter(measurement: Measurement) -> float:
     """kPa: standard deviation of what a saturated reference leaves, correlation left aside."""
-    q = orthonormal(reference_basis(measurement))
+    q = orthonormal(smooth_reference(measurement))
     rest = measurement.force - q @ (q.T @ measurement.force)
     return float(kPa(np.sqrt(np.sum(rest**2) / (rest.size - q.shape[1]))))
 

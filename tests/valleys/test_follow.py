@@ -20,7 +20,7 @@ from bayesmembrane.ground.stored import read, store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.rigs.annulus import Annulus
-from bayesmembrane.report.sections.valleys.section import write_valleys
+from bayesmembrane.report.sections.valleys import write_valleys
 from bayesmembrane.valleys.beside import valleys_beside
 from bayesmembrane.valleys.follow import Valleys, valleys
 from bayesmembrane.valleys.surface import Chart, Surface

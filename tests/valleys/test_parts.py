@@ -162,5 +162,5 @@ def test_what_is_held_is_not_moved(bowl: Any) -> None:
     start = np.array([[4.0, 1.0, -1.0]])
     z, _ = Surface.minimise(bowl, start, np.array([True, False, False]))
     assert z[0, 0] == 4.0
-    free, _ = descend(bowl.batch, start, np.full(3, -99.0), np.full(3, 99.0), 50, np.array([[True, False, False]]))
+    free, _ = descend(bowl.batch, start, (np.full(3, -99.0), np.full(3, 99.0)), 50, np.array([[True, False, False]]))
     np.testing.assert_allclose(z, free, atol=1e-4)

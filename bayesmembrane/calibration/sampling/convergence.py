@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import arviz
 import numpy as np
 from emcee.autocorr import integrated_time
 
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.quiet import arviz
 
 LEAST_TAUS = 50
 BURN_TAUS = 10

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import arviz
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
@@ -19,6 +18,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.plain import plain
+from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.noise.base import force_scale

@@ -28,6 +28,7 @@ class Material(ABC):
     A subclass is a frozen dataclass with float fields and these members:
 
     name, title, reference : how users call it, how reports print it, where it comes from
+    colour : of its curves in reports, "#rrggbb"; "" leaves the choice to the report
     units : unit of each field
     scales : per field, 1 if it scales with the modulus (N/m), 0 if it does not: F(s c) = s F(c)
     coordinates : the `Parameter` s in which it is sampled, with their priors
@@ -38,6 +39,7 @@ class Material(ABC):
 
     name: ClassVar[str]
     title: ClassVar[str]
+    colour: ClassVar[str] = ""
     reference: ClassVar[str]
     units: ClassVar[tuple[str, ...]]
     scales: ClassVar[tuple[int, ...]]

@@ -26,6 +26,7 @@ class Gent(Material):
 
     name: ClassVar[str] = "gent"
     title: ClassVar[str] = "Gent"
+    colour: ClassVar[str] = "#009E73"
     reference: ClassVar[str] = "A. N. Gent, Rubber Chem. Technol. 69 (1996) 59"
     units: ClassVar[tuple[str, ...]] = ("N/m", "-")
     scales: ClassVar[tuple[int, ...]] = (1, 0)

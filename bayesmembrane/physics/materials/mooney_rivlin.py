@@ -26,6 +26,7 @@ class MooneyRivlin(Material):
 
     name: ClassVar[str] = "mooney_rivlin"
     title: ClassVar[str] = "Mooney-Rivlin"
+    colour: ClassVar[str] = "#E69F00"
     reference: ClassVar[str] = (
         "M. Mooney, J. Appl. Phys. 11 (1940) 582; R. S. Rivlin, Phil. Trans. R. Soc. A 241 (1948) 379"
     )

@@ -21,6 +21,7 @@ class NeoHookean(Material):
 
     name: ClassVar[str] = "neo_hookean"
     title: ClassVar[str] = "neo-Hookean"
+    colour: ClassVar[str] = "#0072B2"
     reference: ClassVar[str] = "L. R. G. Treloar, Trans. Faraday Soc. 39 (1943) 241"
     units: ClassVar[tuple[str, ...]] = ("N/m",)
     scales: ClassVar[tuple[int, ...]] = (1,)

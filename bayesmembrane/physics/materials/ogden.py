@@ -33,6 +33,7 @@ class Ogden(Material):
 
     name: ClassVar[str] = "ogden"
     title: ClassVar[str] = "Ogden"
+    colour: ClassVar[str] = "#CC79A7"
     reference: ClassVar[str] = "R. W. Ogden, Proc. R. Soc. A 326 (1972) 565"
     units: ClassVar[tuple[str, ...]] = ("N/m", "N/m", "N/m", "-", "-", "-")
     scales: ClassVar[tuple[int, ...]] = (1, 1, 1, 0, 0, 0)

@@ -23,6 +23,7 @@ class Yeoh(Material):
 
     name: ClassVar[str] = "yeoh"
     title: ClassVar[str] = "Yeoh"
+    colour: ClassVar[str] = "#D55E00"
     reference: ClassVar[str] = "O. H. Yeoh, Rubber Chem. Technol. 66 (1993) 754"
     units: ClassVar[tuple[str, ...]] = ("N/m", "N/m", "N/m")
     scales: ClassVar[tuple[int, ...]] = (1, 1, 1)

@@ -11,38 +11,27 @@ import pytest
 from bayesmembrane.calibration.run import sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.diagnosis.diagnose import Diagnosis, diagnose
-from bayesmembrane.diagnosis.discrepancy import discrepancy
+from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.left.discrepancy import discrepancy
 from bayesmembrane.diagnosis.loop import Loop, Round, Stage
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.separation import Experiment
-from bayesmembrane.diagnosis.wording import size_in_words
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
-from bayesmembrane.report.page import PAGE, TWIN, write_shown
-from bayesmembrane.report.sections.loop.figures import Place, Residual, discrepancy_picture, residual_picture
-from bayesmembrane.report.sections.loop.reading import Change, changes, models
-from bayesmembrane.report.sections.loop.section import (
-    answer,
-    bound_sentences,
-    loop_answers,
-    loop_sections,
-    modulus_sentence,
-    moved_sentences,
-    place_of,
-    residual_rows,
-    rival_sentences,
-    validation_sentences,
-)
-from bayesmembrane.report.sections.loop.tables import (
-    candidate_title,
-    confounded_table,
-    errors_table,
-    moved_table,
-    power_table,
-    ranking_table,
-    scores_table,
-)
-from bayesmembrane.report.view import Shown
+from bayesmembrane.report.blocks import Figure, Points, Table
+from bayesmembrane.report.page import PAGE, TWIN, write_report
+from bayesmembrane.report.runs import Shown
+from bayesmembrane.report.sections.diagnosis.figures import Place, Residual, discrepancy_picture, residual_picture
+from bayesmembrane.report.sections.diagnosis.tables import confounded_table, power_table, ranking_table
+from bayesmembrane.report.sections.loop import LoopSection, place_of, residual_rows
+from bayesmembrane.report.sections.loop.tables import errors_table, moved_table, scores_table
+from bayesmembrane.report.sections.loop.way import waypoints
+from bayesmembrane.words import diagnosis as diagnosis_words
+from bayesmembrane.words import loop as loop_words
+from bayesmembrane.words.candidates import candidate_title
+from bayesmembrane.words.diagnosis import set_aside, size_in_words
+from bayesmembrane.words.moved import Change, changes, modulus_sentence
+from bayesmembrane.words.rounds import answer, bound_sentences, moved, rival_sentences, validation_sentences
 from tests.generator.datasets import THICKNESS, generate
 from tests.generator.protocols import Protocol
 
@@ -75,7 +64,7 @@ def named() -> Loop:
 def unknown(named: Loop) -> Loop:
     """The same curve, had nothing explained it."""
     r = named.rounds[0]
-    d = replace(r.diagnosis, verdict="unknown", effects=(), members=(), best=r.diagnosis.null, sentence="no name.")
+    d = replace(r.diagnosis, verdict="unknown", effects=(), members=(), best=r.diagnosis.null)
     left = discrepancy(r.before.run.measurement, d.null.residual, d.noise)
     return Loop((Round(d, r.before, r.before),), left)
 
@@ -86,7 +75,7 @@ def ambiguous(named: Loop) -> Loop:
     r = named.rounds[0]
     nexts = (Experiment("a blank run", math.inf), Experiment("unloading", 0.7))
     members = tuple(j for j in r.diagnosis.ranking if j.candidate.names)[:2]
-    d = replace(r.diagnosis, verdict="ambiguous", members=members, experiments=nexts, sentence="either.")
+    d = replace(r.diagnosis, verdict="ambiguous", members=members, experiments=nexts)
     return Loop((Round(d, r.before, r.before),), None)
 
 
@@ -107,27 +96,27 @@ def only(loop: Loop, verdict: str) -> Diagnosis:
 
 def test_errors_fall_from_the_model_as_given_to_the_one_with_its_effect(named: Loop) -> None:
     d = only(named, "named")
-    before, after = errors_table(models(named), "cycle 3", "errors").records()
+    before, after = errors_table(waypoints(named), "cycle 3", "errors").records()
     assert (before["model"], after["model"]) == ("neo-Hookean", "neo-Hookean with friction in the guide")
     assert before["rmse_mN"] == pytest.approx(1e3 * np.sqrt(np.mean(d.null.residual**2)))
     assert after["rmse_mN"] == pytest.approx(1e3 * np.sqrt(np.mean(d.best.residual**2)))
     assert all(after[k] < before[k] for k in ("rmse_mN", "reduced_chi2", "heldout_rmse_mN", "heldout_reduced_chi2"))
 
 
-def test_scores_are_those_of_the_sampled_models(named: Loop, ambiguous: Loop) -> None:
-    assert [r["log_evidence"] for r in scores_table(models(named), "s").records()] == [500.0, 600.0]
-    assert len(scores_table(models(ambiguous), "s").rows) == 1
+def test_scores_are_those_of_the_sampled_waypoints(named: Loop, ambiguous: Loop) -> None:
+    assert [r["log_evidence"] for r in scores_table(waypoints(named), "s").records()] == [500.0, 600.0]
+    assert len(scores_table(waypoints(ambiguous), "s").rows) == 1
 
 
 def test_sampled_rivals_stand_side_by_side_and_are_not_added(sampled: Loop) -> None:
-    rows = scores_table(models(sampled), "s").records()
+    rows = scores_table(waypoints(sampled), "s").records()
     assert [r["log_evidence"] for r in rows] == [500.0, 600.0, 550.0]
     assert ["not added" in r["model"] for r in rows] == [False, True, True]
-    errors = errors_table(models(sampled), "cycle 3", "errors").records()
+    errors = errors_table(waypoints(sampled), "cycle 3", "errors").records()
     assert [r["heldout_coverage_90"] is None for r in errors] == [False, False, True]
     (sentence,) = rival_sentences(sampled)
     assert sentence.count("MPa") == 3
-    assert sampled.rounds[0].summary()["leaders"][1]["log_evidence"] == 550.0
+    assert loop_words.round_document(sampled.rounds[0])["leaders"][1]["log_evidence"] == 550.0
 
 
 def test_candidates_are_ranked_against_the_model_as_it_was(named: Loop) -> None:
@@ -178,7 +167,7 @@ def test_moved_parameters_are_in_the_posteriors(named: Loop) -> None:
     assert math.isnan(found["friction.level"].before[0])
     cells = {c[0]: c for c in moved_table(list(found.values()), "m").cells()}
     assert cells["friction in the guide: level"][2] == "-"
-    sentence = moved_sentences(named)[0]
+    sentence = moved(named)[0]
     assert f"{found['shear modulus'].after[0]:.4g}" in sentence
 
 
@@ -200,11 +189,13 @@ def test_the_answer_tells_every_round(named: Loop) -> None:
 
 
 def test_what_was_changed_is_said_before_how_it_ended(named: Loop, unknown: Loop) -> None:
-    assert named.sentence == f"Changed: friction in the guide. {named.rounds[-1].diagnosis.sentence}"
-    assert unknown.sentence == "no name."
+    ends = diagnosis_words.sentence(named.rounds[-1].diagnosis)
+    assert loop_words.sentence(named) == f"Changed: friction in the guide. {ends}"
+    assert loop_words.sentence(unknown) == diagnosis_words.sentence(unknown.rounds[0].diagnosis)
     r = named.rounds[0]
     gent = replace(r.after, run=replace(r.after.run, settings={"hypothesis": hypothesis("gent").settings()}))
-    assert Loop((replace(r, after=gent),), None).sentence.startswith("Changed: Gent instead of neo-Hookean. ")
+    told = loop_words.sentence(Loop((replace(r, after=gent),), None))
+    assert told.startswith("Changed: Gent instead of neo-Hookean. ")
 
 
 def test_a_loop_that_stops_early_says_so(named: Loop) -> None:
@@ -215,7 +206,7 @@ def test_a_loop_that_stops_early_says_so(named: Loop) -> None:
 def test_the_choice_without_the_held_out_points_is_said(named: Loop) -> None:
     d = only(named, "named")
     assert d.validation is not None
-    assert any("choose the same model" in s and d.validation.where in s for s in validation_sentences(named))
+    assert any("choose the same model" in s and set_aside(d.validation) in s for s in validation_sentences(named))
     other = replace(d.validation, chosen="neo_hookean")
     r = replace(named.rounds[0], diagnosis=replace(d, validation=other))
     assert "choose neo-Hookean instead" in validation_sentences(Loop((r,), None))[0]
@@ -237,7 +228,7 @@ def test_an_estimate_at_a_bound_is_a_limit(named: Loop) -> None:
 
 
 def test_the_page_answers_with_the_loop_first(tmp_path: Path, named: Loop, yeoh: Shown) -> None:
-    page = write_shown([yeoh], tmp_path, loops=[named]).read_text()
+    page = write_report([yeoh, named], tmp_path).read_text()
     twin = json.loads((tmp_path / TWIN).read_text())
     assert (tmp_path / PAGE).exists()
     assert twin["answer"][:2] == answer(named)
@@ -247,38 +238,44 @@ def test_the_page_answers_with_the_loop_first(tmp_path: Path, named: Loop, yeoh:
 
 
 def test_two_loops_keep_apart(named: Loop, unknown: Loop) -> None:
-    sections = loop_sections([named, unknown])
-    names = [b.table.name for s in sections for b in s.blocks if b.table]
+    sections = LoopSection().parts([named, unknown])
+    names = [b.name for s in sections for b in s.blocks if isinstance(b, Table)]
     assert [s.key for s in sections] == ["loop1", "loop2"]
     assert len(set(names)) == len(names)
-    assert [s.startswith("synthetic <film>, neo-Hookean up to") for s in loop_answers([named, unknown])] == [True, True]
+    assert [s.startswith("synthetic <film>, neo-Hookean up to") for s in LoopSection().answer([named, unknown])] == [
+        True,
+        True,
+    ]
 
 
 def test_without_a_name_the_rest_is_drawn_and_nothing_is_added(unknown: Loop) -> None:
-    (section,) = loop_sections([unknown])
+    (section,) = LoopSection().parts([unknown])
     assert unknown.left is not None
-    captions = [b.caption for b in section.blocks if b.kind == "figure"]
+    captions = [b.caption for b in section.blocks if isinstance(b, Figure)]
     assert len(captions) == 2
-    assert unknown.left.sentence in captions[1]
-    assert [r.title.partition(":")[0] for r in residual_rows(models(unknown))] == ["As given"]
+    assert loop_words.left_sentence(unknown.left) in captions[1]
+    assert [r.title.partition(":")[0] for r in residual_rows(waypoints(unknown))] == ["As given"]
     assert not any(r["in_answer"] for r in ranking_table(unknown.rounds[0].diagnosis, "r").records())
 
 
 def test_rivals_are_listed_with_what_would_part_them(ambiguous: Loop) -> None:
-    (section,) = loop_sections([ambiguous])
-    lines = [line for b in section.blocks for line in b.lines]
+    (section,) = LoopSection().parts([ambiguous])
+    lines = [line for b in section.blocks if isinstance(b, Points) for line in b.lines]
     assert any(line.endswith("the most probable.") for line in lines)
     assert "To tell them apart: a blank run: shows one of them directly." in lines
     assert "What would not settle it: unloading (0.7 standard deviations)." in lines
     assert any(
-        row["model"].endswith("(not added)") for b in section.blocks if b.table for row in b.table.records()[1:2]
+        row["model"].endswith("(not added)")
+        for b in section.blocks
+        if isinstance(b, Table) and "errors" in b.name
+        for row in b.records()[1:2]
     )
-    assert residual_rows(models(ambiguous))[1].title.startswith("The first rival, not added")
+    assert residual_rows(waypoints(ambiguous))[1].title.startswith("The first rival, not added")
 
 
 def test_an_adequate_model_needs_no_candidates(named: Loop) -> None:
-    (section,) = loop_sections([Loop(named.rounds[1:], None)])
-    names = [b.table.name for b in section.blocks if b.table]
+    (section,) = LoopSection().parts([Loop(named.rounds[1:], None)])
+    names = [b.name for b in section.blocks if isinstance(b, Table)]
     assert names[:2] == ["loop errors", "loop scores"]
     assert "loop candidates" not in names
     assert "loop power" in names
@@ -299,7 +296,7 @@ def test_held_out_points_are_the_last_cycle(named: Loop) -> None:
 
 
 def test_every_model_has_its_row(named: Loop) -> None:
-    place, rows = place_of(named), residual_rows(models(named))
+    place, rows = place_of(named), residual_rows(waypoints(named))
     both, one = (residual_picture(place, r).data for r in (rows, rows[:1]))
     assert height(both) > 1.5 * height(one)
     assert residual_picture(place, rows).data == both
@@ -313,3 +310,21 @@ def test_a_single_loading_without_times_is_drawn() -> None:
     assert place.along[1] == "point (-)"
     assert height(residual_picture(place, [big, small]).data) > 0
     assert height(discrepancy_picture(place, big.residual, 0.4 * ones, 0.1 * ones).data) > 0
+
+
+# ---- without any run -------------------------------------------------------------------------------------------------
+
+
+def test_a_loop_and_a_diagnosis_stand_alone(tmp_path: Path, named: Loop) -> None:
+    page = write_report([named], tmp_path / "loop").read_text()
+    assert "What the force curve of synthetic &lt;film&gt; says" in page
+    assert 'id="data"' not in page
+    d = only(named, "named")
+    page = write_report([d, named.rounds[-1].diagnosis], tmp_path / "diagnosis").read_text()
+    twin = json.loads((tmp_path / "diagnosis" / TWIN).read_text())
+    assert 'id="diagnosis1"' in page
+    assert twin["answer"] == [diagnosis_words.sentence(x) for x in (d, named.rounds[-1].diagnosis)]
+    before, after = twin["tables"]["diagnosis errors 1"]
+    assert (before["model"], after["model"]) == ("neo-Hookean", "neo-Hookean with friction in the guide")
+    assert after["heldout_rmse_mN"] < before["heldout_rmse_mN"]
+    assert twin["tables"]["glance"][0]["found"] == "named: neo-Hookean with friction in the guide"

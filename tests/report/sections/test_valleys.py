@@ -15,10 +15,11 @@ from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
-from bayesmembrane.report.page import write_shown
+from bayesmembrane.report.page import write_report
+from bayesmembrane.report.runs import Shown
+from bayesmembrane.report.sections.valleys import write_valleys
 from bayesmembrane.report.sections.valleys.figures import valley_picture
-from bayesmembrane.report.sections.valleys.section import TESTS, next_table, valley_table, write_valleys
-from bayesmembrane.report.view import Shown
+from bayesmembrane.report.sections.valleys.tables import TESTS, next_table, valley_table
 from bayesmembrane.valleys.follow import Valleys, valleys
 from tests.reference.slow_solver import force_curve
 
@@ -65,11 +66,19 @@ def test_next_measurements_are_a_short_list_ordered_by_what_they_are_worth(two: 
 
 
 def test_page_shows_the_valleys(one: Valleys, yeoh: Shown, tmp_path: Path) -> None:
-    page = write_shown([yeoh], tmp_path, valleys=[one]).read_text()
+    page = write_report([yeoh, one], tmp_path).read_text()
     assert 'id="valleys"' in page
     for sentence in one.sentences:
         assert sentence.split(" (")[0].replace("'", "&#39;") in page
-    assert 'id="valleys"' not in write_shown([yeoh], tmp_path).read_text()
+    assert 'id="valleys"' not in write_report([yeoh], tmp_path).read_text()
+
+
+def test_valleys_stand_alone(one: Valleys, two: Valleys, tmp_path: Path) -> None:
+    page = write_report([one, two], tmp_path).read_text()
+    twin = json.loads((tmp_path / "report.json").read_text())
+    assert [row["about"] for row in twin["tables"]["glance"]][-1] == "Gent, up to 30 mm"
+    assert twin["answer"] == [f.sentences[0] for f in (one, two)]
+    assert 'id="data"' not in page
 
 
 def test_answer_and_picture_are_written_and_read_back(one: Valleys, tmp_path: Path) -> None:

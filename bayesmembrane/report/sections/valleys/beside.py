@@ -8,21 +8,24 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.report.canvas import Picture, _encoded, _figure, _style
-from bayesmembrane.report.sections.valleys.pairs import RANGE_COLOURS, label
-from bayesmembrane.report.style import FAINT, INK, with_unit
+from bayesmembrane.report.blocks import Picture
+from bayesmembrane.report.canvas import encoded, new_figure, style
+from bayesmembrane.report.sections.valleys.pairs import label
+from bayesmembrane.report.style import FAINT, INK, RANGE_COLOURS, with_unit
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Between, Valley
+from bayesmembrane.words.hypothesis import title
+from bayesmembrane.words.language import listed
 
 DOTS = 600
 
 
 def beside_picture(found: Beside, kind: str = "png") -> Picture:
     """A panel for each range: floors, optima and posterior draws, without effects and with them."""
-    names = " and ".join(e.name.replace("_", " ") for e in found.added.hypothesis.effects)
+    names = listed(map(title, found.added.hypothesis.effects))
     count = len(found.pairs)
-    with _style():
-        figure = _figure(4.6)
+    with style():
+        figure = new_figure(4.6)
         axes = figure.subplots(1, count, squeeze=False)[0]
         shown = _shown(found.without.ranges[0])
         for ax, pair, a, b in zip(axes, found.pairs, found.without.ranges, found.added.ranges, strict=True):
@@ -31,10 +34,9 @@ def beside_picture(found: Beside, kind: str = "png") -> Picture:
             _approach(ax, shown, a, pair)
             ax.set_title(label(a))
             ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16))
-        title = found.added.hypothesis.material.title
-        text = f"{title}: valleys without and with {names} (dots: posterior draws)"
+        text = f"{title(found.added.hypothesis.material)}: valleys without and with {names} (dots: posterior draws)"
         figure.suptitle(text, fontweight="bold")
-        return _encoded(figure, kind)
+        return encoded(figure, kind)
 
 
 def _shown(v: Valley) -> tuple[int, int | None]:

@@ -13,9 +13,10 @@ from matplotlib.patches import Patch
 
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.convexity import REACHED, ConvexityMode
-from bayesmembrane.report.canvas import Picture, _encoded, _figure, _style
-from bayesmembrane.report.sections.valleys.pairs import RANGE_COLOURS, label, pairs, percent
-from bayesmembrane.report.style import FAINT, INK, MUTED, with_unit
+from bayesmembrane.report.blocks import Picture
+from bayesmembrane.report.canvas import encoded, new_figure, style
+from bayesmembrane.report.sections.valleys.pairs import label, pairs, percent
+from bayesmembrane.report.style import FAINT, INK, MUTED, RANGE_COLOURS, with_unit
 from bayesmembrane.valleys.posterior import Grid
 from bayesmembrane.valleys.result import Valley, Valleys
 from bayesmembrane.words.valleys import limit_title
@@ -41,8 +42,8 @@ def _mode(v: Valley) -> ConvexityMode:
 
 
 def _one(found: Valleys, kind: str) -> Picture:
-    with _style():
-        figure = _figure(3.6)
+    with style():
+        figure = new_figure(3.6)
         ax = figure.subplots()
         drawn = [(v, v.profiles[0], v.chart.natural(v.profiles[0].points)[:, 0]) for v in found.ranges]
         for (v, p, x), c in zip(drawn, RANGE_COLOURS, strict=False):
@@ -59,7 +60,7 @@ def _one(found: Valleys, kind: str) -> Picture:
         ax.set_xlabel(with_unit(found.ranges[0].chart.names[0], found.ranges[0].chart.units[0]))
         ax.set_ylabel("loss above the least (%)")
         ax.legend()
-        return _encoded(figure, kind)
+        return encoded(figure, kind)
 
 
 # ---- two parameters --------------------------------------------------------------------------------------------------
@@ -68,15 +69,15 @@ def _one(found: Valleys, kind: str) -> Picture:
 def _plane(found: Valleys, kind: str) -> Picture:
     ranges = found.ranges
     axes_of = _axes_order(ranges[0])
-    with _style():
-        figure = _figure(4.4 + 3.9)
+    with style():
+        figure = new_figure(4.4 + 3.9)
         grid = figure.add_gridspec(2, len(ranges), height_ratios=(1.12, 1.0))
         top = figure.add_subplot(grid[0, :])
         _overview(top, found, axes_of)
         for i, v in enumerate(ranges):
             _zoom(figure.add_subplot(grid[1, i]), v, axes_of, RANGE_COLOURS[i % len(RANGE_COLOURS)])
         figure.legend(handles=_handles(ranges), loc="outside lower center", ncols=3, handlelength=2.2)
-        return _encoded(figure, kind)
+        return encoded(figure, kind)
 
 
 def _axes_order(v: Valley) -> tuple[int, int]:

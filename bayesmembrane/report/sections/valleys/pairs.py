@@ -12,12 +12,11 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.report.canvas import Picture, _encoded, _figure, _style
-from bayesmembrane.report.style import INK, MUTED, with_unit
+from bayesmembrane.report.blocks import Picture
+from bayesmembrane.report.canvas import encoded, new_figure, style
+from bayesmembrane.report.style import INK, MUTED, RANGE_COLOURS, with_unit
 from bayesmembrane.valleys.profile import PairMap
 from bayesmembrane.valleys.result import Valley, Valleys
-
-RANGE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9")
 
 
 def label(v: Valley) -> str:
@@ -33,8 +32,8 @@ def percent(v: Valley) -> str:
 def pairs(found: Valleys, kind: str) -> Picture:
     """A triangle of pairwise maps, with the profile of each parameter on its diagonal."""
     k = found.ranges[0].chart.size
-    with _style({"font.size": 9 if k > 3 else 11, "axes.labelsize": 9 if k > 3 else 11}):
-        figure = _figure(max(1.55 * k, 6.4))
+    with style({"font.size": 9 if k > 3 else 11, "axes.labelsize": 9 if k > 3 else 11}):
+        figure = new_figure(max(1.55 * k, 6.4))
         axes = figure.subplots(k, k, squeeze=False, sharex="col")
         for i in range(k):
             for j in range(k):
@@ -50,7 +49,7 @@ def pairs(found: Valleys, kind: str) -> Picture:
         rise, name = percent(found.ranges[0]), found.hypothesis.material.title
         told = f"{name}: films within {rise} of the best loss, the other parameters adjusted"
         figure.suptitle(told, fontweight="bold", fontsize=12)
-        return _encoded(figure, kind)
+        return encoded(figure, kind)
 
 
 def _axis_values(v: Valley, i: int, z: Array) -> Array:

@@ -1,0 +1,82 @@
+"""What could explain the curve: a material with some effects at its most probable parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.effects.base import Effect
+from bayesmembrane.physics.hypothesis import Hypothesis
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One hypothesis at its most probable parameters, under the measurement's own noise.
+
+    hypothesis : material and effects
+    x : (k,) coordinates
+    residual : (N,) N, measured less fitted
+    slopes : (N, k) dF/dx there
+    log_evidence : Laplace approximation of ln Z, up to a constant that all candidates share
+    at_bound : names of coordinates at a bound
+    """
+
+    hypothesis: Hypothesis
+    x: Array
+    residual: Array
+    slopes: Array
+    log_evidence: float
+    at_bound: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its effects."""
+        return tuple(e.name for e in self.hypothesis.effects)
+
+    @property
+    def label(self) -> str:
+        """Material, effects and noise by name: of the candidates of one measurement, each has its own."""
+        return self.hypothesis.label()
+
+    def slopes_of(self, names: Collection[str]) -> Array:
+        """(N, m) the slopes of the coordinates of these effects."""
+        sizes = [len(e.coordinates) for e in self.hypothesis.effects]
+        owner = np.repeat(self.names, sizes) if sizes else np.empty(0, dtype=str)
+        start = self.hypothesis.material_size
+        return self.slopes[:, start : start + owner.size][:, np.isin(owner, list(names))]
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Effect parameters by full name, SI."""
+        n = self.hypothesis.material_size
+        names = self.hypothesis.names[n : self.hypothesis.curve_size]
+        return {name: float(v) for name, v in zip(names, self.x[n:], strict=True)}
+
+
+def with_effects(hypothesis: Hypothesis, effects: Sequence[Effect]) -> Hypothesis:
+    """The hypothesis with more effects."""
+    return replace(hypothesis, effects=(*hypothesis.effects, *effects))
+
+
+def available(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
+    """Effects of the library that can be seen in this test, can be told from the material, and are not there yet."""
+    thin = measurement.specimen.thickness
+    return [e for e in _possible(measurement, hypothesis) if not e.absorbed and not e.negligible(thin)]
+
+
+def absorbed(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
+    """Effects that the material absorbs without trace."""
+    return [e for e in _possible(measurement, hypothesis) if e.absorbed]
+
+
+def _possible(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
+    """Effects of the library that can occur in this test and are not in the hypothesis."""
+    found: list[Effect] = [cls() for cls in components("effects").values()]
+    have = {e.name for e in hypothesis.effects}
+    rig, path = measurement.rig.name, measurement.path
+    return [e for e in found if e.name not in have and not e.unavailable(rig, path)]

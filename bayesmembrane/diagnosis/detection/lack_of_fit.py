@@ -1,0 +1,68 @@
+"""Does the model leave more than the smooth reference? The overall test: it sees any smooth misfit, faintly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, f, ncf, ncx2
+
+from bayesmembrane.diagnosis.reference.noise import Whitened
+from bayesmembrane.diagnosis.thresholds import NOISE, TINY
+
+
+@dataclass(frozen=True)
+class LackOfFit:
+    """F = [(RSS - RSS_saturated) / (p - k)] / s^2 of a model, and what is its probability if nothing is missing.
+
+    ratio : F; 1 is what an adequate model has
+    p_value : P(F >= ratio)
+    chi2 : RSS over the noise's own variance
+    dof : N - k
+    extra, rest : degrees of freedom above and below in F; ``rest`` is inf where the noise is stated
+    """
+
+    ratio: float
+    p_value: float
+    chi2: float
+    dof: int
+    extra: int = 1
+    rest: float = np.inf
+
+    def p_if_left(self, part: float, before: LackOfFit) -> float:
+        """P(F >= ratio) if ``part`` of the misfit that ``before`` shows were left: noncentral F or chi-square."""
+        missing = part * max(before.ratio - 1, 0.0) * before.extra
+        if missing == 0:
+            return self.p_value
+        if np.isinf(self.rest):
+            return float(ncx2.sf(self.ratio * self.extra, self.extra, missing))
+        return float(ncf.sf(self.ratio, self.extra, self.rest, missing))
+
+    def part_left_of(self, before: LackOfFit) -> float:
+        """(F - 1) over that of another model: part of its misfit that this one leaves; 0 where it has none."""
+        return max(self.ratio - 1, 0.0) / max(before.ratio - 1, 1e-12) if before.ratio > 1 else 0.0
+
+    @property
+    def reduced_chi2(self) -> float:
+        """chi^2 / (N - k), by the measurement's own noise."""
+        return self.chi2 / max(self.dof, 1)
+
+
+def lack_of_fit(model: Whitened) -> LackOfFit:
+    """How much of the residual the reference, together with the model's slopes, explains.
+
+    The saturated residual sets the scale where the noise is inferred; where it is stated, that does. A curve too short
+    for the reference to leave enough degrees of freedom is judged by all that is left, if its noise is stated.
+    """
+    r, rest, k, noise = model.residual, model.rest, model.parameters, model.noise
+    n, p = r.size, model.reference.shape[1]
+    rss, rss_saturated = float(r @ r), float(np.sum(rest**2))
+    extra = max(p - k, 1)
+    if noise.stated:
+        whole = noise.root is not None or n - p < NOISE.doubt_from_dof
+        value, dof = (rss, max(n - k, 1)) if whole else (max(rss - rss_saturated, 0.0), extra)
+        return LackOfFit(value / dof, float(chi2.sf(value, dof)), rss, n - k, dof)
+    scale = max(rss_saturated / max(n - p, 1), TINY)
+    ratio = max(rss - rss_saturated, 0.0) / extra / scale
+    rest_dof = max(n - p, 1)
+    return LackOfFit(float(ratio), float(f.sf(ratio, extra, rest_dof)), rss, n - k, extra, float(rest_dof))

@@ -1,0 +1,109 @@
+"""Errors before and after an effect is added: in sample, and on points that were set aside before looking."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.thresholds import HELD_OUT
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.forward import Forward
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Root mean square and largest residual in N, and chi^2 over degrees of freedom by the measurement's own noise."""
+
+    rmse_N: float  # noqa: N815 - the unit is part of the name that users read
+    max_N: float  # noqa: N815
+    reduced_chi2: float
+
+
+def misfit_of(residual: Array, noise_sd: Array, parameters: int = 0) -> Misfit:
+    """The misfit of residuals (N,) with the noise's standard deviations (N,); ``parameters`` were fitted to them."""
+    dof = max(residual.size - parameters, 1)
+    return Misfit(
+        float(np.sqrt(np.mean(residual**2))),
+        float(np.max(np.abs(residual))),
+        float(np.sum((residual / noise_sd) ** 2) / dof),
+    )
+
+
+def held_out(measurement: Measurement) -> NDArray[np.bool_]:
+    """(N,) True for points that are set aside: the rule looks at the path alone.
+
+    The last cycle where there are two or more, else every fourth of twenty blocks of the path.
+    """
+    cycles = np.unique(measurement.cycle)
+    if cycles.size >= 2:
+        mask = np.asarray(measurement.cycle == cycles[-1])
+    else:
+        n, every = len(measurement), HELD_OUT.every
+        blocks = np.minimum(np.arange(n) * HELD_OUT.blocks // max(n, 1), HELD_OUT.blocks - 1)
+        mask = blocks % every == every - 2
+    if np.count_nonzero(~mask) < HELD_OUT.least_points:
+        return np.zeros(len(measurement), dtype=bool)
+    return mask
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Errors on points that no fit saw, and which model the others choose.
+
+    cycle : number of the cycle that was set aside, the last of ``cycles``; every fourth block of points if ``cycles``
+        is 1
+    before, after : errors there of the plain and of the chosen model, both fitted to the other points
+    chosen : label of the most probable of the rivals when these points are left out
+    covered_before, covered_after : part of these points inside the 90 % bands of the two predictions, noise included
+    """
+
+    cycle: int
+    cycles: int
+    before: Misfit
+    after: Misfit
+    chosen: str
+    covered_before: float
+    covered_after: float
+
+
+def validate(search: Search, before: Candidate, after: Candidate, rivals: list[Candidate]) -> HeldOut | None:
+    """Fit to the points that are not held out, and predict those that are; None where there are none, or no film."""
+    whole = search.measurement
+    mask = held_out(whole)
+    if not np.any(mask):
+        return None
+    part = _on_the_others(search, mask)
+    fits = {}
+    for candidate in {c.label: c for c in (before, after, *rivals)}.values():
+        found = part.fit(candidate.hypothesis, [candidate.x])
+        if found is not None:
+            fits[candidate.label] = found
+    if before.label not in fits or after.label not in fits:
+        return None
+    first, covered_first = _predicted(part, fits[before.label], search, mask)
+    last, covered_last = _predicted(part, fits[after.label], search, mask)
+    chosen = max(fits, key=lambda label: fits[label].log_evidence)
+    cycles = np.unique(whole.cycle)
+    return HeldOut(int(cycles[-1]), cycles.size, first, last, chosen, covered_first, covered_last)
+
+
+def _on_the_others(search: Search, mask: NDArray[np.bool_]) -> Search:
+    seen = search.measurement.select(~mask)
+    return replace(search, measurement=seen, noise=search.noise.part(seen, ~mask))
+
+
+def _predicted(part: Search, fit: Candidate, search: Search, mask: NDArray[np.bool_]) -> tuple[Misfit, float]:
+    """(error, part inside the 90 % band) of a model fitted to the others, at the points of ``mask``."""
+    whole, sd = search.measurement, search.noise.each[mask]
+    forward = Forward(fit.hypothesis, whole, whole.deflection, search.solve)
+    new = forward(fit.x[None, :], sensitivities=True, reached=False)
+    assert new.sensitivity is not None
+    residual = np.nan_to_num(whole.force - new.force[0], nan=float(np.max(whole.force)))[mask]
+    slopes = np.nan_to_num(new.sensitivity[0][mask])
+    band = HELD_OUT.band * np.sqrt(np.einsum("ni,ij,nj->n", slopes, part.covariance(fit), slopes) + sd**2)
+    return misfit_of(residual, sd), float(np.mean(np.abs(residual) <= band))

@@ -1,0 +1,91 @@
+"""The noise that a measurement states, or that its readings show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.stats import chi2
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.reference.noise import OwnNoise, decorrelated, divided, forgotten, orthonormal
+from bayesmembrane.diagnosis.thresholds import NOISE, TINY
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.noise.ar1 import gaps_of
+
+
+def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
+    """Noise that the measurement states, or else what ``basis`` (N, p) leaves, by restricted maximum likelihood.
+
+    A stated standard deviation is a claim, often from a data sheet: where the readings scatter more than that, or
+    remember, what they do counts, in proportion to what is stated of each. A stated covariance is believed.
+
+    For AR(1) noise e the restricted likelihood of rho, sd maximised away, is
+    -1/2 [(N - p) ln RSS + ln |R| + ln |B^T R^-1 B|] (D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320); the prior
+    density of rho falls evenly to zero at 1. Where the
+    points are uneven in time, noise may forget by the time (drift of air, filters) or by the reading (averages and
+    filters of so many readings): the likelier is taken.
+    """
+    gaps, readings = gaps_of(measurement, "time"), gaps_of(measurement, "readings")
+    covariance, stated = measurement.covariance, measurement.force_sd
+    if covariance is not None:
+        sd = float(np.sqrt(np.mean(np.diag(covariance))))
+        return OwnNoise(sd, 0.0, 0.0, gaps, np.asarray(np.linalg.cholesky(covariance), dtype=float), np.inf)
+    sd = 1.0 if stated is None else float(np.sqrt(np.mean(stated**2)))
+    profile = np.ones(1) if stated is None else stated / sd
+    y, q = divided(measurement.force, profile), orthonormal(divided(basis, profile))
+    found = [_most_likely(_Restricted(y, q, gaps), "time")]
+    if gaps.size and float(np.max(np.abs(gaps - 1))) > NOISE.even_steps:
+        found.append(_most_likely(_Restricted(y, q, readings), "readings"))
+    inferred = replace(min(found, key=lambda f: f[0])[1], profile=profile)
+    if stated is None:
+        return inferred
+    larger = chi2.sf((inferred.sd / sd) ** 2 * inferred.dof, inferred.dof) < NOISE.doubt_below
+    if inferred.dof < NOISE.doubt_from_dof or not (inferred.remembers or larger):
+        return OwnNoise(sd, 0.0, 0.0, gaps, None, np.inf, profile=profile)
+    return replace(inferred, excess=inferred.sd / sd)
+
+
+@dataclass(frozen=True, eq=False)
+class _Restricted:
+    """The restricted likelihood of readings y (N,) beside the orthonormal columns q (N, p)."""
+
+    y: Array
+    q: Array
+    gaps: Array
+
+    @property
+    def dof(self) -> int:
+        return int(self.y.size - self.q.shape[1])
+
+    def at(self, rho: float) -> tuple[float, float]:
+        """(-2 ln L, RSS) at one correlation."""
+        # The last diagonal entry of R is what y has beyond the span of the others.
+        r = np.diag(np.linalg.qr(decorrelated(np.column_stack([self.q, self.y]), rho, self.gaps), mode="r"))
+        rss = float(r[-1] ** 2)
+        phi = forgotten(rho, self.gaps)
+        log_det = float(np.sum(np.log1p(-(phi**2)))) + 2 * float(np.sum(np.log(np.abs(r[:-1]))))
+        # A density 2 (1 - rho): noise that hardly forgets is a drift, which no test could tell from a misfit.
+        return self.dof * np.log(max(rss, TINY)) + log_det - 2 * np.log1p(-rho), rss
+
+    def value(self, rho: float) -> float:
+        return self.at(rho)[0]
+
+
+def _most_likely(likelihood: _Restricted, clock: str) -> tuple[float, OwnNoise]:
+    """(-2 ln L, noise) at the most likely correlation."""
+    value, dof = likelihood.value, likelihood.dof
+    trials = np.linspace(0.0, NOISE.largest_rho, NOISE.rho_trials)
+    best = int(np.argmin([value(rho) for rho in trials]))
+    low, high = trials[max(best - 1, 0)], trials[min(best + 1, trials.size - 1)]
+    rho = float(minimize_scalar(value, bounds=(low, high), method="bounded").x)
+    rho = 0.0 if value(0.0) <= value(rho) else rho
+    step = NOISE.rho_step
+    middle = min(max(rho, step), NOISE.largest_rho - step)
+    bend = (value(middle - step) - 2 * value(middle) + value(middle + step)) / step**2
+    error = float(np.sqrt(2 / bend)) if bend > 0 else 1 / np.sqrt(dof)
+    least, rss = likelihood.at(rho)
+    floor = NOISE.smallest_sd * float(np.max(np.abs(likelihood.y)))
+    sd = max(float(np.sqrt(rss / dof)), floor)
+    return least, OwnNoise(sd, rho, min(error, NOISE.largest_rho_sd), likelihood.gaps, None, float(dof), clock)

@@ -1,0 +1,331 @@
+"""A run as a report shows it: what was stored, and the few numbers that sentences need. Nothing is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayesmembrane.calibration.posterior import FAILURES
+from bayesmembrane.calibration.predictions import Predictions
+from bayesmembrane.calibration.run import Run, load_run, predictions_of
+from bayesmembrane.ground.errors import SettingsError, StorageError
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.quiet import arviz
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.rigs.base import Rig
+from bayesmembrane.report.canvas import Measured
+from bayesmembrane.words.calibration import LOOSE, Case
+from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.language import millimetres, spoken_parameter
+
+
+@dataclass(frozen=True, eq=False)
+class Sampling:
+    """How a run was sampled.
+
+    status : "converged", or why it stopped
+    ess, r_hat : of the worst coordinate
+    wanted : effective draws that were asked for
+    tau : (k,) autocorrelation times of the coordinates, steps
+    means : (E, T, k) means over the walkers of each ensemble at ``steps_at`` (T,), burn-in included
+    draws : (E, D, k) some of the draws of each ensemble, in the order of the walk, at the steps ``draws_at`` (D,)
+    """
+
+    status: str
+    ess: float
+    wanted: float
+    r_hat: float
+    tau: Array
+    acceptance: float
+    ensembles: int
+    walkers: int
+    steps: int
+    burn: int
+    evaluations: int
+    seconds: float
+    means: Array
+    steps_at: Array
+    draws: Array
+    draws_at: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Replicas:
+    """Measured forces (N,) N, new readings (N, S) N from the posterior, and the log weights (N, S) with which each
+    stands for the posterior that has not seen its point (Pareto-smoothed); ``shape`` (N,) of the weights' tail.
+    """
+
+    force: Array
+    readings: Array
+    log_weights: Array
+    shape: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """The film, what held it, and its origin in words."""
+
+    name: str
+    thickness: float
+    rig: Rig
+    origin: str
+    files: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """One run.
+
+    x, natural : (S, k) and (S, m) posterior draws in coordinates and natural parameters
+    prior : (P, k) draws of the truncated prior in coordinates; none where the convexity prior leaves next to nothing
+    goodness : of the draw with the largest posterior density (`calibration.goodness`)
+    dominated : the inferred noise exceeds the stated one
+    masses : (mass of the prior, standard error) by convexity mode
+    outcomes : what became of all evaluations
+    cache, crosscheck : tally of the curve cache; what the second solver found
+    facts : settings, versions and the like
+    replicas : new readings, None where the run stored none
+    """
+
+    folder: str
+    hypothesis: Hypothesis
+    film: Film
+    data_hash: str
+    digest: Predictions
+    x: Array
+    natural: Array
+    prior: Array
+    sampling: Sampling
+    goodness: Mapping[str, float | None]
+    dominated: bool
+    outcomes: Mapping[str, int]
+    masses: Mapping[str, tuple[float, float]]
+    cache: Mapping[str, Any]
+    crosscheck: Mapping[str, Any]
+    facts: Mapping[str, Any]
+    replicas: Replicas | None = None
+
+    @property
+    def material(self) -> str:
+        """Name of the material."""
+        return self.hypothesis.material.name
+
+    @property
+    def look(self) -> str:
+        """The name by which pictures choose colour, line and marker: of the material, or of it with its effects."""
+        return self.hypothesis.label()
+
+    @property
+    def name(self) -> str:
+        """Material and effects, for people."""
+        return spoken(self.hypothesis)
+
+    @property
+    def key(self) -> str:
+        """A word for anchors and JSON: material, effects, range."""
+        return f"{self.hypothesis.label()}-{1e3 * self.digest.end:.4g}mm".replace("+", "-").replace(".", "_")
+
+    @cached_property
+    def case(self) -> Case:
+        """The numbers that the answer needs."""
+        d, noise = self.digest, self._extra_noise()
+        fit = self.goodness
+        gd = np.asarray(self.hypothesis.material.shear_modulus(self.hypothesis.films(self.x).T), dtype=float)
+        failed = sum(self.outcomes.get(o.label, 0) for o in FAILURES) / max(1, sum(self.outcomes.values()))
+        low, middle, high = np.quantile(gd, (0.05, 0.5, 0.95)).tolist()
+        force = d.curve[:, -1].tolist()
+        return Case(
+            name=self.name,
+            end=d.end,
+            rmse=float(fit["rmse_N"] or 0.0),
+            own_noise=fit["own_noise_N"],
+            extra_noise=None if noise is None else float(np.median(noise)),
+            dominated=self.dominated,
+            p_value=fit["p_value"],
+            modulus=(low, middle, high),
+            thickness=self.film.thickness,
+            status=self.sampling.status,
+            ess=self.sampling.ess,
+            wanted=self.sampling.wanted,
+            r_hat=self.sampling.r_hat,
+            failed=failed,
+            last=float(d.deflection[-1]),
+            last_force=(force[0], force[1], force[2]),
+            lost={r: float(d.lost[i, -1]) for i, r in enumerate(d.reasons) if d.lost[i, -1] > 0},
+            loose=self._loose(),
+        )
+
+    @property
+    def end(self) -> str:
+        """The largest fitted deflection: ``35.1 mm``."""
+        return millimetres(self.digest.end)
+
+    @property
+    def points(self) -> Measured:
+        """The fitted points."""
+        return Measured(self.digest.at, self.digest.force, self.digest.sd if self.digest.has_noise else None)
+
+    def _extra_noise(self) -> Array | None:
+        names = self.hypothesis.natural_names
+        return self.natural[:, names.index("noise.sd")] if "noise.sd" in names else None
+
+    def _loose(self) -> dict[str, float]:
+        """Coordinates of the curve whose posterior is nearly as wide as the prior, with the ratio of the widths."""
+        found: dict[str, float] = {}
+        if not len(self.prior):
+            return found
+        for i, p in enumerate(self.hypothesis.parameters[: self.hypothesis.curve_size]):
+            wide = float(np.subtract(*np.quantile(self.prior[:, i], (0.95, 0.05))))
+            ratio = float(np.subtract(*np.quantile(self.x[:, i], (0.95, 0.05)))) / wide if wide > 0 else 0.0
+            if ratio >= LOOSE:
+                found[spoken_parameter(p.name)] = ratio
+        return found
+
+
+def by_points(shown: Sequence[Shown]) -> list[list[Shown]]:
+    """Runs fitted to the same points, in order."""
+    return [list(g) for _, g in groupby(in_order(shown), key=lambda s: (s.digest.end, s.data_hash))]
+
+
+def in_order(shown: Sequence[Shown]) -> list[Shown]:
+    """Shorter ranges first; of one range those with fewer parameters."""
+    return sorted(shown, key=lambda s: (s.digest.end, s.data_hash, s.hypothesis.curve_size, s.name))
+
+
+# ---- from the run ----------------------------------------------------------------------------------------------------
+
+MOST_TRACED, MOST_REPLICAS = 300, 1000  # draws of an ensemble in a trace, new readings of each point
+_SHOWN_APART = ("hypothesis", "sampling", "data", "code", "versions", "seed", "fingerprint")
+
+
+def read(run: Run | Path | str) -> Shown:
+    """A run, or the folder that holds one, as a report shows it.
+
+    Of a run that was interrupted before its predictions were stored they are made here, once. Raises `StorageError` if
+    the folder holds no run; `SettingsError` for a run that is not stored.
+    """
+    if not isinstance(run, Run):
+        folder = Path(run)
+        if not folder.is_dir():
+            raise StorageError("there is no such run folder", str(folder), "name a folder under chains/")
+        run = load_run(folder)
+    if run.path is None:
+        raise SettingsError(f'the run "{run.name}" is not stored', remedy="sample with out=")
+    m, h = run.measurement, run.hypothesis
+    p = m.provenance
+    return Shown(
+        folder=str(run.path),
+        hypothesis=h,
+        film=Film(
+            m.specimen.name,
+            m.specimen.thickness,
+            m.rig,
+            p.origin,
+            (p.curve, p.specimen, p.covariance),
+            p.notes,
+        ),
+        data_hash=m.data_hash,
+        digest=predictions_of(run),
+        x=run.draws(),
+        natural=_stacked(run.data.posterior, h.natural_names),
+        prior=_stacked(run.data.prior, h.names) if "prior" in run.data.groups() else np.empty((0, len(h.names))),
+        sampling=_sampling(run),
+        goodness=run.status["goodness"],
+        dominated=bool(run.status["extra_noise_dominates"]),
+        outcomes=run.status["tally"],
+        masses={mode: (v["value"], v["sd"]) for mode, v in run.status["prior_mass"].items()},
+        cache=run.status.get("cache", {}),
+        crosscheck=run.status["crosscheck"],
+        facts=_facts(run),
+        replicas=_replicas(run.data),
+    )
+
+
+def _stacked(group: Any, names: tuple[str, ...]) -> Array:
+    """Draws (S, k) of the named variables, all ensembles together."""
+    return np.stack([np.asarray(group[n].values, dtype=float).ravel() for n in names], axis=1)
+
+
+def _sampling(run: Run) -> Sampling:
+    status = run.status
+    means, steps = _means(run)
+    draws, at = _draws(run)
+    tau = np.array([np.nan if v is None else v for v in (status["tau"][n] for n in run.hypothesis.names)], dtype=float)
+    return Sampling(
+        status=status["status"],
+        ess=_number(status["ess_bulk"], 0.0),
+        wanted=status["ess_wanted"],
+        r_hat=_number(status["r_hat"], np.inf),
+        tau=tau,
+        acceptance=status["acceptance"],
+        ensembles=int(run.data.posterior.sizes["chain"]),
+        walkers=status["walkers"],
+        steps=status["steps"],
+        burn=status["burn"],
+        evaluations=status["evaluations"],
+        seconds=status["seconds"],
+        means=means,
+        steps_at=steps,
+        draws=draws,
+        draws_at=at,
+    )
+
+
+def _number(value: float | None, missing: float) -> float:
+    return missing if value is None else float(value)
+
+
+def _means(run: Run) -> tuple[Array, Array]:
+    """Means over the walkers (E, T, k) at steps (T,): of the whole walk if it was stored, else of the stored draws."""
+    constant = run.data.constant_data
+    if "ensemble_mean" in constant:
+        return np.asarray(constant["ensemble_mean"].values, float), np.asarray(constant["ensemble_step"].values, float)
+    x = _walked(run)
+    ensembles, draws, k = x.shape
+    walkers = run.status["walkers"] if draws % run.status["walkers"] == 0 else 1
+    means = x.reshape(ensembles, -1, walkers, k).mean(axis=2)
+    return means, np.linspace(run.status["burn"], run.status["steps"], means.shape[1])
+
+
+def _walked(run: Run) -> Array:
+    """All stored draws (E, D, k), step after step, of each step all walkers."""
+    return np.stack([np.asarray(run.data.posterior[n].values, float) for n in run.hypothesis.names], axis=-1)
+
+
+def _draws(run: Run) -> tuple[Array, Array]:
+    """At most `MOST_TRACED` draws of each ensemble (E, D, k), and their steps (D,)."""
+    x = _walked(run)
+    at = np.linspace(run.status["burn"], run.status["steps"], x.shape[1])
+    keep = np.unique(np.linspace(0, x.shape[1] - 1, min(x.shape[1], MOST_TRACED)).astype(int))
+    return x[:, keep], at[keep]
+
+
+def _replicas(data: Any) -> Replicas | None:
+    if not {"posterior_predictive", "log_likelihood"} <= set(data.groups()):
+        return None
+    readings, likelihood = (
+        np.asarray(g["force"].values, dtype=float).reshape(-1, data.observed_data["force"].size)
+        for g in (data.posterior_predictive, data.log_likelihood)
+    )
+    thin = max(1, len(readings) // MOST_REPLICAS)
+    weights, shape = arviz.psislw(-likelihood[::thin].T)  # type: ignore[no-untyped-call]
+    force = np.asarray(data.observed_data["force"].values, dtype=float)
+    return Replicas(force, readings[::thin].T, np.asarray(weights), np.asarray(shape))
+
+
+def _facts(run: Run) -> dict[str, Any]:
+    """Settings and versions as names and values."""
+    asked = run.settings
+    facts: dict[str, Any] = {f"hypothesis: {k}": v for k, v in asked["hypothesis"].items()}
+    facts |= {f"sampling: {k}": v for k, v in asked["sampling"].items()}
+    facts |= {"seed": asked["seed"], "fingerprint": asked["fingerprint"], "code (SHA-256)": asked["code"]["sha256"]}
+    facts |= {f"version of {k}": v for k, v in asked["versions"].items()}
+    facts |= {k: v for k, v in asked.items() if k not in _SHOWN_APART}
+    return facts | {"folder": run.name}

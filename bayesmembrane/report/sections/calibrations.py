@@ -1,0 +1,193 @@
+"""The calibrations side by side: how well each fits, losses beside the paper's, parameters across ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from bayesmembrane.calibration.beside_paper import Compared
+from bayesmembrane.report.blocks import Block, Column, Figure, Picture, Table, Text, points
+from bayesmembrane.report.canvas import Interval, draw_interval, encoded, new_figure, style
+from bayesmembrane.report.runs import Shown, in_order
+from bayesmembrane.report.sections.base import Section, Subject, of_kind
+from bayesmembrane.report.style import FAINT, with_unit
+from bayesmembrane.words.beside_paper import LossPair, losses
+from bayesmembrane.words.calibration import answer, details, overview, verdict
+from bayesmembrane.words.hypothesis import material_title
+from bayesmembrane.words.language import listed, spoken_parameter
+
+
+class CalibrationsSection(Section):
+    """What describes which range, how stiff the film is, and whether one set of parameters serves several ranges."""
+
+    name = "comparison"
+    title = "Comparison"
+    order = 40
+    shows = Compared
+
+    def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
+        shown, beside = in_order(of_kind(results, Shown)), of_kind(results, Compared)
+        out: list[Block] = []
+        if shown:
+            out += [*points(details([s.case for s in shown])), fits_table(shown)]
+        if beside:
+            told = losses([LossPair(material_title(c.material), c.range, c.ours, c.evaluated) for c in beside])
+            out += [*([Text(told)] if told else []), losses_table(beside)]
+        for _, group in groupby(sorted(shown, key=lambda s: s.hypothesis.label()), lambda s: s.hypothesis.label()):
+            runs = sorted(group, key=lambda s: s.digest.end)
+            out += [_forest(runs)] if len(runs) > 1 else []
+        return out
+
+    def answer(self, results: Sequence[Any]) -> Sequence[str]:
+        shown = in_order(of_kind(results, Shown))
+        return answer([s.case for s in shown]) if shown else ()
+
+    def subject(self, results: Sequence[Any]) -> Subject | None:
+        shown = in_order(of_kind(results, Shown))
+        if not shown:
+            return None
+        return Subject(tuple(dict.fromkeys(s.film.name for s in shown)), overview([s.case for s in shown]))
+
+
+# ---- tables ----------------------------------------------------------------------------------------------------------
+
+
+def fits_table(shown: Sequence[Shown]) -> Table:
+    """How well each run's curve fits, judged by the measurement's own noise."""
+    columns = (
+        Column("run", "material"),
+        Column("end_mm", "fitted up to (mm)"),
+        Column("points", "points", "d"),
+        Column("parameters", "parameters", "d"),
+        Column("rmse_mN", "rms residual (mN)", ".3g"),
+        Column("max_mN", "largest residual (mN)", ".3g"),
+        Column("loss_N", "loss (N)"),
+        Column("own_noise_mN", "stated noise (mN)", ".3g"),
+        Column("extra_noise_mN", "inferred extra noise (mN)", ".3g"),
+        Column("reduced_chi2", "reduced chi-square", ".3g"),
+        Column("p_value", "p-value", "p"),
+        Column("verdict", "verdict"),
+    )
+    rows = []
+    for s in shown:
+        fit, case = s.goodness, s.case
+        rows.append(
+            (
+                s.name,
+                1e3 * s.digest.end,
+                int(s.digest.at.size),
+                s.hypothesis.curve_size,
+                1e3 * (fit["rmse_N"] or 0.0),
+                1e3 * (fit["max_N"] or 0.0),
+                fit["loss_N"],
+                _milli(fit["own_noise_N"]),
+                _milli(case.extra_noise),
+                fit["reduced_chi2"],
+                fit["p_value"],
+                verdict(case),
+            )
+        )
+    return Table(
+        "fits",
+        "Residuals of the most probable draw of each run: forces in N and mN, deflections in mm. Chi-square and "
+        "p-value use the noise that the measurement states, never the inferred one.",
+        columns,
+        tuple(rows),
+    )
+
+
+def _milli(value: float | None) -> float | None:
+    return None if value is None else 1e3 * value
+
+
+def losses_table(compared: Sequence[Compared]) -> Table:
+    """Our losses beside the paper's."""
+    columns = (
+        Column("material", "material"),
+        Column("range", "range"),
+        Column("ours_N", "ours", ".5g"),
+        Column("ours_convex_N", "ours, convex on reached states", ".5g"),
+        Column("paper_printed_N", "paper, printed", ".5g"),
+        Column("paper_evaluated_N", "paper's parameters, re-evaluated", ".5g"),
+        Column("ratio", "ours / re-evaluated (-)", ".3f"),
+        Column("at_bound", "at a bound"),
+    )
+    rows = tuple(
+        (
+            material_title(c.material),
+            c.range,
+            c.ours,
+            c.constrained,
+            c.printed,
+            c.evaluated,
+            c.ours / c.evaluated if c.evaluated else None,
+            ", ".join(spoken_parameter(n) for n in c.at_bound) or None,
+        )
+        for c in compared
+    )
+    caption = (
+        "Losses in N: Euclidean norm of measured minus computed force over the points of a range. Re-evaluated: the "
+        "paper's optimum of that range, with our solver, on the reconstructed curve."
+    )
+    return Table("losses", caption, columns, rows).without_empty()
+
+
+# ---- parameters across ranges ----------------------------------------------------------------------------------------
+
+
+def _forest(runs: Sequence[Shown]) -> Figure:
+    h = runs[0].hypothesis
+    parameters = {
+        name: [Interval(s.end, s.look, np.quantile(s.natural[:, i], (0.05, 0.5, 0.95))) for s in runs]
+        for i, name in enumerate(h.natural_names)
+    }
+    units = dict(zip(h.natural_names, h.natural_units, strict=True))
+    ends = listed(f"{1e3 * s.digest.end:.4g}" for s in runs)
+    names = listed(f"{spoken_parameter(n)} ({units[n]})" for n in parameters)
+    return Figure(
+        forest_picture(parameters, units),
+        alt=f"Intervals of the parameters of {runs[0].name} for the fitted ranges {ends} mm",
+        caption=f"{runs[0].name}: medians and 90 % intervals of {names}, fitted up to {ends} mm. Intervals that do not "
+        "overlap say that one set of parameters cannot serve both ranges.",
+    )
+
+
+def forest_picture(
+    parameters: Mapping[str, Sequence[Interval]], units: Mapping[str, str], kind: str = "svg"
+) -> Picture:
+    """Parameters across runs: one panel per parameter, one row per run; 90 % intervals and medians."""
+    names = list(parameters)
+    columns = min(3, len(names))
+    rows = -(-len(names) // columns)
+    tallest = max(len(v) for v in parameters.values())
+    with style():
+        figure = new_figure(0.5 + rows * (0.75 + 0.27 * tallest))
+        grid = figure.subplots(rows, columns, squeeze=False)
+        for k, ax in enumerate(grid.flat):
+            if k >= len(names):
+                ax.set_visible(False)
+                continue
+            _forest_panel(ax, parameters[names[k]], with_unit(names[k], units.get(names[k]) or "-"))
+            if k % columns and _same_labels(parameters[names[k]], parameters[names[k - 1]]):
+                ax.tick_params(labelleft=False)
+        return encoded(figure, kind)
+
+
+def _same_labels(a: Sequence[Interval], b: Sequence[Interval]) -> bool:
+    return [i.label for i in a] == [i.label for i in b]
+
+
+def _forest_panel(ax: Axes, intervals: Sequence[Interval], label: str) -> None:
+    for y, interval in enumerate(intervals):
+        draw_interval(ax, interval, y)
+    ax.set_yticks(range(len(intervals)), [i.label for i in intervals], fontsize=9.5)
+    ax.set_ylim(len(intervals) - 0.5, -0.5)
+    ax.xaxis.set_major_locator(MaxNLocator(4))
+    ax.set_xlabel(label)
+    ax.margins(x=0.08)
+    ax.grid(axis="x", color=FAINT, linewidth=0.6)

@@ -1,0 +1,210 @@
+"""The curves: measured points, medians and 90 % bands of every material, extrapolation, and the residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, NullFormatter
+from numpy.typing import NDArray
+
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.report.blocks import Block, Figure, Picture, points
+from bayesmembrane.report.canvas import Measured, Shade, band, encoded, errorbars, legend_columns, new_figure, style
+from bayesmembrane.report.runs import Shown, by_points
+from bayesmembrane.report.sections.base import Section, of_kind
+from bayesmembrane.report.style import FAINT, INK, MUTED, SHADE, colour, linestyle, marker
+from bayesmembrane.words.calibration import held_out
+from bayesmembrane.words.language import listed
+
+
+class CurvesSection(Section):
+    """A picture for each set of fitted points, and what the curves say of points that were not used."""
+
+    name = "curves"
+    title = "Curves and residuals"
+    order = 30
+
+    def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
+        return [b for group in by_points(of_kind(results, Shown)) for b in _blocks(group)]
+
+
+def _blocks(group: Sequence[Shown]) -> list[Block]:
+    names, end = listed(s.name for s in group), group[0].end
+    figure = Figure(
+        first_look([look_of(group)]),
+        alt=f"Measured force against deflection up to {end} with the curves of {names}, and their residuals",
+        caption=f"Force (N) against deflection (mm), fitted up to {end}: median curves and 90 % bands of {names}. "
+        "Beyond the fitted range curves are dashed and bands hatched: there only the form of the energy and the priors "
+        "speak. Below: measured minus median force (N); the grey band is two standard deviations of the stated noise. "
+        "The vertical axis of the residuals is logarithmic away from zero where it has to be.",
+    )
+    return [figure, *points([held_out(s.name, s.digest.rest_residual) for s in group if s.digest.rest_at.size])]
+
+
+def look_of(group: Sequence[Shown]) -> Panel:
+    """The picture of runs that were fitted to the same points."""
+    d = group[0].digest
+    rest = None
+    if d.rest_at.size:
+        rest = Measured(d.rest_at, d.rest_force, d.rest_sd if np.all(np.isfinite(d.rest_sd)) else None)
+    curves = tuple(
+        Fitted(s.look, s.digest.deflection, s.digest.curve, s.digest.beyond, s.digest.residual, s.name) for s in group
+    )
+    return Panel(group[0].points, curves, rest, f"Fitted up to {group[0].end}")
+
+
+# ---- the picture -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What one model says: 5, 50 and 95 % of the force (3, G) N at ``deflection`` (G,) m, and the residuals.
+
+    ``beyond`` (G,) is True where the deflection lies outside the fitted range; ``residual`` (3, N) N is measured minus
+    computed force at the measured points.
+    """
+
+    look: str
+    deflection: Array
+    force: Array
+    beyond: NDArray[np.bool_]
+    residual: Array
+    label: str
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One set of points with the curves fitted to it; ``rest`` are points that were not used."""
+
+    points: Measured
+    curves: tuple[Fitted, ...]
+    rest: Measured | None = None
+    heading: str = ""
+
+
+def first_look(looks: Sequence[Panel], kind: str = "svg") -> Picture:
+    """The measured curve, the materials' medians and 90 % bands, extrapolation dashed; the residuals beneath."""
+    with style():
+        figure = new_figure(6.4)
+        grid = figure.subplots(2, len(looks), sharex="col", squeeze=False, height_ratios=(2.3, 1))
+        for i, look in enumerate(looks):
+            _look(grid[0, i], look, first=i == 0)
+            _look_residuals(grid[1, i], look, first=i == 0)
+        if len(looks) > 1:
+            _same_limits([grid[0, i] for i in range(len(looks))])
+        handles = _look_legend(looks)
+        columns = legend_columns([str(h.get_label()) for h in handles], 4)
+        figure.legend(handles=handles, loc="outside upper center", ncols=columns, columnspacing=1.4, handlelength=2.4)
+        return encoded(figure, kind)
+
+
+def _look(ax: Axes, look: Panel, first: bool) -> None:
+    end = 1e3 * float(np.max(look.points.deflection))
+    for curve in look.curves:
+        _curve(ax, curve)
+    last = max([end, *(1e3 * float(c.deflection[-1]) for c in look.curves)])
+    lowest, top = _reach(look, 1e-3 * last)
+    if last > end * (1 + 1e-6):
+        ax.axvspan(end, last, color=SHADE, zorder=0)
+        narrow = last - end < 0.3 * last
+        ax.text(
+            last * 0.995 if narrow else end + 0.015 * last,
+            top - 0.015 * (top - lowest),
+            "extrapolation",
+            color=MUTED,
+            ha="right" if narrow else "left",
+            va="top",
+            rotation=90 if narrow else 0,
+            fontsize=9.5,
+            style="italic",
+        )
+    errorbars(ax, look.points, filled=True)
+    if look.rest is not None and look.rest.deflection.size:
+        errorbars(ax, look.rest, filled=False)
+    ax.set_ylim(lowest - 0.02 * top, top)
+    ax.set_xlim(0, last)
+    ax.set_title(look.heading)
+    ax.grid(color=FAINT, linewidth=0.6)
+    if first:
+        ax.set_ylabel("force (N)")
+
+
+def _reach(look: Panel, last: float) -> tuple[float, float]:
+    """The vertical axis: all measured points up to the deflection ``last``, m, with a margin."""
+    parts = [look.points] + ([look.rest] if look.rest is not None else [])
+    seen = np.concatenate([p.force[p.deflection <= last * (1 + 1e-9)] for p in parts])
+    return min(0.0, 1.12 * float(np.min(seen))), 1.12 * float(np.max(seen))
+
+
+def _curve(ax: Axes, curve: Fitted) -> None:
+    x, c = 1e3 * curve.deflection, colour(curve.look)
+    inside = ~curve.beyond
+    band(ax, x, curve.force, inside, Shade(c, 0.25))
+    ax.plot(x[inside], curve.force[1][inside], color=c, zorder=3)
+    if np.any(curve.beyond):
+        outside = curve.beyond.copy()
+        outside[max(0, int(np.argmax(curve.beyond)) - 1)] = True  # joined to the inside
+        band(ax, x, curve.force, outside, Shade(c, 0.12, "////"))
+        ax.plot(x[outside], curve.force[1][outside], color=c, linestyle=(0, (4, 2)), linewidth=1.5, zorder=3)
+
+
+def _look_residuals(ax: Axes, look: Panel, first: bool) -> None:
+    x, n = 1e3 * look.points.deflection, look.points.deflection.size
+    if look.points.sd is not None:
+        order = np.argsort(x)
+        sd = 2 * look.points.sd[order]
+        ax.fill_between(x[order], -sd, sd, color=FAINT, lw=0, zorder=1)
+    ax.axhline(0, color=INK, linewidth=0.8)
+    for curve in look.curves:
+        c = colour(curve.look)
+        mark = marker(curve.look) if n <= 60 else "none"
+        line = linestyle(curve.look)
+        ax.plot(x, curve.residual[1], color=c, linewidth=1.1, linestyle=line, marker=mark, markersize=3.5)
+    _residual_scale(ax, [c.residual[1] for c in look.curves], look.points.sd)
+    ax.set_xlabel("deflection (mm)")
+    ax.grid(color=FAINT, linewidth=0.6)
+    if first:
+        ax.set_ylabel("residual (N)")
+
+
+def _residual_scale(ax: Axes, residuals: Sequence[Array], sd: Array | None) -> None:
+    """Linear, unless the worst material would flatten the best: then linear near zero and logarithmic beyond."""
+    sizes = [float(np.nanmax(np.abs(r))) for r in residuals if np.any(np.isfinite(r))]
+    if not sizes:
+        return
+    reach = 1.15 * max(sizes + ([2 * float(np.max(sd))] if sd is not None else []))
+    if max(sizes) > 12 * min(sizes):
+        linear = 10 ** np.floor(np.log10(2 * min(sizes)))
+        ax.set_yscale("symlog", linthresh=linear, linscale=0.8)
+        ax.yaxis.set_minor_formatter(NullFormatter())
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    ax.set_ylim(-reach, reach)
+
+
+def _same_limits(axes: Sequence[Axes]) -> None:
+    low, high = min(ax.get_ylim()[0] for ax in axes), max(ax.get_ylim()[1] for ax in axes)
+    for ax in axes:
+        ax.set_ylim(low, high)
+
+
+def _look_legend(looks: Sequence[Panel]) -> list[Any]:
+    curves = {c.label: c for look in looks for c in look.curves}
+    handles: list[Any] = [
+        Line2D([], [], color=INK, marker="o", linestyle="none", markersize=4.5, label="measured (bars: 2 sd)")
+    ]
+    if any(look.rest is not None and look.rest.deflection.size for look in looks):
+        handles.append(
+            Line2D(
+                [], [], color=INK, marker="o", markerfacecolor="white", linestyle="none", markersize=4.5,
+                label="measured, not used",
+            )
+        )  # fmt: skip
+    for name, c in curves.items():
+        line, mark = linestyle(c.look), marker(c.look)
+        handles.append(Line2D([], [], color=colour(c.look), linestyle=line, marker=mark, markersize=4, label=name))
+    return handles

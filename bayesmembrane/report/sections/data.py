@@ -1,0 +1,71 @@
+"""The data: what was measured, on which film and rig, and where it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bayesmembrane.physics.rigs.base import Strip
+from bayesmembrane.reconstruction.result import Reconstruction
+from bayesmembrane.report.blocks import Block, Table, Text, facts_table
+from bayesmembrane.report.runs import Film, Shown, by_points
+from bayesmembrane.report.sections.base import Section, of_kind
+from bayesmembrane.words.language import listed
+from bayesmembrane.words.origin import origin
+
+
+class DataSection(Section):
+    """One table for each set of fitted points."""
+
+    name = "data"
+    title = "Data"
+    order = 20
+
+    def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
+        shown = of_kind(results, Shown)
+        if not shown:
+            return ()
+        out: list[Block] = [Text(origin(r)) for r in of_kind(results, Reconstruction)]
+        before = ""
+        for group in by_points(shown):
+            out.append(_table(group[0], before))
+            before = group[0].film.origin
+        return out
+
+
+def _table(s: Shown, before: str) -> Table:
+    """What is known of a measurement; an origin that is that of the table ``before`` is not told again."""
+    d, film = s.digest, s.film
+    noise = (
+        f"stated noise {1e3 * float(np.min(d.sd)):.3g} to {1e3 * float(np.max(d.sd)):.3g} mN (sd)"
+        if d.has_noise
+        else "no stated noise: it is inferred"
+    )
+    facts = {
+        "specimen": film.name,
+        "thickness": f"{1e6 * film.thickness:.4g} um",
+        "rig": _rig(film),
+        "points": f"{d.at.size}, from {1e3 * float(np.min(d.at)):.4g} to {s.end} of deflection",
+        "forces": f"{float(np.min(d.force)):.4g} to {float(np.max(d.force)):.4g} N; {noise}",
+        "whole measurement": f"up to {1e3 * d.full_range:.4g} mm",
+        "files": ", ".join(f for f in film.files if f) or "-",
+        "origin": "as above" if before and film.origin == before else film.origin or "not stated",
+        "notes": "; ".join(film.notes) or "none",
+        "data hash (SHA-256)": s.data_hash,
+    }
+    return facts_table(f"data up to {s.end}", f"The measurement, fitted up to {s.end}.", facts)
+
+
+def _rig(film: Film) -> str:
+    """Its lengths, and for a strip what stress and stretch the page's forces and deflections stand for."""
+    rig = film.rig
+    lengths = listed(f"{name.replace('_', ' ')} {1e3 * v:.4g} mm" for name, v in rig.lengths.items())
+    if not isinstance(rig, Strip):
+        return f"{rig.title}, {lengths}"
+    shown = rig.shown(film.thickness)
+    return (
+        f"{rig.title}, {lengths}; forces are nominal stress times width times thickness, 1 N for "
+        f"{shown['N'][0]:.4g} kPa, and 1 mm of deflection is {1e-3 * shown['m'][0]:.4g} of stretch"
+    )

@@ -1,0 +1,143 @@
+"""The tables of a diagnosis: errors, candidates, effects that look alike, effects that would have shown."""
+
+from __future__ import annotations
+
+import math
+
+from bayesmembrane.diagnosis.left.heldout import Misfit
+from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.diagnosis.thresholds import EXPLANATION
+from bayesmembrane.ground.registry import components
+from bayesmembrane.report.blocks import Column, Table, Value
+from bayesmembrane.words.candidates import candidate_title, sizes
+from bayesmembrane.words.diagnosis import set_aside, size_in_words
+from bayesmembrane.words.hypothesis import effect_title, spoken
+from bayesmembrane.words.language import spoken_parameter
+
+MOST_CANDIDATES = 20
+
+ERRORS = (
+    Column("model", "model"),
+    Column("rmse_mN", "root mean square (mN)", ".3g"),
+    Column("max_mN", "largest (mN)", ".3g"),
+    Column("reduced_chi2", "reduced chi-square", ".3f"),
+    Column("heldout_rmse_mN", "held out: root mean square (mN)", ".3g"),
+    Column("heldout_max_mN", "held out: largest (mN)", ".3g"),
+    Column("heldout_reduced_chi2", "held out: reduced chi-square", ".3f"),
+    Column("heldout_coverage_90", "held out: inside the 90 % band", "%"),
+)
+
+
+def errors_caption(where: str) -> str:
+    """What a table of errors says; ``where`` : which points were held out."""
+    return (
+        "Residuals before and after, by the measurement's own noise (a reduced chi-square of 1 is noise alone). Held "
+        f"out: {where}; predicted by the model fitted to the other points."
+    )
+
+
+def error_cells(error: Misfit | None) -> tuple[Value, ...]:
+    """An error in three cells."""
+    return (None, None, None) if error is None else (1e3 * error.rmse_N, 1e3 * error.max_N, error.reduced_chi2)
+
+
+def before_and_after(d: Diagnosis, name: str) -> Table:
+    """Errors of the model as given and, if something was found, of the most probable one."""
+    v = d.validation
+    rows = [
+        (
+            spoken(d.null.hypothesis),
+            *error_cells(d.before),
+            *error_cells(v.before if v else None),
+            v.covered_before if v else None,
+        )
+    ]
+    if d.best is not d.null:
+        rows.append(
+            (
+                spoken(d.best.hypothesis),
+                *error_cells(d.after),
+                *error_cells(v.after if v else None),
+                v.covered_after if v else None,
+            )
+        )
+    return Table(name, errors_caption(set_aside(v)), ERRORS, tuple(rows))
+
+
+def ranking_table(d: Diagnosis, name: str) -> Table:
+    """Every candidate that was refitted, the most probable first."""
+    columns = (
+        Column("candidate", "candidate"),
+        Column("size", "size"),
+        Column("log_bayes_factor", "ln Bayes factor", "+.1f"),
+        Column("unexplained", "unexplained", "%"),
+        Column("explains", "explains it"),
+        Column("at_bound", "at a bound"),
+        Column("in_answer", "in the answer"),
+    )
+    members = {j.candidate.label for j in d.members} if d.verdict != "unknown" else set()
+    rows = []
+    for j in d.ranking[:MOST_CANDIDATES]:
+        c = j.candidate
+        rows.append(
+            (
+                candidate_title(c, d.null),
+                ", ".join(sizes(c, d.null)) or "-",
+                j.log_evidence - d.null.log_evidence,
+                j.unexplained,
+                j.explains,
+                ", ".join(spoken_parameter(n) for n in c.at_bound) or "-",
+                c.label in members,
+            )
+        )
+    caption = (
+        f"What could explain the residual of {spoken(d.null.hypothesis)}: each candidate was refitted with "
+        "the material. ln Bayes factor: against the model as it was (Laplace approximation). Unexplained: part of the "
+        "lack of fit that is left; a candidate explains the curve if that is noise, or at most "
+        f"{100 * EXPLANATION.unexplained:g} %."
+    )
+    if len(d.ranking) > MOST_CANDIDATES:
+        caption += f" The {MOST_CANDIDATES} most probable of {len(d.ranking)}."
+    return Table(name, caption, columns, tuple(rows))
+
+
+def confounded_table(d: Diagnosis, name: str) -> Table:
+    """Pairs of effects whose traces are nearly the same on this protocol."""
+    columns = (
+        Column("effect", "effect"),
+        Column("other", "and"),
+        Column("degrees", "degrees between their traces", ".1f"),
+    )
+    rows = tuple((effect_title(a), effect_title(b), v) for a, b, v in d.confounded)
+    caption = (
+        "Effects that this measurement hardly tells apart, whichever is at work: angle between what they leave in the "
+        "residual after the material has absorbed its part (0: the same, 90: nothing in common)."
+    )
+    return Table(name, caption, columns, rows)
+
+
+def power_table(d: Diagnosis, name: str) -> Table:
+    """The smallest size of each effect that would have shown, the easiest to see first."""
+    columns = (
+        Column("effect", "effect"),
+        Column("parameter", "size"),
+        Column("smallest", "smallest that shows"),
+        Column("usual", "usual"),
+        Column("ratio", "smallest over usual", ".2g"),
+    )
+    known = components("effects")
+    rows = []
+    for effect, smallest in d.power.items():
+        size = known[effect]().size
+        if math.isfinite(smallest):
+            words = (size_in_words(v, size.unit) for v in (smallest, size.scale))
+            rows.append(
+                (effect_title(effect), spoken_parameter(f"{effect}.{size.name}"), *words, smallest / size.scale)
+            )
+    rows.sort(key=lambda r: float(r[-1]))
+    caption = (
+        f"What this measurement could have shown beside {spoken(d.null.hypothesis)}: the smallest effect "
+        "that the tests would have found nine times out of ten, beside what is usual before the data. An effect whose "
+        "ratio is above 1 could be there, of usual size, and not be seen."
+    )
+    return Table(name, caption, columns, tuple(rows))

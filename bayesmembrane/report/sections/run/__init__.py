@@ -1,0 +1,206 @@
+"""One run: its parameters, residuals, draws, convexity and shapes. A part of the page for each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from bayesmembrane.calibration import store
+from bayesmembrane.calibration.beside_paper import Compared
+from bayesmembrane.calibration.run import Run
+from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.report.blocks import Block, Figure, Heading, Part, Text
+from bayesmembrane.report.runs import Shown, in_order, read
+from bayesmembrane.report.sections.base import Glance, Section, of_kind
+from bayesmembrane.report.sections.run.draws import (
+    Marginal,
+    Walk,
+    calibration_picture,
+    corner_plot,
+    prior_posterior,
+    traces,
+)
+from bayesmembrane.report.sections.run.film import Plane, Shapes, convexity_map, profiles, residual_picture
+from bayesmembrane.report.sections.run.tables import coordinates_table, parameters_table
+from bayesmembrane.words.calibration import convergence, describes, extrapolation, unknown, verdict, warnings
+from bayesmembrane.words.language import listed, newtons, percent, spoken_parameter
+
+MOST_CORNER = 4000  # draws in a corner plot
+TRUSTED = 0.7  # tail of the weights up to which a prediction without a point can be told from one with it
+
+
+class RunSection(Section):
+    """Every run under a heading of its own."""
+
+    name = "runs"
+    title = "Runs"
+    order = 90
+    shows = Run
+
+    def reads(self, folder: Path) -> Any | None:
+        stored = (folder / store.ASKED).is_file() and (folder / store.STATUS).is_file()
+        return read(folder) if stored else None
+
+    def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
+        parts = self.parts(results)
+        return [b for p in parts for b in (Heading(p.title), *p.blocks)]
+
+    def parts(self, results: Sequence[Any]) -> Sequence[Part]:
+        shown = [*of_kind(results, Shown), *map(read, of_kind(results, Run))]
+        compared = of_kind(results, Compared)
+        return [
+            Part(s.key, f"{s.name}, fitted up to {s.end}", tuple(_blocks(s, _beside(s, compared))))
+            for s in in_order(shown)
+        ]
+
+    def warnings(self, results: Sequence[Any]) -> Sequence[str]:
+        return warnings([s.case for s in in_order(of_kind(results, Shown))])
+
+    def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
+        return [
+            Glance(
+                "calibration",
+                f"{s.name}, up to {s.end}",
+                f"rms residual {newtons(s.case.rmse)}, {verdict(s.case)}; {s.sampling.status}",
+            )
+            for s in in_order(of_kind(results, Shown))
+        ]
+
+    def text(self, result: Any) -> str:
+        shown = result if isinstance(result, Shown) else read(result)
+        return "\n".join([f"{shown.name}, fitted up to {shown.end}", *_sentences(shown)])
+
+
+def _beside(s: Shown, compared: Sequence[Compared]) -> Compared | None:
+    """The optima that belong to a run without effects."""
+    fits = (c for c in compared if c.material == s.material and abs(c.end - s.digest.end) <= 1e-6 * s.digest.end)
+    return None if s.hypothesis.effects else next(fits, None)
+
+
+def _blocks(s: Shown, compared: Compared | None) -> list[Block]:
+    return [
+        *map(Text, _sentences(s)),
+        parameters_table(s, compared),
+        _residuals(s),
+        *_calibrated(s),
+        _corner(s, compared),
+        _priors(s) if len(s.prior) else Text("The convexity prior leaves next to no prior draws to show."),
+        _traces(s),
+        _map(s),
+        *_profiles(s),
+        coordinates_table(s),
+    ]
+
+
+def _sentences(s: Shown) -> list[str]:
+    told = [describes([s.case]), unknown([s.case]), extrapolation([s.case]), convergence([s.case])]
+    return [t for t in told if t]
+
+
+def _residuals(s: Shown) -> Figure:
+    unit = "in units of the stated noise (sd)" if s.digest.has_noise else "in N"
+    return Figure(
+        residual_picture(s.points, s.digest.residual, s.look),
+        alt=f"Residuals of {s.name} against deflection {unit}",
+        caption=f"{s.name}: measured minus computed force {unit} against deflection (mm), with the 90 % band of the "
+        "posterior. The grey bands are one and two standard deviations. Residuals that follow each other with one "
+        "sign say that the curve has another shape, or that the errors of the points depend on each other.",
+    )
+
+
+def _calibrated(s: Shown) -> list[Block]:
+    if s.replicas is None:
+        return []
+    doubtful = int((s.replicas.shape > TRUSTED).sum())
+    some = f" Of {doubtful} of the {s.replicas.shape.size} points the draws cannot quite tell it." if doubtful else ""
+    return [
+        Figure(
+            calibration_picture(s.replicas, s.look),
+            alt=f"Whether readings predicted by {s.name} spread as the measured points do",
+            caption=f"{s.name}: each point is predicted by the posterior without it, noise included. Its place is the "
+            "share (-) of the predicted readings that lie below it; the curve is the place minus the rank among all "
+            "places (-), zero if the spread is right. Where it leaves the grey area, the noise or the form is wrong."
+            f"{some}",
+        )
+    ]
+
+
+def _corner(s: Shown, compared: Compared | None) -> Figure:
+    h = s.hypothesis
+    thin = s.natural[:: max(1, len(s.natural) // MOST_CORNER)]
+    optimum = published = None
+    marked = ""
+    if compared is not None:
+        held = compared.held_parameters or compared.parameters
+        own = [n.partition(".")[2] if n.startswith(f"{s.material}.") else "" for n in h.natural_names]
+        optimum = [held.get(n) for n in own]
+        published = [compared.published.get(n) for n in own] if compared.published else None
+        marked = (
+            " Crosses: our least-squares optimum under the convexity prior, and the paper's, where they lie inside."
+        )
+    names = listed(f"{spoken_parameter(n)} ({u})" for n, u in zip(h.natural_names, h.natural_units, strict=True))
+    return Figure(
+        corner_plot(thin, h.natural_names, h.natural_units, s.look, optimum, published),
+        alt=f"Corner plot of the parameters of {s.name}",
+        caption=f"{s.name}: posterior of {names}, one by one and in pairs (regions that hold 50 % and 90 %; dashed: "
+        f"5, 50 and 95 %; axes are logarithmic where a parameter spans more than a decade).{marked}",
+    )
+
+
+def _coordinates(s: Shown) -> str:
+    return listed(f"{spoken_parameter(p.name)} ({p.unit})" for p in s.hypothesis.parameters)
+
+
+def _priors(s: Shown) -> Figure:
+    marginals = [Marginal(p.name, p.unit, s.prior[:, i], s.x[:, i]) for i, p in enumerate(s.hypothesis.parameters)]
+    return Figure(
+        prior_posterior(marginals, s.look),
+        alt=f"Prior and posterior of the sampled coordinates of {s.name}",
+        caption=f"{s.name}: what the data add to the prior, for {_coordinates(s)}; each scaled to its own maximum.",
+    )
+
+
+def _traces(s: Shown) -> Figure:
+    p, w = s.hypothesis.parameters, s.sampling
+    walk = Walk([c.name for c in p], [c.unit for c in p], w.draws, w.draws_at, w.means, w.steps_at, w.burn)
+    whole = w.steps_at[0] < w.burn
+    discarded = "What is shaded was discarded." if whole else f"The first {w.burn} steps were discarded."
+    return Figure(
+        traces(walk),
+        alt=f"Draws and means of the ensembles of {s.name} against the step",
+        caption=f"{s.name}: for {_coordinates(s)}, the density of each ensemble's draws, its draws (pale) and the mean "
+        f"over its walkers against the step (-). {discarded} Ensembles that stay apart, or drift, have not converged.",
+    )
+
+
+def _map(s: Shown) -> Figure:
+    d = s.digest
+    shares = listed(f"{m} {percent(v)}" for m, v in d.convex.items())
+    annulus = isinstance(s.film.rig, Annulus)
+    states = "the states that its film passes from the ring to the disc" if annulus else "the state of the film"
+    plane = Plane(d.map_1, d.map_2, d.eigenvalue, d.shape_at, d.state_1, d.state_2)
+    return Figure(
+        convexity_map(plane, s.material),
+        alt=f"Map of the convexity of {s.name} over the stretches, with the states that the film reaches",
+        caption=f"{s.name}: least eigenvalue of the Hessian of the energy over G d (-) in the plane of the stretches "
+        f"(-), for the draw nearest to the median curve, and {states} at several deflections (mm). Convexity prior: "
+        f"{s.hypothesis.convexity.name}; posterior draws that meet each mode: {shares}.",
+    )
+
+
+def _profiles(s: Shown) -> list[Block]:
+    """The lifted film; a strip is as long as it is stretched, and needs no picture."""
+    d, rig = s.digest, s.film.rig
+    if not isinstance(rig, Annulus):
+        return []
+    at = listed(f"{1e3 * x:.3g}" for x in d.shape_at)
+    shapes = Shapes(d.shape_at, d.shape_radius, d.shape_height, rig.inner_radius, rig.outer_radius)
+    return [
+        Figure(
+            profiles(shapes, s.look),
+            alt=f"Deformed film of {s.name} at {at} mm",
+            caption=f"{s.name}: the deformed film, height (mm) against radius (mm), at deflections of {at} mm; one "
+            f"thin line for each of {d.shape_radius.shape[1]} posterior draws.",
+        )
+    ]

@@ -1,0 +1,78 @@
+"""What could explain a residual, in words: candidates, how large they are, and what would tell them apart."""
+
+from __future__ import annotations
+
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.diagnosis.thresholds import NEXT_TEST
+from bayesmembrane.words.diagnosis import experiment_sentence, set_aside, size_in_words
+from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.language import listed, spoken_parameter
+
+
+def candidate_title(candidate: Candidate, null: Candidate) -> str:
+    """What a candidate adds to the model as it was."""
+    have = {e.name for e in null.hypothesis.effects}
+    added = [e.title for e in candidate.hypothesis.effects if e.name not in have]
+    if candidate.hypothesis.material is not null.hypothesis.material:
+        added.append(f"the energy {candidate.hypothesis.material.title}")
+    return " and ".join(added) or "nothing: the model as it was"
+
+
+def sizes(candidate: Candidate, null: Candidate) -> list[str]:
+    """``slip 0.0021``: sizes of the effects that a candidate adds, in the units that people read."""
+    have = {e.name for e in null.hypothesis.effects}
+    values = candidate.parameters
+    added = [e for e in candidate.hypothesis.effects if e.name not in have]
+    return [
+        f"{spoken_parameter(f'{e.name}.{e.size.name}')} {size_in_words(values[f'{e.name}.{e.size.name}'], e.size.unit)}"
+        for e in added
+    ]
+
+
+def rivals(d: Diagnosis) -> list[str]:
+    """The ambiguous set, and what to measure to tell its members apart."""
+    best = max(j.log_evidence for j in d.members)
+    told = []
+    for j in d.members:
+        behind = best - j.log_evidence
+        words = "the most probable" if behind == 0 else f"{behind:.1f} behind in ln of the evidence"
+        size = ", ".join(sizes(j.candidate, d.null))
+        told.append(f"{candidate_title(j.candidate, d.null)}{f' ({size})' if size else ''}: {words}.")
+    clear = [e for e in d.experiments if e.separation >= NEXT_TEST.clear]
+    dim = [e for e in d.experiments if e.separation < NEXT_TEST.clear]
+    rest = [f"{e.what} ({e.separation:.1f} standard deviations)" for e in dim]
+    told += [f"To tell them apart: {experiment_sentence(e)}." for e in clear]
+    if not clear:
+        told.append("None of the further tests that were simulated would tell them apart.")
+    if rest:
+        told.append(f"What would not settle it: {listed(rest)}.")
+    return told
+
+
+def validation_sentence(d: Diagnosis) -> str:
+    """Which points were set aside, and whether the others choose the same model; "" where none were or nothing was
+    chosen.
+    """
+    if d.validation is None or d.verdict in ("adequate", "unknown"):
+        return ""
+    v = d.validation
+    names = {c.hypothesis.label(): spoken(c.hypothesis) for c in (j.candidate for j in d.ranking)}
+    chosen = names.get(v.chosen, v.chosen)
+    same = (
+        f"the others choose the same model, {chosen}"
+        if v.chosen == d.best.hypothesis.label()
+        else f"the others choose {chosen} instead: the choice rests on the points left out"
+    )
+    fall = f"their root mean square goes from {1e3 * v.before.rmse_N:.3g} to {1e3 * v.after.rmse_N:.3g} mN"
+    return f"Set aside before looking: {set_aside(v)}. Without these points {same}; {fall}."
+
+
+def bounds(d: Diagnosis) -> list[str]:
+    """Estimates at a bound, of the model as given and of all that the answer rests on."""
+    return [
+        f"{spoken(c.hypothesis)}: the estimate of {listed(spoken_parameter(n) for n in c.at_bound)} lies at its bound. "
+        "Take it as a limit, not as a value."
+        for c in [d.null, *(j.candidate for j in d.members)]
+        if c.at_bound
+    ]

@@ -1,0 +1,110 @@
+"""How parameters moved between two calibrations of one film, and what that means, in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesmembrane.calibration.run import Run
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.language import listed, spoken_parameter
+
+MATTERS = 1.0  # standard deviations: a smaller change of a parameter is none
+SAME = 1e-3  # of its value: parameters whose parts differ by less move together
+
+
+@dataclass(frozen=True)
+class Change:
+    """A number before and after: posterior means and standard deviations; nan where a model does not have it.
+
+    unit : as people read it; ``material`` tells a property of the film from one of the test
+    """
+
+    name: str
+    unit: str
+    before: tuple[float, float]
+    after: tuple[float, float]
+    material: bool
+
+    @property
+    def share(self) -> float:
+        """(after - before) / |before|."""
+        return (self.after[0] - self.before[0]) / abs(self.before[0]) if self.before[0] else float("nan")
+
+    @property
+    def in_sd(self) -> float:
+        """(after - before) over the standard deviation that was stated before."""
+        return (self.after[0] - self.before[0]) / self.before[1] if self.before[1] > 0 else float("nan")
+
+
+def changes(before: Run, after: Run) -> list[Change]:
+    """Shear modulus first, then every parameter that either run has, in the order of the later one."""
+    out = [Change("shear modulus", "MPa", modulus_of(before), modulus_of(after), True)]
+    old, new = _posterior(before), _posterior(after)
+    nothing = (float("nan"), float("nan"))
+    for name in dict.fromkeys([*new, *old]):
+        unit = (new.get(name) or old[name])[1]
+        b, a = (found[name][0] if name in found else nothing for found in (old, new))
+        noise = name.startswith("noise.")
+        own = name.partition(".")[0] in (before.hypothesis.material.name, after.hypothesis.material.name)
+        factor, shown = (1e3, "mN") if noise and unit == "N" else (1.0, unit)
+        out.append(Change(name, shown, _times(factor, b), _times(factor, a), own))
+    return out
+
+
+def _times(factor: float, pair: tuple[float, float]) -> tuple[float, float]:
+    return factor * pair[0], factor * pair[1]
+
+
+def _posterior(run: Run) -> dict[str, tuple[tuple[float, float], str]]:
+    """By full name, ((mean, sd), unit) of the natural parameters."""
+    h = run.hypothesis
+    pairs = zip(h.natural_names, h.natural_units, strict=True)
+    return {n: (_moments(run.data.posterior[n].values), u) for n, u in pairs}
+
+
+def modulus_of(run: Run) -> tuple[float, float]:
+    """Mean and standard deviation of G in MPa: the initial slope of the energy over the thickness."""
+    material = run.hypothesis.material
+    fields = np.stack([run.data.posterior[f"{material.name}.{n}"].values.ravel() for n in material.field_names()])
+    return _moments(1e-6 * np.asarray(material.shear_modulus(fields)) / run.measurement.specimen.thickness)
+
+
+def _moments(values: Array) -> tuple[float, float]:
+    return float(np.mean(values)), float(np.std(values))
+
+
+def moved_sentences(before: Run, after: Run) -> list[str]:
+    """How the material moved, and why that matters."""
+    every = [c for c in changes(before, after) if c.material or c.name == "shear modulus"]
+    modulus, rest = every[0], every[1:]
+    told = [modulus_sentence(modulus, spoken(after.hypothesis))]
+    # What only scales with the modulus says nothing new.
+    known = [c for c in rest if abs(c.in_sd) > MATTERS and abs(c.share - modulus.share) > SAME]
+    if known:
+        names = listed(
+            f"{spoken_parameter(c.name)} by {100 * c.share:+.2g} % ({c.in_sd:+.1f} sd)"
+            for c in sorted(known, key=lambda c: -abs(c.in_sd))
+        )
+        told.append(
+            f"The shape of the curve moves too: {names}. Every prediction made with the first calibration, of another "
+            "test or beyond this range, carries what it imitated."
+        )
+    return told
+
+
+def modulus_sentence(c: Change, model: str) -> str:
+    """What the change of the modulus means to a user."""
+    start = f"In {model} the shear modulus is {c.after[0]:.4g} +- {c.after[1]:.2g} MPa instead of {c.before[0]:.4g}"
+    if abs(c.in_sd) <= MATTERS:
+        return (
+            f"{start}: {100 * c.share:+.2g} %, within the {c.before[1]:.2g} MPa that were stated before. The modulus "
+            "of the first calibration could be used."
+        )
+    return (
+        f"{start}: {100 * c.share:+.2g} %, {abs(c.in_sd):.1f} of the standard deviations that were stated before. The "
+        "first calibration had bent the material to imitate what it lacked, and was surer of it than it should have "
+        "been."
+    )

@@ -1,0 +1,76 @@
+"""What the rounds of a closed loop say beside their verdicts: how it ended, what was held out, how sure the film is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayesmembrane.diagnosis.loop import Loop, Stage
+from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.words.candidates import bounds, validation_sentence
+from bayesmembrane.words.diagnosis import sentence
+from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.moved import modulus_of, moved_sentences
+
+
+def answer(found: Loop) -> list[str]:
+    """What was found and added, with the size, and how it ended."""
+    told = [sentence(r.diagnosis) for r in found.rounds]
+    told = [told[0], *(f"With that: {s}" for s in told[1:])]
+    last = found.rounds[-1]
+    if last.changed:
+        told.append(
+            f"The loop stops after {len(found.rounds)} round{'s' if len(found.rounds) > 1 else ''}: whether "
+            f"{spoken(last.after.run.hypothesis)} is adequate has not been asked."
+        )
+    return told
+
+
+def subject(found: Loop) -> str:
+    """Film, model and range that a loop started from."""
+    m = found.rounds[0].before.run.measurement
+    end = 1e3 * float(np.max(m.deflection))
+    return f"{m.specimen.name}, {spoken(found.rounds[0].diagnosis.null.hypothesis)} up to {end:.4g} mm"
+
+
+def validation_sentences(found: Loop) -> list[str]:
+    """Which points were set aside in each round, and whether the others choose the same model."""
+    told = [s for s in (validation_sentence(r.diagnosis) for r in found.rounds) if s]
+    if not told and found.rounds[-1].diagnosis.validation is None:
+        told.append("No points were set aside: there are too few.")
+    return told
+
+
+def bound_sentences(found: Loop) -> list[str]:
+    """Estimates at a bound, of the models on the way and of all that an answer rests on."""
+    return list(dict.fromkeys(s for r in found.rounds for s in bounds(r.diagnosis)))
+
+
+def moved(found: Loop) -> list[str]:
+    """How the material moved from the first posterior to the last, and why that matters."""
+    before, after = stages(found)
+    return moved_sentences(before.run, after.run) if any(r.changed for r in found.rounds) else []
+
+
+def rival_sentences(found: Loop) -> list[str]:
+    """What the modulus is under each explanation of an ambiguous answer: whether the choice matters for the film."""
+    last = found.rounds[-1]
+    if not last.leaders:
+        return []
+    every = [(spoken(s.run.hypothesis), modulus_of(s.run)) for s in (last.before, *last.leaders)]
+    values = "; ".join(f"{mean:.4g} +- {sd:.2g} MPa in {name}" for name, (mean, sd) in every)
+    means, sds = np.array([m for _, m in every[1:]]).T
+    apart = float(np.ptp(means))
+    matters = apart > float(np.max(sds))
+    end = "Which of them is right decides the modulus." if matters else "Which of them is right matters little for it."
+    return [f"The shear modulus is {values}. {end}"]
+
+
+def deciding(loop: Loop) -> Diagnosis:
+    """The diagnosis in which something was found: the last that is not `adequate`, or the last."""
+    found = [r.diagnosis for r in loop.rounds if r.diagnosis.verdict != "adequate"]
+    return found[-1] if found else loop.rounds[-1].diagnosis
+
+
+def stages(loop: Loop) -> tuple[Stage, Stage]:
+    """The first and the last posterior; the same if nothing was added."""
+    return loop.rounds[0].before, loop.rounds[-1].after

@@ -1,0 +1,49 @@
+"""A fit alone on a page."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bayesmembrane.calibration.fit import Estimate, Fit
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.report.page import TWIN, write_report
+from bayesmembrane.words.calibration import fit_sentence
+
+AT = np.linspace(0.001, 0.035, 9)
+
+
+def fitted() -> Fit:
+    parameters = {
+        "yeoh.c1": Estimate(8.8, 0.1, "N/m"),
+        "yeoh.c2": Estimate(-0.6, 0.02, "N/m"),
+        "yeoh.c3": Estimate(0.05, None, "N/m"),
+    }
+    margins = {"reached": 0.1, "box": 0.1, "elliptic": 0.1, "none": 0.1}
+    found = Fit(
+        hypothesis("yeoh"), "euclidean", np.zeros(3), np.eye(3), parameters, AT, 60 * AT, 0.01, 3e-3, 5e-3, 0.01,
+        margins, (), "converged",
+    )  # fmt: skip
+    return replace(found, constrained=found)
+
+
+def test_a_fit_stands_alone(tmp_path: Path) -> None:
+    page = write_report([fitted()], tmp_path).read_text()
+    twin = json.loads((tmp_path / TWIN).read_text())
+    assert twin["answer"] == ["Yeoh fitted up to 35 mm misses the forces by 3.00 mN rms, at most 5.00 mN."]
+    assert twin["tables"]["optimum"][0] == {"parameter": "c1", "unit": "N/m", "value": 8.8, "sd": 0.1}
+    assert twin["tables"]["optimum"][2]["sd"] is None
+    assert 'id="fits"' in page
+    assert 'id="data"' not in page
+
+
+def test_a_bound_and_a_prior_that_is_not_met_are_said() -> None:
+    found = fitted()
+    held = replace(found, loss_N=0.02)
+    told = fit_sentence(replace(found, at_bound=("yeoh.c3_c1",), margins={"reached": -0.1}, constrained=held))
+    assert "no optimum inside the bounds for c3/c1" in told
+    assert "the least loss is 0.02 instead of 0.01 N" in told
+    assert "no film that meets the convexity prior was found" in fit_sentence(
+        replace(found, margins={"reached": -0.1}, constrained=None)
+    )

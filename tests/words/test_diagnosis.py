@@ -1,0 +1,81 @@
+"""Sentences speak in the units of the rig: forces and lengths of a lifted disc, stresses and stretches of a strip."""
+
+import numpy as np
+import pytest
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.left.shape import residual_shape
+from bayesmembrane.diagnosis.result import Thinned, thinning
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.base import Rig
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from bayesmembrane.words.diagnosis import SCALES, size_in_words, thinning_sentence
+from bayesmembrane.words.shape import shape_in_words
+
+THICKNESS = 1e-3
+STRETCH = np.concatenate([np.linspace(1.01, 1.5, 30), np.linspace(1.49, 1.01, 30)])
+
+
+def describe(m: Measurement, residual: Array) -> str:
+    return shape_in_words(residual_shape(m, residual), None, m.rig, m.rig.shown(m.specimen.thickness))
+
+
+def strip(width: float, length: float = 0.05) -> Measurement:
+    rig = Uniaxial(length, width)
+    stress = 4e4 * (STRETCH - 1)
+    return Measurement(length * (STRETCH - 1), stress * width * THICKNESS, rig, Specimen("strip", THICKNESS))
+
+
+@pytest.mark.parametrize("width", [0.005, 0.02])
+@pytest.mark.parametrize("length", [0.05, 0.1])
+def test_a_residual_in_stress_reads_alike_whatever_the_strip_measures(width: float, length: float) -> None:
+    m = strip(width, length)
+    stress = np.where(m.leg > 0, 700.0, -300.0)
+    stress[29] = 2000.0
+    told = describe(m, stress * width * THICKNESS)
+    rms = np.sqrt(np.mean(stress**2)) / 1e3
+    assert told.startswith(
+        f"The residual has a root mean square of {rms:.3g} kPa and reaches 2 kPa at a stretch of 1.5."
+    )
+    gap = (np.mean(stress[m.leg > 0]) - np.mean(stress[m.leg < 0])) / 1e3
+    assert f"Loading legs lie {gap:.3g} kPa above unloading legs." in told
+    assert "mN" not in told
+    assert "mm" not in told
+
+
+def test_a_lifted_disc_is_told_in_forces_and_lengths() -> None:
+    d = np.linspace(1e-3, 35e-3, 40)
+    m = Measurement(d, 50 * d, Annulus(0.010, 0.035), Specimen("film", 5e-5))
+    told = describe(m, np.where(d == d[-1], 0.02, 0.001))
+    assert "reaches 20 mN at 35 mm." in told
+
+
+def test_units_of_a_strip_undo_what_its_size_does() -> None:
+    """A stress s is the force s w t, a stretch the deflection L (l - 1); their quotients follow."""
+    rig = Uniaxial(0.08, 0.02)
+    shown = rig.shown(THICKNESS)
+    area = 0.02 * THICKNESS
+    assert shown["N"] == (pytest.approx(1e-3 / area), "kPa")
+    assert size_in_words(0.25 * 0.08, "m", shown) == "0.25 in stretch"
+    assert size_in_words(3e3 * area, "N", shown) == "3 kPa"
+    assert size_in_words(3e3 * area, "N/s", shown) == "3 kPa/s"
+    assert size_in_words(0.25 * 0.08 / (3e3 * area), "m/N", shown) == "0.0833 1/kPa"
+    assert size_in_words(0.5, "-", shown) == "0.5"
+
+
+def test_every_rig_shows_the_same_quantities() -> None:
+    rigs: dict[str, type[Rig]] = components("rigs")
+    for kind in rigs.values():
+        rig = kind(0.01, 0.035) if kind is Annulus else kind()
+        assert set(rig.shown(THICKNESS)) == set(SCALES)
+    assert Annulus(0.010, 0.035).shown(THICKNESS) == SCALES
+
+
+def test_it_is_said_how_many_readings_were_taken_and_only_where_some_were_left_out() -> None:
+    whole = strip(0.02)
+    part = whole.select(np.arange(0, 60, 3))
+    assert thinning(whole, whole) is None
+    assert (found := thinning(whole, part)) == Thinned(20, 60)
+    assert thinning_sentence(found).startswith("20 of the 60 readings were diagnosed, one in 3: ")
