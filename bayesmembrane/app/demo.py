@@ -1,47 +1,36 @@
-"""Everything on the data that ship: reconstruct, calibrate and compare five materials, follow valleys, close loops."""
+"""The demonstration: a list of verbs on the data that ship, each storing its answer, and a page about what lies there.
+
+Five materials on both ranges of the paper are fitted, sampled and compared, valleys are followed, loops are closed.
+"""
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from queue import Empty
-from threading import Thread
 from typing import Any
 
 import numpy as np
-from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-from rich.progress import Progress as Bars
 
-from bayesmembrane.app.terminal import lines, log
-from bayesmembrane.calibration.beside_paper import Compared, compare_with_paper, paper_break_points
-from bayesmembrane.calibration.fit import fit
-from bayesmembrane.calibration.predictions import Wanted
-from bayesmembrane.calibration.run import load_run, predictions_of, sample
-from bayesmembrane.calibration.sampling.walk import Progress
-from bayesmembrane.comparison.compare import Range, compare_ranges
-from bayesmembrane.comparison.jobs import Judging
-from bayesmembrane.comparison.result import Comparison
+from bayesmembrane.app import analyses
+from bayesmembrane.app.answers import asked, kept
+from bayesmembrane.calibration.beside_paper import compare_with_paper, paper_break_points
+from bayesmembrane.calibration.run import load_run
+from bayesmembrane.comparison.compare import Range
 from bayesmembrane.data.measurement import Measurement, read_measurement
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.data.shipped import shipped
-from bayesmembrane.diagnosis.loop import Loop, LoopSettings, loop
-from bayesmembrane.ground.jobs import Tell, silent
+from bayesmembrane.ground.jobs import Tell, silent, workers
+from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.registry import materials
-from bayesmembrane.physics.cache import CachedSolver, Tally
+from bayesmembrane.ground.stored import answer, answer_folders, store
+from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.reconstruction.reconstruct import reconstruct
-from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.report.page import write_report
-from bayesmembrane.valleys.follow import Valleys, valleys_of
-from bayesmembrane.words.loop import sentence
-from bayesmembrane.words.reconstruction import document as reconstruction_document
 
+TITLE = "What the published force curve of a 50 um silicone film says about five materials"
 RANGES = ("OP1", "OP2")
 # The slowest first, two materials at a time: the others fill the gaps, and no solver is compiled twice.
 ORDER = tuple(
@@ -52,17 +41,130 @@ VALLEYS = ("yeoh", "mooney_rivlin", "gent")
 # What the loop is closed on: the paper's curve over both of its ranges, and a cyclic curve with something hidden in it.
 LOOPS = (("yeoh", "elastosil_50um_first_loading"), ("yeoh", "elastosil_50um_op1"), ("yeoh", "synthetic_cyclic"))
 LOOP_ESS = 400.0
-FINISHED = "finished"
-TITLE = "What the published force curve of a 50 um silicone film says about five materials"
 
 
 @dataclass(frozen=True)
-class Done:
-    """One material on one range: its run folder, our optimum beside the paper's, what the cache did."""
+class Place:
+    """Where the demonstration works, and how well.
 
-    run: Path
-    compared: tuple[Compared, ...]
-    tally: Tally
+    folder : of its answers and runs
+    """
+
+    folder: Path
+    seed: int
+    ess: float
+
+    @property
+    def loop_runs(self) -> Path:
+        """Where the runs on the way of the loops lie: a page about the answers shows them with their loop."""
+        return self.folder / "loops"
+
+    def run(self, name: str, range_name: str) -> Path:
+        """The folder of a material's run."""
+        return self.folder / f"elastosil_50um_{range_name.lower()}_{name}"
+
+
+Verb = Callable[[Place, Tell], None]
+
+
+def stages() -> tuple[dict[str, Verb], ...]:
+    """The verbs by the label that their progress has; those of one stage do not need each other."""
+    first: dict[str, Verb] = {f"{name}, {where}": partial(calibrate, name, where) for name, where in ORDER}
+    then: dict[str, Verb] = {f"loop, {stem}": partial(close_loop, name, stem) for name, stem in LOOPS}
+    then |= {f"valleys, {name}": partial(follow_valleys, name) for name in VALLEYS}
+    return {**first, "reconstruct": reconstruct}, then
+
+
+def demo(page_folder: Path, folder: Path, *, seed: int = 0, ess: float = 1000.0, tell: Tell = silent) -> dict[str, Any]:
+    """Run it all on the cores there are, and write the page to ``page_folder``.
+
+    Returns the JSON answer: where the page lies, the runs, and the seconds it took. Runs of an earlier demonstration
+    with the same data, settings and code are read back. Raises `StorageError` if a folder cannot be written.
+    """
+    began = time.perf_counter()
+    place = Place(folder, seed, ess)
+    with workers(tell) as submit:
+        for stage in stages():
+            for job in [submit(_labelled, verb, label, place) for label, verb in stage.items()]:
+                job.result()
+    compare(place, tell)
+    page = write_report([folder], page_folder, TITLE)
+    return {
+        "report": str(page),
+        "verdicts": [_verdict(c) for c in _answers(folder, "loop")],
+        "runs": [str(place.run(name, r)) for name in materials() for r in RANGES if (name, r) in ORDER],
+        "suspect_rows": [row for found in _answers(folder, "reconstruction") for row in found["suspect_rows"]],
+        "stored": str(folder),
+        "seconds": time.perf_counter() - began,
+    }
+
+
+def _labelled(verb: Verb, label: str, place: Place, tell: Tell) -> None:
+    """A verb that tells when it begins and when it has ended."""
+    tell(label, "working")
+    verb(place, tell)
+    tell(label, "")
+
+
+# ---- the verbs -------------------------------------------------------------------------------------------------------
+
+
+def reconstruct(place: Place, tell: Tell) -> None:
+    """The curve behind the published losses, and those losses beside it."""
+    found = analyses.reconstruct(place.seed, place.folder)
+    assert found.folder is not None
+    printed = read_published_table()
+    store(found.folder, "published", printed, plain(printed))
+
+
+def calibrate(name: str, range_name: str, place: Place, tell: Tell) -> None:
+    """Fit one material on one range, lay that beside the paper, and sample it."""
+    claim, measurement = hypothesis(name), shipped_measurement(range_name)
+    published = [list(row.values) for row in read_published_table().rows if row.material == name]
+    found = analyses.fit(measurement, claim, seed=place.seed, starts=published, out=place.folder)
+    (beside,) = compare_with_paper(
+        measurement, [found.result], range_name, solve=CachedSolver(place.folder / analyses.CURVES)
+    )
+    what = asked("paper", compare_with_paper, [measurement], [claim], {"seed": place.seed, "range": range_name})
+    kept("beside_paper", beside, plain(beside), what, place.folder)
+    last = range_name == RANGES[-1]
+    run = analyses.sample(
+        measurement,
+        claim,
+        ess=place.ess,
+        seed=place.seed,
+        out=place.folder,
+        name=place.run(name, range_name).name,
+        whole=shipped_measurement(RANGES[-1]),
+        breaks=paper_break_points() if last else (),
+        progress=lambda progress: tell(f"{name}, {range_name}", progress),
+    ).result
+    if run.interrupted:
+        raise KeyboardInterrupt
+
+
+def follow_valleys(name: str, place: Place, tell: Tell) -> None:
+    """The valleys of one material on both ranges, with the draws of its runs."""
+    draws = [load_run(place.run(name, r)).draws() for r in RANGES]
+    both = [shipped_measurement(r) for r in RANGES]
+    analyses.valleys_with_draws(both, hypothesis(name), draws, seed=place.seed, out=place.folder)
+
+
+def close_loop(name: str, stem: str, place: Place, tell: Tell) -> None:
+    """The loop on one curve that ships."""
+    measurement = read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
+    ess = min(place.ess, LOOP_ESS)
+    analyses.loop(measurement, hypothesis(name), seed=place.seed, ess=ess, out=place.folder, runs=place.loop_runs)
+
+
+def compare(place: Place, tell: Tell) -> None:
+    """The five materials on each range of the paper, from the runs that are there."""
+    ranges = {name: shipped_ranges()[name] for name in RANGES}
+    claims = [hypothesis(name) for name in materials()]
+    analyses.compare(ranges, claims, ess=place.ess, seed=place.seed, out=place.folder, progress=tell)
+
+
+# ---- the data --------------------------------------------------------------------------------------------------------
 
 
 def shipped_measurement(range_name: str) -> Measurement:
@@ -70,77 +172,6 @@ def shipped_measurement(range_name: str) -> Measurement:
     both = [_read(name) for name in RANGES]
     chosen = both[RANGES.index(range_name)]
     return replace(chosen, full_range=max(float(m.deflection.max()) for m in both))
-
-
-def _read(range_name: str) -> Measurement:
-    stem = f"elastosil_50um_{range_name.lower()}"
-    return read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
-
-
-def calibrate(
-    name: str, range_name: str, chains: Path, seed: int, ess: float, tell: Callable[[Progress | None], None]
-) -> Done:
-    """Fit and sample one material on one range, stored under ``chains``."""
-    cache, claim, measurement = CachedSolver(chains / "curves"), hypothesis(name), shipped_measurement(range_name)
-    published = [row.values for row in read_published_table().rows if row.material == name]
-    tell(None)
-    found = fit(measurement, claim, seed=seed, starts=published)
-    stem = f"elastosil_50um_{range_name.lower()}_{name}"
-    options: dict[str, Any] = {"seed": seed, "out": chains, "name": stem, "ess": ess, "progress": tell, "solve": cache}
-    run = sample(measurement, claim, predictions=False, **options)
-    if run.interrupted or run.path is None:
-        raise KeyboardInterrupt
-    whole = shipped_measurement(RANGES[-1])
-    beyond = whole.deflection > measurement.deflection.max()
-    last = not np.any(beyond)
-    wanted = Wanted(breaks=paper_break_points()) if last else Wanted(rest=whole.select(beyond))
-    predictions_of(run, wanted, cache)
-    return Done(run.path, compare_with_paper(measurement, [found], range_name, solve=cache), cache.tally)
-
-
-def demo(out: Path, chains: Path, seed: int = 0, ess: float = 1000.0) -> dict[str, Any]:
-    """Run it all on the cores there are, show progress on stderr, and write the report to ``out``.
-
-    Returns the JSON answer: where the report lies, the runs, and the seconds it took. Runs of an earlier demo with the
-    same data, settings and code are read back. Raises `StorageError` if a folder cannot be written.
-    """
-    began = time.perf_counter()
-    done: dict[tuple[str, str], Done] = {}
-    with _workers() as (pool, queue), _progress(queue):
-        jobs = {pool.submit(_in_worker, *case, chains, seed, ess, queue): case for case in ORDER}
-        other = pool.submit(_reconstruct_in_worker, seed, queue)
-        for job in as_completed(jobs):
-            done[jobs[job]] = job.result()
-        found: Reconstruction = other.result()
-        closing = [pool.submit(_loop_in_worker, *case, chains, seed, min(ess, LOOP_ESS), queue) for case in LOOPS]
-        following = [
-            pool.submit(_valleys_in_worker, name, [done[name, r].run for r in RANGES], seed, queue) for name in VALLEYS
-        ]
-        loops: list[Loop] = [job.result() for job in closing]
-        valleys: list[Valleys] = [job.result() for job in following]
-    with lines() as tell:
-        comparison = compare(chains, seed, ess, tell)
-    ordered = [done[name, range_name] for name in materials() for range_name in RANGES if (name, range_name) in done]
-    compared = [c for d in ordered for c in d.compared]
-    shown = [*(d.run for d in ordered), found, *compared, _sum([d.tally for d in ordered]), *valleys, comparison]
-    page = write_report([*shown, read_published_table(), *loops], out, TITLE)
-    return {
-        "report": str(page),
-        "verdicts": [{"verdict": c.rounds[0].diagnosis.verdict, "sentence": sentence(c)} for c in loops],
-        "runs": [str(d.run) for d in ordered],
-        "suspect_rows": reconstruction_document(found)["suspect_rows"],
-        "seconds": time.perf_counter() - began,
-    }
-
-
-def compare(chains: Path, seed: int = 0, ess: float = 1000.0, progress: Tell = silent) -> dict[str, Comparison]:
-    """The five materials on each range of the paper, from runs of the demo where there are any.
-
-    Raises `StorageError` if ``chains`` cannot be written; Ctrl-C stores what is finished.
-    """
-    claims = [hypothesis(name) for name in materials()]
-    ranges = {name: shipped_ranges()[name] for name in RANGES}
-    return compare_ranges(ranges, claims, Judging(seed, ess, out=chains), progress=progress)
 
 
 def shipped_ranges() -> dict[str, Range]:
@@ -156,97 +187,16 @@ def shipped_ranges() -> dict[str, Range]:
     }
 
 
-@contextmanager
-def _workers() -> Iterator[tuple[ProcessPoolExecutor, Any]]:
-    """Fresh processes, one for each core, and a queue on which they tell how far they are."""
-    context = multiprocessing.get_context("spawn")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    with context.Manager() as manager, ProcessPoolExecutor(cores, mp_context=context) as pool:
-        try:
-            yield pool, manager.Queue()
-        except BaseException:
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise
+def _read(range_name: str) -> Measurement:
+    stem = f"elastosil_50um_{range_name.lower()}"
+    return read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
 
 
-def _in_worker(name: str, range_name: str, chains: Path, seed: int, ess: float, queue: Any) -> Done:
-    label = f"{name}, {range_name}"
-    return calibrate(name, range_name, chains, seed, ess, lambda progress: queue.put((label, progress)))
+def _answers(folder: Path, kind: str) -> list[dict[str, Any]]:
+    """The stored answers of one kind."""
+    found = [answer(path, kind) for path in answer_folders(folder)]
+    return [document for document in found if document is not None]
 
 
-def _loop_in_worker(name: str, stem: str, chains: Path, seed: int, ess: float, queue: Any) -> Loop:
-    queue.put((f"loop, {stem}", None))
-    measurement = read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
-    found = loop(measurement, hypothesis(name), LoopSettings(seed, chains, ess, adapt_noise=True))
-    queue.put((f"loop, {stem}", FINISHED))
-    return found
-
-
-def _valleys_in_worker(name: str, runs: list[Path], seed: int, queue: Any) -> Valleys:
-    queue.put((f"valleys, {name}", None))
-    draws = [load_run(run).draws() for run in runs]
-    found = valleys_of([shipped_measurement(r) for r in RANGES], hypothesis(name), seed=seed, draws=draws)
-    queue.put((f"valleys, {name}", FINISHED))
-    return found
-
-
-def _reconstruct_in_worker(seed: int, queue: Any) -> Reconstruction:
-    queue.put(("reconstruct", None))
-    return reconstruct(seed=seed)
-
-
-@contextmanager
-def _progress(queue: Any) -> Iterator[None]:
-    """A line per job: what it does and, while it samples, ESS and the time left."""
-    columns = (
-        TextColumn("{task.description:<22}"),
-        BarColumn(),
-        TextColumn("{task.fields[text]}"),
-        TimeElapsedColumn(),
-    )
-    with Bars(*columns, console=log) as bars:
-        stop: list[bool] = []
-        thread = Thread(target=_listen, args=(queue, bars, stop), daemon=True)
-        thread.start()
-        try:
-            yield
-        finally:
-            stop.append(True)
-            thread.join(timeout=2)
-
-
-def _listen(queue: Any, bars: Bars, stop: list[bool]) -> None:
-    tasks: dict[str, Any] = {}
-    while not stop:
-        try:
-            label, progress = queue.get(timeout=0.2)
-        except Empty:
-            continue
-        except (EOFError, OSError):
-            return
-        if label not in tasks:
-            tasks[label] = bars.add_task(label, total=1.0, text="fitting" if "," in label else "")
-        if progress == FINISHED:
-            bars.update(tasks[label], completed=1.0, text="done")
-        elif progress is not None:
-            bars.update(tasks[label], completed=share(progress), text=told(progress))
-
-
-def share(progress: Progress) -> float:
-    """How much of a run is done, from 0 to 1: the worse of ESS and time."""
-    left = progress.seconds_left
-    if progress.steps_per_second > 0 and left == left:
-        spent = progress.steps / progress.steps_per_second
-        return float(spent / (spent + left)) if spent + left > 0 else 1.0
-    return float(min(progress.ess / progress.wanted, 1.0))
-
-
-def told(progress: Progress) -> str:
-    """ESS and time left in words."""
-    left = progress.seconds_left
-    rest = f", {left:.0f} s left" if left == left else ""
-    return f"ESS {progress.ess:.0f} of {progress.wanted:.0f}, R-hat {progress.r_hat:.3f}{rest}"
-
-
-def _sum(tallies: list[Tally]) -> Tally:
-    return Tally(**{f.name: sum(getattr(t, f.name) for t in tallies) for f in fields(Tally)})
+def _verdict(document: dict[str, Any]) -> dict[str, str]:
+    return {"verdict": document["rounds"][0]["verdict"], "sentence": document["sentence"]}

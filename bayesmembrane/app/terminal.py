@@ -1,23 +1,72 @@
-"""What people see in the terminal: tables, sentences and progress on stderr, answers on stdout."""
+"""What people see in the terminal: tables, sentences and progress on stderr, answers on stdout.
+
+rich is imported where something is shown, for ``--json`` and ``--help`` do without its tables and bars.
+"""
 
 from __future__ import annotations
 
 import json
 import math
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
-from rich.table import Table
+import typer
 
 from bayesmembrane.ground.errors import SettingsError
-from bayesmembrane.ground.plain import plain
 
-log = Console(stderr=True, highlight=False, soft_wrap=True)
-out = Console(highlight=False, soft_wrap=True)
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from bayesmembrane.calibration.sampling.walk import Progress
+
+INTERRUPTED = 130
+
+
+@cache
+def _console(stderr: bool) -> Console:
+    from rich.console import Console
+
+    return Console(stderr=stderr, highlight=False, soft_wrap=True)
+
+
+def say(text: str) -> None:
+    """A sentence on stdout."""
+    _console(False).print(text)
+
+
+def note(text: str) -> None:
+    """A sentence on stderr, as it is."""
+    _console(True).print(text, markup=False)
+
+
+def answer(document: dict[str, Any], as_json: bool, show: Callable[[], None]) -> None:
+    """Print the JSON document, with nan and infinity as null, or the text for people."""
+    from bayesmembrane.ground.plain import plain
+
+    if as_json:
+        sys.stdout.write(json.dumps(plain(document), allow_nan=False) + "\n")
+    else:
+        show()
+
+
+def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table on stdout; the first column to the left, numbers to the right."""
+    from rich.table import Table
+
+    grid = Table(title=title, title_justify="left")
+    for i, name in enumerate(header):
+        grid.add_column(name, justify="left" if i == 0 else "right", overflow="fold")
+    for row in rows:
+        grid.add_row(*row)
+    _console(False).print(grid)
+
+
+# ---- what is typed ---------------------------------------------------------------------------------------------------
 
 
 def numbers(text: str, option: str) -> list[float]:
@@ -38,29 +87,28 @@ def numbers(text: str, option: str) -> list[float]:
     return values
 
 
-def answer(document: dict[str, Any], as_json: bool, show: Callable[[], None]) -> None:
-    """Print the JSON document, with nan and infinity as null, or the text for people."""
-    if as_json:
-        sys.stdout.write(json.dumps(plain(document), allow_nan=False) + "\n")
-    else:
-        show()
+def command() -> str:
+    """The command that was typed."""
+    return shlex.join(["bayesmembrane", *sys.argv[1:]])
 
 
-def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table on stdout; the first column to the left, numbers to the right."""
-    grid = Table(title=title, title_justify="left")
-    for i, name in enumerate(header):
-        grid.add_column(name, justify="left" if i == 0 else "right", overflow="fold")
-    for row in rows:
-        grid.add_row(*row)
-    out.print(grid)
+# ---- while something is computed -------------------------------------------------------------------------------------
+
+
+@contextmanager
+def status(text: str) -> Iterator[Callable[[str], None]]:
+    """A line on stderr that says what is being done; give it another text by calling what this yields."""
+    with _console(True).status(text) as shown:
+        yield shown.update
 
 
 @contextmanager
 def lines() -> Iterator[Callable[[str, str], None]]:
     """A line on stderr for each label, with what is being done for it and for how long."""
+    from rich.progress import Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
+
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TextColumn("{task.fields[text]}"))
-    with Progress(*columns, TimeElapsedColumn(), console=log) as shown:
+    with Progress(*columns, TimeElapsedColumn(), console=_console(True)) as shown:
         tasks: dict[str, TaskID] = {}
 
         def tell(label: str, text: str) -> None:
@@ -69,3 +117,52 @@ def lines() -> Iterator[Callable[[str, str], None]]:
             shown.update(tasks[label], text=text)
 
         yield tell
+
+
+@contextmanager
+def bars() -> Iterator[Callable[[str, Progress | str], None]]:
+    """A bar on stderr for each label: how far its sampling is, or a text; "" completes it."""
+    from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+
+    columns = (TextColumn("{task.description:<22}"), BarColumn(), TextColumn("{task.fields[text]}"))
+    with Bars(*columns, TimeElapsedColumn(), console=_console(True)) as shown:
+        tasks: dict[str, TaskID] = {}
+
+        def tell(label: str, now: Progress | str) -> None:
+            if label not in tasks:
+                tasks[label] = shown.add_task(label, total=1.0, text="")
+            if now == "":
+                shown.update(tasks[label], completed=1.0, text="done")
+            elif isinstance(now, str):
+                shown.update(tasks[label], text=now)
+            else:
+                shown.update(tasks[label], completed=share(now), text=in_words(now))
+
+        yield tell
+
+
+def share(progress: Progress) -> float:
+    """How much of a run is done, from 0 to 1: the worse of ESS and time."""
+    left = progress.seconds_left
+    if progress.steps_per_second > 0 and math.isfinite(left):
+        spent = progress.steps / progress.steps_per_second
+        return float(spent / (spent + left)) if spent + left > 0 else 1.0
+    return float(min(progress.ess / progress.wanted, 1.0))
+
+
+def in_words(progress: Progress) -> str:
+    """ESS and time left in words."""
+    left = progress.seconds_left
+    rest = f", {left:.0f} s left" if math.isfinite(left) else ""
+    return f"ESS {progress.ess:.0f} of {progress.wanted:.0f}, R-hat {progress.r_hat:.3f}{rest}"
+
+
+@contextmanager
+def resumable(folder: Path) -> Iterator[None]:
+    """Turn an interrupt into the sentence that says what is stored and how to go on, and exit status 130."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        note(f"Interrupted; what is finished is stored in {folder}. The same command resumes it: {command()}")
+        raise typer.Exit(INTERRUPTED) from None

@@ -23,8 +23,6 @@ from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.tree import Decoder, Encoder
 
 PROGRAM, FORMAT = "bayesmembrane", 1
-KINDS = ("fit", "comparison", "valleys", "diagnosis", "loop", "reconstruction", "predictions")
-"""What is stored today; other kinds may be, the name is all that is said of them."""
 
 _START = f'{{"program": "{PROGRAM}"'
 _FAULTS = (
@@ -64,10 +62,11 @@ def store(folder: Path, kind: str, result: Any, answer: Mapping[str, Any]) -> Pa
 def read(folder: Path, kind: str) -> Any:
     """The result of this ``kind`` that is stored in ``folder``, as it was; None if there is none.
 
-    Raises `StorageError` if it is damaged, of another format or version, or not of this program.
+    A file of this name that some other program wrote is none; beside arrays of this name it is taken for a damaged one.
+    Raises `StorageError` if the answer is damaged, or of another format or version.
     """
     document, arrays = _files(Path(folder), kind)
-    if not document.is_file():
+    if not _stored(document):
         return None
     content = _document(document, kind)
     try:
@@ -90,7 +89,7 @@ def read(folder: Path, kind: str) -> Any:
 def answer(folder: Path, kind: str) -> dict[str, Any] | None:
     """The JSON answer of the verb, stored beside the result; None if there is none. Raises as `read` does."""
     document, _ = _files(Path(folder), kind)
-    return dict(_document(document, kind)["answer"]) if document.is_file() else None
+    return dict(_document(document, kind)["answer"]) if _stored(document) else None
 
 
 def stored_kinds(folder: Path) -> tuple[str, ...]:
@@ -108,6 +107,10 @@ def answer_folders(place: Path) -> list[Path]:
 
 def _files(folder: Path, kind: str) -> tuple[Path, Path]:
     return folder / f"{kind}.json", folder / f"{kind}.npz"
+
+
+def _stored(document: Path) -> bool:
+    return document.is_file() and (document.with_suffix(".npz").is_file() or _begins(document))
 
 
 def _begins(path: Path) -> bool:

@@ -132,8 +132,8 @@ def preferred(found: Comparison) -> str:
     if not found.agreed:
         gap, se = _elpd_gap(predicts, next_best)
         return (
-            f"The evidence gives no ranking; leave-one-out prefers {called(predicts)} to {called(next_best)} by {gap:.1f} "
-            f"+- {se:.1f}{_weak(gap, se)}."
+            f"The evidence gives no ranking; leave-one-out prefers {called(predicts)} to {called(next_best)} by "
+            f"{gap:.1f} +- {se:.1f}{_weak(gap, se)}."
         )
     by_z = sorted(both, key=lambda r: -_best(r)[0])
     gap = _best(by_z[0])[0] - _best(by_z[1])[0]
@@ -151,8 +151,8 @@ def preferred(found: Comparison) -> str:
             "prediction disagree, and of the two the evidence is the one that depends on the width of the priors."
         )
     return (
-        f"{start}, and leave-one-out puts {called(predicts)} before it by {d:.1f} +- {se:.1f}{_weak(d, se)}: prediction "
-        "does not contradict the evidence."
+        f"{start}, and leave-one-out puts {called(predicts)} before it by {d:.1f} +- {se:.1f}{_weak(d, se)}: "
+        "prediction does not contradict the evidence."
     )
 
 

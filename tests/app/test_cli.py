@@ -19,7 +19,9 @@ CURVE, SPECIMEN = shipped("elastosil_50um_op1.csv"), shipped("elastosil_50um_op1
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    monkeypatch.chdir(tmp_path)  # what is not sent elsewhere is stored in chains/ here
+
     def call(*arguments: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["bayesmembrane", *map(str, arguments)])
         with pytest.raises(SystemExit) as stop:

@@ -1,6 +1,8 @@
 """The optimum: recovery from another solver's curves, linear cases in closed form, constraints, open ends."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,8 @@ from bayesmembrane.ground.registry import material
 from bayesmembrane.ground.stored import answer, read, store
 from bayesmembrane.physics.forward import predict
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.physics.mechanics import request, solve
+from bayesmembrane.physics.mechanics import Request, request, solve
+from bayesmembrane.physics.mechanics.solution import Curves
 
 FILMS = {
     "neo_hookean": (7.5,),
@@ -142,3 +145,43 @@ def test_bad_questions_are_refused(film) -> None:  # type: ignore[no-untyped-def
         fit(curve, hypothesis("yeoh"), loss="weighted")
     with pytest.raises(SettingsError, match="4 points cannot fix the 6 parameters"):
         fit(film("neo_hookean", (7.5,), points=4), hypothesis("ogden"))
+
+
+def without_slopes(keeps: float) -> Any:
+    """A solver whose films with |c3 / c1| above ``keeps`` have forces and no slopes, as next to a loss of stability."""
+
+    def solver(asked: Request) -> Curves:
+        curves, p = solve(asked), asked.parameters
+        if curves.sensitivity is None or p.shape[1] < 3:
+            return curves
+        lost = np.abs(p[:, 2] / p[:, 0]) > keeps
+        return replace(curves, sensitivity=np.where(lost[:, None, None], np.nan, curves.sensitivity))
+
+    return solver
+
+
+def test_films_without_slopes_are_neither_starts_nor_answers(film) -> None:  # type: ignore[no-untyped-def]
+    curve = film("yeoh", (8.0, -0.2, 0.03), noise=0.02, seed=8)
+    found = fit(curve, hypothesis("yeoh", convexity="none"), solve=without_slopes(0.003))
+    assert found.status == "converged"
+    assert np.isfinite(found.rmse_N)
+    assert abs(found.coordinates[2]) <= 0.003
+
+
+@pytest.mark.parametrize("effects", [(), ("force_offset",)])
+def test_an_energy_fits_no_worse_than_the_one_inside(film, effects: tuple[str, ...]) -> None:  # type: ignore[no-untyped-def]
+    """Next to nothing but the neo-Hookean film itself is left for Yeoh's: it must be found."""
+    curve = film("neo_hookean", (7.5,), noise=0.02, seed=8)
+    inner = fit(curve, hypothesis("neo_hookean", effects))
+    found = fit(curve, hypothesis("yeoh", effects), solve=without_slopes(1e-7))
+    assert found.status == "converged"
+    assert found.loss_N <= inner.loss_N * (1 + 1e-6)
+    assert found.constrained is not None
+    assert found.constrained.loss_N <= inner.loss_N * (1 + 1e-6)
+
+
+def test_where_there_is_no_fit_a_sentence_says_so(film) -> None:  # type: ignore[no-untyped-def]
+    found = fit(film("neo_hookean", (7.5,), noise=0.02), hypothesis("yeoh"), solve=without_slopes(-1.0))
+    assert np.isnan(found.rmse_N)
+    assert "no yeoh film was found that reaches 50 mm with finite forces and slopes" in found.status
+    assert all(e.sd is None for e in found.parameters.values())

@@ -231,6 +231,13 @@ def test_another_program_s_file_is_told(kept: Path, text: str) -> None:
     assert stored_kinds(kept) == ()
 
 
+def test_another_program_s_file_alone_is_no_answer(tmp_path: Path) -> None:
+    (tmp_path / "valleys.json").write_text('{"material": "yeoh"}')
+    assert read(tmp_path, "valleys") is None
+    assert answer(tmp_path, "valleys") is None
+    assert answer_folders(tmp_path) == []
+
+
 def test_another_kind_and_another_format_are_told(kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for suffix in ("json", "npz"):
         (kept / f"fit.{suffix}").rename(kept / f"valleys.{suffix}")

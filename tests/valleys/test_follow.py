@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 from typer.testing import CliRunner
 
-from bayesmembrane.app.cli import app
+from bayesmembrane.app.cli import assembled
 from bayesmembrane.data.measurement import Measurement, Specimen, write_measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
@@ -222,7 +222,7 @@ def test_the_command_answers_with_the_promised_fields(film: Film, tmp_path: Path
     m = film("mooney_rivlin", (6.0, 1.5), end=0.03, points=8, noise=0.003)
     write_measurement(m, tmp_path / "curve.csv", tmp_path / "film.toml")
     asked = ["valleys", str(tmp_path / "curve.csv"), "--specimen", str(tmp_path / "film.toml")]
-    done = CliRunner().invoke(app, [*asked, "--material", "neo_hookean", "--ranges-mm", "20,30", "--json"])
+    done = CliRunner().invoke(assembled(), [*asked, "--material", "neo_hookean", "--ranges-mm", "20,30", "--json"])
     assert done.exit_code == 0, done.output
     answer = json.loads(done.stdout)
     assert [r["max_deflection_mm"] for r in answer["ranges"]] == pytest.approx([1e3 * 0.03 / 8 * 5, 30])

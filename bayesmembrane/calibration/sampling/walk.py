@@ -156,7 +156,10 @@ def _sampler(posterior: Posterior, walkers: int, counts: Counter[str], known: Le
         counts.update(tally(e.outcome))
         return e.log_posterior
 
-    return emcee.EnsembleSampler(walkers, posterior.size, log_probability, moves=known.moves(), vectorize=True)
+    sampler = emcee.EnsembleSampler(walkers, posterior.size, log_probability, moves=known.moves(), vectorize=True)
+    # emcee's own wrapper prints a traceback of whatever is raised, Ctrl-C among it.
+    sampler.log_prob_fn = log_probability
+    return sampler
 
 
 def _start(posterior: Posterior, settings: Settings, seed: int, counts: Counter[str]) -> Chains:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from bayesmembrane.calibration.beside_paper import Compared
+from bayesmembrane.ground.stored import read
 from bayesmembrane.report.blocks import Block, Column, Figure, Picture, Table, Text, points
 from bayesmembrane.report.canvas import Interval, draw_interval, encoded, new_figure, style
 from bayesmembrane.report.runs import Shown, in_order
@@ -29,6 +31,9 @@ class CalibrationsSection(Section):
     title = "Comparison"
     order = 40
     shows = Compared
+
+    def reads(self, folder: Path) -> Any | None:
+        return read(folder, "beside_paper")
 
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
         shown, beside = in_order(of_kind(results, Shown)), of_kind(results, Compared)

@@ -150,8 +150,10 @@ def test_interrupted_and_continued_is_never_stopped() -> None:
     assert np.array_equal(resumed.chains.x, whole.chains.x)
 
 
-def test_an_interruption_at_once_is_survived() -> None:
+def test_an_interruption_at_once_is_survived_in_silence(capsys: pytest.CaptureFixture[str]) -> None:
+    """Ctrl-C amid a solution is what a user asked for, and no failure that a traceback explains."""
     found = run_ensembles(Normal(stop_after=3), Settings(), 0, chains=start(Normal()))  # type: ignore[arg-type]
+    assert capsys.readouterr() == ("", "")
     assert found.status == "interrupted"
     assert found.chains.steps == 1
     x, lp = found.draws(1000)

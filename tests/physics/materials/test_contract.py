@@ -215,3 +215,15 @@ def test_wrong_parameters_are_refused_in_a_sentence(material, bad):
     values = [float("nan")] * len(material.field_names()) if bad == ["nan"] else bad
     with pytest.raises(SettingsError, match=r"parameters"):
         material.from_vector(values)
+
+
+def test_the_neo_hookean_film_inside_is_one(material):
+    """Within bounds, and with the tensions of the neo-Hookean energy, or next to them in a limit."""
+    x = material.neo_hookean(15.0)
+    if x is None:
+        pytest.skip("contains no neo-Hookean film")
+    low, high = np.array([p.bounds for p in material.coordinates]).T
+    assert np.all((x >= low) & (x <= high))
+    film, plain = material.from_vector(material.from_coordinates(x)), materials()["neo_hookean"](7.5)
+    l1, l2 = np.meshgrid(np.linspace(1.0, 4.0, 9), np.linspace(1.0, 4.0, 9))
+    np.testing.assert_allclose(film.tension(l1, l2), plain.tension(l1, l2), rtol=1e-5, atol=1e-9)

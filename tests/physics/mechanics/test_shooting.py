@@ -119,3 +119,16 @@ def test_order_signs_and_repeats_do_not_matter():
     curves = solve(request(NeoHookean, [7.5], mixed, solver="shooting", **RADII))
     single = [solve(request(NeoHookean, [7.5], d, solver="shooting", **RADII)).force[0, 0] for d in mixed]
     assert curves.force[0] == pytest.approx(single, rel=1e-8)
+
+
+def test_next_to_a_film_that_is_lost_slopes_are_those_of_the_side_that_is_there():
+    """A little softer and the film is no longer elliptic at its last deflections: no difference has both sides."""
+    film, radii = [16.94512975, -4.12303456, 0.70933148], (0.008318723918681005, 0.04223791947291318)
+    d = np.linspace(0.0225 / 21, 0.02250385410179133, 21)[-4:]
+    softer = shooting.solve(request(Yeoh, np.array(film) * [1 - 1e-4, 1, 1], d, *radii))
+    assert softer.status[0, -1] == Status.NOT_ELLIPTIC
+    curves = shooting.solve(request(Yeoh, film, d, *radii, sensitivities=True))
+    assert curves.ok.all()
+    assert np.all(np.isfinite(curves.sensitivity))
+    # The force is linear in all constants together: sum c_i dF/dc_i = F, to first order in the step.
+    assert (curves.sensitivity @ film)[0] == pytest.approx(curves.force[0], rel=0.05)

@@ -6,6 +6,8 @@ from typing import Any
 
 import emcee
 
+from bayesmembrane.calibration.sampling.proposals.snooker import Snooker
+
 
 def ensemble_moves(share: float) -> list[tuple[Any, float]]:
     """Differential evolution, snooker and stretch with weights that add up to ``share``.
@@ -15,6 +17,6 @@ def ensemble_moves(share: float) -> list[tuple[Any, float]]:
     return [
         (emcee.moves.DEMove(), 0.6 * share),
         (emcee.moves.DEMove(gamma0=1.0), 0.1 * share),
-        (emcee.moves.DESnookerMove(), 0.1 * share),
+        (Snooker(), 0.1 * share),
         (emcee.moves.StretchMove(), 0.2 * share),
     ]

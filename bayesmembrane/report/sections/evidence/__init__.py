@@ -32,7 +32,8 @@ class EvidenceSection(Section):
     aside = True
 
     def reads(self, folder: Path) -> Any | None:
-        return read(folder, "comparison")
+        found = read(folder, "comparison")
+        return read(folder, "published") if found is None else found
 
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
         found, paper = by_range(results), _paper(results)

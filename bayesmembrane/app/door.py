@@ -1,0 +1,160 @@
+"""What ``import bayesmembrane as bm`` offers: the verbs as functions from values to values.
+
+Every verb takes ``out``, a folder of answers: there the result is stored whole, to be read by `load` and `report`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from bayesmembrane.app import analyses, documents
+from bayesmembrane.app.folders import lying
+from bayesmembrane.calibration.fit import Fit
+from bayesmembrane.calibration.run import Run
+from bayesmembrane.comparison.compare import Range
+from bayesmembrane.comparison.result import Comparison
+from bayesmembrane.data.measurement import Measurement, read_measurement
+from bayesmembrane.diagnosis.loop import Loop
+from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.physics import hypothesis as hypotheses
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.reconstruction.result import Reconstruction
+from bayesmembrane.report.page import write_report
+from bayesmembrane.valleys.beside import Beside
+from bayesmembrane.valleys.result import Valleys
+
+Folder = str | Path
+
+
+def read(curve: Folder, specimen: Folder) -> Measurement:
+    """The measured curve (CSV) of a specimen (TOML), in SI; raises `DataError` that says what is wrong where."""
+    return read_measurement(Path(curve), Path(specimen))
+
+
+def hypothesis(
+    material: str, effects: Iterable[str] = (), noise: str = "white", convexity: str = "reached"
+) -> Hypothesis:
+    """y = F(delta; material, effects) + noise, by names; raises `SettingsError` for one that nobody declared.
+
+    ``effects`` may also be one text, with commas: "zero_offset,prestretch".
+    """
+    names = effects.split(",") if isinstance(effects, str) else effects
+    return hypotheses.hypothesis(material, [n.strip() for n in names if n.strip()], noise, convexity)
+
+
+def fit(
+    measurement: Measurement,
+    hypothesis: Hypothesis,
+    *,
+    loss: str = "euclidean",
+    seed: int = 0,
+    out: Folder | None = None,
+) -> Fit:
+    """The global minimum of |F(x) - y| ("euclidean", N) or of the same in standard deviations of the noise
+    ("weighted"), with standard errors, with and without the convexity prior.
+    """
+    return analyses.fit(measurement, hypothesis, loss=loss, seed=seed, out=out).result
+
+
+def sample(
+    measurement: Measurement,
+    hypothesis: Hypothesis,
+    *,
+    ess: float = 1000.0,
+    seed: int = 0,
+    out: Folder | None = None,
+    whole: Measurement | None = None,
+) -> Run:
+    """Draws of p(parameters | measurement) worth ``ess`` independent ones; ``.data`` is an arviz InferenceData.
+
+    With ``out`` the run is stored, and read back or continued if it is there; ``whole`` is the measurement whose first
+    part ``measurement`` is, so that the rest is shown beside its prediction.
+    """
+    return analyses.sample(measurement, hypothesis, ess=ess, seed=seed, out=out, whole=whole).result
+
+
+def compare(
+    measurement: Measurement,
+    hypotheses: Sequence[Hypothesis],
+    *,
+    ess: float = 1000.0,
+    seed: int = 0,
+    out: Folder | None = None,
+    workers: int | None = 1,
+) -> Comparison:
+    """ln Z of every hypothesis by two estimators, leave-one-out beside it, and their ranking if the estimators agree.
+
+    ``workers`` processes share the work (None: one for each core; scripts then need ``if __name__ == "__main__"``).
+    """
+    ranges = {f"up to {1e3 * float(measurement.deflection.max()):.4g} mm": Range(measurement)}
+    (found,) = analyses.compare(ranges, hypotheses, ess=ess, seed=seed, out=out, workers=workers).result.values()
+    return found
+
+
+def valleys(
+    measurement: Measurement,
+    hypothesis: Hypothesis,
+    ranges_mm: Sequence[float] = (),
+    *,
+    loss_rise: float = 0.1,
+    seed: int = 0,
+    out: Folder | None = None,
+) -> Valleys | Beside:
+    """What fits within the part ``loss_rise`` of the least loss, on the ranges that end at ``ranges_mm``.
+
+    With effects also what it is without them (`Beside`).
+    """
+    ends = [1e-3 * end for end in ranges_mm]
+    return analyses.valleys(measurement, hypothesis, ends=ends, rise=loss_rise, seed=seed, out=out).result
+
+
+def diagnose(
+    measurement: Measurement, hypothesis: Hypothesis, *, seed: int = 0, out: Folder | None = None
+) -> Diagnosis:
+    """Whether the hypothesis leaves structure in the residual, and which effect or energy explains it."""
+    return analyses.diagnose(measurement, hypothesis, seed=seed, out=out).result
+
+
+def loop(
+    measurement: Measurement,
+    hypothesis: Hypothesis,
+    *,
+    ess: float = 1000.0,
+    seed: int = 0,
+    adapt_noise: bool = True,
+    out: Folder | None = None,
+) -> Loop:
+    """Diagnose, sample, add what is missing, and again, until adequate or abstaining.
+
+    ``adapt_noise`` samples with correlated noise where neighbouring readings turn out to be correlated.
+    """
+    return analyses.loop(measurement, hypothesis, ess=ess, seed=seed, adapt_noise=adapt_noise, out=out).result
+
+
+def reconstruct(*, seed: int = 0, out: Folder | None = None) -> Reconstruction:
+    """The measured curve behind the losses that the paper prints, with its covariance."""
+    return analyses.reconstruct(seed, out).result
+
+
+def report(*shown: Any, out: Folder, title: str | None = None) -> Path:
+    """Write ``out/index.html`` about results, and about all that lies in folders, and return its path.
+
+    Raises `SettingsError` if there is nothing to show, `StorageError` for a folder that holds nothing.
+    """
+    return write_report(shown, Path(out), title)
+
+
+def load(folder: Folder) -> Any:
+    """The result stored in ``folder``: a `Run`, a `Fit`, a `Diagnosis`, ...; of several, a dict by folder and kind.
+
+    Raises `StorageError` if there is none, or one is damaged.
+    """
+    found = lying([Path(folder)])
+    return found[0].read() if len(found) == 1 else {(each.folder.name, each.kind): each.read() for each in found}
+
+
+def as_dict(result: Any) -> dict[str, Any]:
+    """A result as plain values, the ones that ``--json`` prints: for JSON, pandas or a notebook of one's own."""
+    return documents.document(result)

@@ -1,0 +1,188 @@
+"""The options that verbs share, each said once, and groups of them that a verb takes as one argument.
+
+A verb is a function; where an argument is annotated with a group (a dataclass derived from `Group`), the command line
+has the group's fields as options, and the verb gets them as one value.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import MISSING, dataclass, fields
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+
+import typer
+
+from bayesmembrane.app.terminal import note, numbers
+
+if TYPE_CHECKING:
+    from bayesmembrane.data.measurement import Measurement
+    from bayesmembrane.physics.hypothesis import Hypothesis
+
+CHAINS = Path("chains")
+"""Where answers and runs lie unless another folder is named."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """A group of options."""
+
+
+@dataclass(frozen=True)
+class Output(Group):
+    """What every verb can be asked for beside its answer."""
+
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout; logs go to stderr.")] = False
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of every random number.")] = 0
+
+
+@dataclass(frozen=True)
+class Stored(Group):
+    """Where the answer is stored whole."""
+
+    folder: Annotated[Path, typer.Option("--out", help="Folder of the answers; this one gets its own inside.")] = CHAINS
+
+
+@dataclass(frozen=True)
+class StoredOnRequest(Group):
+    """Where an answer is stored that is quickly had again."""
+
+    folder: Annotated[
+        Path | None, typer.Option("--out", help="Also store the answer, in a folder inside this one.")
+    ] = None
+
+
+@dataclass(frozen=True)
+class Film(Group):
+    """A strain energy with its parameters."""
+
+    material: Annotated[str, typer.Option("--material", help="neo_hookean, mooney_rivlin, gent, yeoh or ogden.")]
+    parameters: Annotated[
+        str,
+        typer.Option(
+            "--parameters", help="Membrane parameters, N/m (exponents and Gent's c2 pure numbers), by commas."
+        ),
+    ]
+
+
+@dataclass(frozen=True)
+class Curve(Group):
+    """A measured curve."""
+
+    curve: Annotated[
+        Path, typer.Argument(help="The measured curve: CSV whose header names carry units.", metavar="CURVE")
+    ]
+    specimen: Annotated[Path, typer.Option("--specimen", help="TOML with film, rig and noise.")]
+
+    def read(self) -> Measurement:
+        """The whole measurement; what was left aside while reading is said on stderr."""
+        from bayesmembrane.data.measurement import read_measurement
+
+        measurement = read_measurement(self.curve, self.specimen)
+        for left_aside in measurement.provenance.notes:
+            note(f"{self.curve}: {left_aside}.")
+        return measurement
+
+
+@dataclass(frozen=True)
+class Range(Group):
+    """How much of the curve is used."""
+
+    max_deflection_mm: Annotated[
+        float | None, typer.Option("--max-deflection-mm", help="Use the curve up to here only, mm.")
+    ] = None
+
+    def of(self, whole: Measurement) -> Measurement:
+        """The part of a measurement that is used."""
+        return whole if self.max_deflection_mm is None else whole.up_to(self.max_deflection_mm * 1e-3)
+
+
+@dataclass(frozen=True)
+class Ranges(Group):
+    """Several ranges of one curve."""
+
+    ranges_mm: Annotated[
+        str, typer.Option("--ranges-mm", help="Ends of the ranges, mm: 35.1,91.5. The whole curve without.")
+    ] = ""
+
+    @property
+    def ends(self) -> list[float]:
+        """Their ends in m."""
+        return [1e-3 * end for end in numbers(self.ranges_mm, "--ranges-mm")] if self.ranges_mm else []
+
+
+@dataclass(frozen=True)
+class Material(Group):
+    """The strain energy that is asked about."""
+
+    material: Annotated[str, typer.Option("--material", help="neo_hookean, mooney_rivlin, gent, yeoh or ogden.")]
+
+
+@dataclass(frozen=True)
+class Materials(Group):
+    """Several strain energies."""
+
+    materials: Annotated[str, typer.Option("--materials", help="By commas; yeoh+prestretch adds an effect to one.")]
+
+
+@dataclass(frozen=True)
+class Beside(Group):
+    """What is claimed beside the strain energy."""
+
+    effects: Annotated[str, typer.Option("--effects", help="Physical effects beside the material, by commas.")] = ""
+    convexity: Annotated[str, typer.Option("--convexity", help="Convexity prior: reached, box, elliptic or none.")] = (
+        "reached"
+    )
+    noise: Annotated[str, typer.Option("--noise", help="Noise model: white, ar1 or ar1_readings.")] = "white"
+
+    def with_material(self, material: str, noise: str = "") -> Hypothesis:
+        """The hypothesis; ``noise`` instead of the one asked for, unless it is ""."""
+        from bayesmembrane.physics.hypothesis import hypothesis
+
+        names = [name.strip() for name in self.effects.split(",") if name.strip()]
+        return hypothesis(material, names, noise or self.noise, self.convexity)
+
+
+@dataclass(frozen=True)
+class BesideAuto(Beside):
+    """The same where the noise may be found out."""
+
+    noise: Annotated[
+        str,
+        typer.Option("--noise", help="A noise model, or auto: correlated if neighbouring readings turn out to be so."),
+    ] = "auto"
+
+
+@dataclass(frozen=True)
+class Sampling(Group):
+    """How well a posterior is sampled."""
+
+    ess: Annotated[float, typer.Option("--ess", help="Wanted effective sample size of the worst parameter.")] = 1000.0
+
+
+def spread(verb: Callable[..., None]) -> Callable[..., None]:
+    """``verb`` with the fields of every group among its arguments as arguments of their own, as Typer wants them."""
+    hints = get_type_hints(verb, include_extras=True)
+    groups = {n: h for n, h in hints.items() if inspect.isclass(h) and issubclass(h, Group)}
+    flat: dict[str, inspect.Parameter] = {}
+    for name, parameter in inspect.signature(verb).parameters.items():
+        own = _fields(groups[name]) if name in groups else [(name, hints[name], parameter.default)]
+        for option, hint, default in own:
+            flat[option] = inspect.Parameter(option, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
+
+    @wraps(verb)
+    def typed(**given: Any) -> None:
+        made = {n: kind(**{f.name: given.pop(f.name) for f in fields(kind)}) for n, kind in groups.items()}
+        verb(**made, **given)
+
+    typed.__signature__ = inspect.Signature(list(flat.values()))  # type: ignore[attr-defined]
+    typed.__annotations__ = {name: p.annotation for name, p in flat.items()}
+    return typed
+
+
+def _fields(group: type[Group]) -> list[tuple[str, Any, Any]]:
+    hints = get_type_hints(group, include_extras=True)
+    empty = inspect.Parameter.empty
+    return [(f.name, hints[f.name], empty if f.default is MISSING else f.default) for f in fields(group)]

@@ -1,0 +1,62 @@
+"""``compare``: which hypotheses the data support."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bayesmembrane.app.options import Beside, Curve, Materials, Output, Range, Ranges, Sampling, Stored
+from bayesmembrane.app.terminal import answer, lines, resumable, say, table
+from bayesmembrane.ground.errors import SettingsError
+
+if TYPE_CHECKING:
+    from bayesmembrane.comparison.result import Comparison
+
+place = 8
+
+# What a terminal of 80 characters has room for; a report shows all columns.
+COLUMNS = {
+    "evidence": ("hypothesis", "nested", "nested_sd", "bridge", "bridge_sd", "probability", "mass"),
+    "prediction": ("hypothesis", "elpd_loo", "loo_se", "refits", "held_rmse"),
+}
+
+
+def verb(
+    curve: Curve,
+    materials: Materials,
+    beside: Beside,
+    used: Range,
+    several: Ranges,
+    sampling: Sampling,
+    stored: Stored,
+    output: Output,
+) -> None:
+    """Which materials the data support, by two estimators of the evidence, with prediction beside it."""
+    from bayesmembrane.app import analyses
+    from bayesmembrane.comparison.compare import claimed, ranges_of
+
+    claims = claimed(materials.materials, beside.effects, beside.noise, beside.convexity)
+    if several.ranges_mm and used.max_deflection_mm is not None:
+        raise SettingsError("the range is given twice", "--ranges-mm, --max-deflection-mm", "give one of them")
+    only = [] if used.max_deflection_mm is None else [1e-3 * used.max_deflection_mm]
+    ranges = ranges_of(curve.read(), several.ends or only)
+    with resumable(stored.folder), lines() as tell:
+        found = analyses.compare(ranges, claims, ess=sampling.ess, seed=output.seed, out=stored.folder, progress=tell)
+    answer(found.document, output.as_json, lambda: show(found.result))
+
+
+def show(found: dict[str, Comparison]) -> None:
+    """Evidence and prediction of each range, on the terminal."""
+    from bayesmembrane.report.sections.evidence.tables import evidence_table
+    from bayesmembrane.words.comparison import remark, sentences
+
+    for name, comparison in found.items():
+        shown = evidence_table({name: comparison})
+        for text, part in COLUMNS.items():
+            columns = [i for i, c in enumerate(shown.columns) if c.key in part]
+            rows = [[row[i] for i in columns] for row in shown.cells()]
+            table(f"{name}: {text}", [shown.columns[i].head for i in columns], rows)
+        for row in comparison.rows:
+            if not row.fitted:
+                say(f"{row.label}: {remark(row)}")
+        for sentence in sentences(comparison):
+            say(sentence)

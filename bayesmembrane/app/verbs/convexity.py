@@ -1,0 +1,54 @@
+"""``convexity``: whether a strain energy is one on a box of stretches."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from bayesmembrane.app.options import Film, Output, StoredOnRequest
+from bayesmembrane.app.terminal import answer, numbers, say
+from bayesmembrane.ground.errors import SettingsError
+
+place = 2
+
+
+def verb(
+    film: Film,
+    stored: StoredOnRequest,
+    output: Output,
+    box: Annotated[str, typer.Option(help="Stretches between which W(l1, l2) must be convex.")] = "1,8",
+) -> None:
+    """Whether an energy is convex in the stretches on a box, by what margin, and where it is worst."""
+    from bayesmembrane.app.answers import Asked, kept
+    from bayesmembrane.ground.fingerprint import digest
+    from bayesmembrane.ground.registry import material as named
+    from bayesmembrane.physics.mechanics.convexity import box_convexity, box_ellipticity
+
+    edges = numbers(box, "--box")
+    if len(edges) != 2:
+        raise SettingsError(
+            f"a box has two edges, and {len(edges)} were given", where="--box", remedy="write --box 1,8"
+        )
+    made = named(film.material).from_vector(numbers(film.parameters, "--parameters"))
+    found, elliptic = box_convexity(made, *edges), box_ellipticity(made, *edges)
+    document = {
+        "material": made.name,
+        "convex": found.convex,
+        "margin": found.margin,
+        "worst": dict(zip(("l1", "l2"), found.worst, strict=True)),
+        "elliptic": elliptic.elliptic,
+        "elliptic_margin": elliptic.margin,
+        "box": edges,
+    }
+    l1, l2 = found.worst
+    sentence = (
+        f"{made.title} with {film.parameters} is {'' if found.convex else 'not '}convex on "
+        f"[{edges[0]:g}, {edges[1]:g}]^2: least eigenvalue of the Hessian {found.margin:.4g} G d, at stretches "
+        f"({l1:.4g}, {l2:.4g}); it is {'' if elliptic.elliptic else 'not '}elliptic there (least of P11, P22: "
+        f"{elliptic.margin:.4g} G d)."
+    )
+    settings = {"parameters": made.vector.tolist(), "box": edges}
+    what = Asked("convexity", "", made.name, float("nan"), digest(settings))
+    kept_as = kept("convexity", document, document, what, stored.folder)
+    answer(kept_as.document, output.as_json, lambda: say(sentence))

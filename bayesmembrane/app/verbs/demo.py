@@ -1,0 +1,28 @@
+"""``demo``: all of it on the data that ship."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bayesmembrane.app.options import CHAINS, Output, Sampling
+from bayesmembrane.app.terminal import answer, bars, note, say
+
+place = 12
+
+
+def verb(
+    sampling: Sampling,
+    output: Output,
+    page_folder: Annotated[Path, typer.Option("--out", help="Folder of the page.")] = Path("reports/demo"),
+    chains: Annotated[Path, typer.Option(help="Folder of the answers and runs.")] = CHAINS / "demo",
+) -> None:
+    """Reconstruct, fit and sample five materials on both ranges of the data that ship, compare, close loops, report."""
+    from bayesmembrane.app.demo import demo
+
+    note("Five materials on two ranges; the first run compiles the solvers, which takes about a minute.")
+    with bars() as tell:
+        document = demo(page_folder, chains, seed=output.seed, ess=sampling.ess, tell=tell)
+    answer(document, output.as_json, lambda: say(f"The report lies in {document['report']}"))

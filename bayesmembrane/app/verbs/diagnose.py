@@ -1,0 +1,64 @@
+"""``diagnose``: what the model misses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from bayesmembrane.app.options import Beside, Curve, Material, Output, Range, Stored
+from bayesmembrane.app.terminal import answer, note, say, status, table
+
+if TYPE_CHECKING:
+    from bayesmembrane.data.measurement import Measurement
+
+place = 9
+
+CANDIDATES = 8
+
+
+def verb(curve: Curve, material: Material, beside: Beside, used: Range, stored: Stored, output: Output) -> None:
+    """Whether the model misses something, which effect or energy explains it, or that this cannot be told."""
+    from bayesmembrane.app import analyses
+
+    claim = beside.with_material(material.material)
+    measurement = used.of(curve.read())
+    say_thinning(measurement)
+    with status(f"Diagnosing {claim.label()}") as tell:
+        found = analyses.diagnose(measurement, claim, seed=output.seed, out=stored.folder, tell=tell)
+    answer(found.document, output.as_json, lambda: show(found.document, measurement))
+
+
+def say_thinning(measurement: Measurement) -> None:
+    """On stderr, before the work: that not all readings will be used."""
+    from bayesmembrane.data.thinning import thinned
+    from bayesmembrane.diagnosis.result import thinning
+    from bayesmembrane.words.diagnosis import thinning_sentence
+
+    if (found := thinning(measurement, thinned(measurement))) is not None:
+        note(thinning_sentence(found).replace("were diagnosed", "are diagnosed"))
+
+
+def show(document: dict[str, Any], measurement: Measurement) -> None:
+    """A diagnosis on the terminal, in the units of the rig."""
+    factor, unit = measurement.rig.shown(measurement.specimen.thickness)["N"]
+    say(document["sentence"])
+    several = len({r["material"] for r in document["ranking"]}) > 1
+    rows = [
+        [
+            f"{r['effect']} with {r['material']}" if several and r["effect"] != r["material"] else r["effect"],
+            f"{r['log_bayes_factor']:.1f}",
+            f"{100 * r['unexplained']:.0f} %",
+            ", ".join(f"{k.split('.')[-1]} {v:.4g}" for k, v in r["parameters"].items()),
+        ]
+        for r in document["ranking"][:CANDIDATES]
+    ]
+    table("Candidates", ["effect or energy", "ln Bayes factor", "unexplained", "parameters, SI"], rows)
+    errors = [
+        [when, f"{factor * e['rmse_N']:.3g}", f"{factor * e['max_N']:.3g}", f"{e['reduced_chi2']:.2f}"]
+        for when, e in document["error"].items()
+        if isinstance(e, dict)
+    ]
+    table("Errors", ["", f"root mean square, {unit}", f"largest, {unit}", "reduced chi-square"], errors)
+    for sentence in document["absorbed"]:
+        say(sentence)
+    for step in document["next_measurements"]:
+        say(step["sentence"])

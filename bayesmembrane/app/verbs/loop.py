@@ -1,0 +1,59 @@
+"""``loop``: calibrate, diagnose, add what is missing, calibrate again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from bayesmembrane.app.options import BesideAuto, Curve, Material, Output, Range, Sampling, Stored
+from bayesmembrane.app.terminal import answer, lines, resumable, say
+from bayesmembrane.app.verbs.diagnose import say_thinning
+from bayesmembrane.app.verbs.diagnose import show as show_diagnosis
+
+if TYPE_CHECKING:
+    from bayesmembrane.data.measurement import Measurement
+
+place = 10
+
+
+def verb(
+    curve: Curve,
+    material: Material,
+    beside: BesideAuto,
+    used: Range,
+    sampling: Sampling,
+    stored: Stored,
+    output: Output,
+    report_folder: Annotated[Path, typer.Option("--report", help="Folder of the page.")] = Path("reports/loop"),
+) -> None:
+    """Calibrate, diagnose, add what is missing, calibrate again, until adequate or abstaining; and report."""
+    from bayesmembrane.app import analyses
+    from bayesmembrane.report.page import write_report
+
+    adapt = beside.noise == "auto"
+    claim = beside.with_material(material.material, noise="white" if adapt else "")
+    measurement = used.of(curve.read())
+    say_thinning(measurement)
+    with resumable(stored.folder), lines() as tell:
+        found = analyses.loop(
+            measurement,
+            claim,
+            ess=sampling.ess,
+            seed=output.seed,
+            adapt_noise=adapt,
+            out=stored.folder,
+            tell=lambda text: tell(claim.label(), text),
+        )
+    page = write_report([*analyses.loop_runs(found.result), found.result], report_folder)
+    document = {**found.document, "report": str(page)}
+    answer(document, output.as_json, lambda: show(document, measurement))
+
+
+def show(document: dict[str, Any], measurement: Measurement) -> None:
+    """Every round, and where the page lies, on the terminal."""
+    for number, round_ in enumerate(document["rounds"], 1):
+        say(f"Round {number}")
+        show_diagnosis(round_, measurement)
+    say(f"The report lies in {document['report']}")

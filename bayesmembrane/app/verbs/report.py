@@ -1,0 +1,35 @@
+"""``report``: a page about whatever answers lie in some folders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bayesmembrane.app.options import Output
+from bayesmembrane.app.terminal import answer, say
+
+place = 11
+
+
+def verb(
+    folders: Annotated[
+        list[Path], typer.Argument(help="Folders of answers and runs, or that hold such.", metavar="DIR...")
+    ],
+    output: Output,
+    page_folder: Annotated[Path, typer.Option("--out", help="Folder of the page.")] = Path("reports/report"),
+    title: Annotated[str | None, typer.Option(help="Title of the page.")] = None,
+) -> None:
+    """One self-contained HTML page about whatever answers and runs lie there."""
+    from bayesmembrane.app.folders import RUN, lying
+    from bayesmembrane.report.page import write_report
+
+    found = lying(folders)
+    page = write_report(folders, page_folder, title)
+    document = {
+        "report": str(page),
+        "runs": [str(f.folder) for f in found if f.kind == RUN],
+        "answers": [{"folder": str(f.folder), "kind": f.kind} for f in found if f.kind != RUN],
+    }
+    answer(document, output.as_json, lambda: say(f"The report lies in {page}"))

@@ -1,0 +1,56 @@
+"""``sample``: the posterior."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+
+from bayesmembrane.app.options import Beside, Curve, Material, Output, Range, Sampling, Stored
+from bayesmembrane.app.terminal import INTERRUPTED, answer, bars, command, note, say, table
+
+place = 6
+
+
+def verb(
+    curve: Curve,
+    material: Material,
+    beside: Beside,
+    used: Range,
+    sampling: Sampling,
+    stored: Stored,
+    output: Output,
+) -> None:
+    """The posterior, stored as a run; the same command continues a run that was interrupted."""
+    from bayesmembrane.app import analyses
+
+    claim, whole = beside.with_material(material.material), curve.read()
+    with bars() as tell:
+        tell(claim.label(), "finding starts")
+        found = analyses.sample(
+            used.of(whole),
+            claim,
+            ess=sampling.ess,
+            seed=output.seed,
+            out=stored.folder,
+            whole=whole,
+            progress=lambda progress: tell(claim.label(), progress),
+        )
+    if found.result.interrupted:
+        note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")
+        raise typer.Exit(INTERRUPTED)
+    title = f"{claim.material.title} on {curve.curve}"
+    answer(found.document, output.as_json, lambda: show(found.document, title))
+
+
+def show(run: dict[str, Any], title: str) -> None:
+    """Parameters, and how well they were sampled, on the terminal."""
+    rows = [
+        [name, f"{v['mean']:.5g}", f"{v['sd']:.2g}", f"{v['hdi_94'][0]:.5g} to {v['hdi_94'][1]:.5g}"]
+        for name, v in run["posterior"].items()
+    ]
+    table(title, ["parameter", "mean", "sd", "94 % interval"], rows)
+    say(f"ESS {run['ess_bulk']:.0f}, R-hat {run['r_hat']:.3f}, {run['evaluations']} curves, {run['seconds']:.0f} s.")
+    for sentence in run["sentences"]:
+        say(sentence)
+    say(f"Stored in {run['stored']}; bayesmembrane report {run['stored']} shows it.")

@@ -1,0 +1,69 @@
+"""``valleys``: where many films fit nearly as well as the best one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from bayesmembrane.app.options import CHAINS, Beside, Curve, Material, Output, Ranges
+from bayesmembrane.app.terminal import answer, say, status, table
+
+if TYPE_CHECKING:
+    from bayesmembrane.valleys.beside import Beside as BesideValleys
+    from bayesmembrane.valleys.result import Valleys
+
+place = 7
+
+COLUMNS = ("material", "end_mm", "loss_N", "length", "unit", "condition_number", "open")
+TESTS = 5
+
+
+def verb(
+    curve: Curve,
+    material: Material,
+    beside: Beside,
+    ranges: Ranges,
+    output: Output,
+    loss_rise: Annotated[float, typer.Option(help="A valley fits within this part of the least loss.")] = 0.1,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder of the answer; JSON and figure are written here too. Without: chains."),
+    ] = None,
+) -> None:
+    """How long the valley of the loss is, over one range or several, whether they meet, and what to measure next.
+
+    With --effects also the valley without them, and how far the two lie apart.
+    """
+    from bayesmembrane.app import analyses
+    from bayesmembrane.report.sections.valleys import write_valleys
+
+    claim = beside.with_material(material.material)
+    measurement = curve.read()
+    with status(f"Following the valleys of {claim.label()}"):
+        found = analyses.valleys(
+            measurement, claim, ends=ranges.ends, rise=loss_rise, seed=output.seed, out=folder or CHAINS
+        )
+    document = found.document
+    if folder is not None:
+        document |= {"files": [str(f) for f in write_valleys(found.result, folder)]}
+    title = f"Valleys of {claim.material.title} on {curve.curve}"
+    answer(document, output.as_json, lambda: show(found.result, title))
+
+
+def show(found: Valleys | BesideValleys, title: str) -> None:
+    """The valleys, what is said of them, and what would shorten them, on the terminal."""
+    from bayesmembrane.report.sections.valleys.tables import valley_table
+    from bayesmembrane.valleys.beside import Beside as BesideValleys
+    from bayesmembrane.words.valleys import sentences
+
+    parts = [found.without, found.added] if isinstance(found, BesideValleys) else [found]
+    whole = valley_table(parts)
+    shown = [i for i, c in enumerate(whole.columns) if c.key in COLUMNS]
+    table(title, [whole.columns[i].head for i in shown], [[row[i] for i in shown] for row in whole.cells()])
+    for sentence in sentences(found):
+        say(sentence)
+    for valley in parts[-1].ranges:
+        rows = [[t.test, f"{100 * t.reduction:.0f} %"] for t in valley.next_tests[:TESTS]]
+        table(f"What to measure next, from data up to {1e3 * valley.end:.4g} mm", ["test", "shorter by"], rows)

@@ -1,0 +1,135 @@
+"""Every verb stores its answer whole, under a name that says what it is, and it is read back as it was."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bayesmembrane as bm
+from bayesmembrane.app import analyses
+from bayesmembrane.app.answers import Asked, asked, kept
+from bayesmembrane.app.folders import lying
+from bayesmembrane.calibration.fit import fit as least_squares
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.errors import SettingsError, StorageError
+from bayesmembrane.ground.plain import plain
+from bayesmembrane.ground.stored import answer, read
+from bayesmembrane.physics.hypothesis import hypothesis
+
+PLAIN = hypothesis("neo_hookean")
+
+
+@pytest.fixture
+def curve(film: Any) -> Measurement:
+    """A neo-Hookean film with noise."""
+    return film("neo_hookean", (7.0,), end=0.03, points=10, noise=0.002)
+
+
+def equal(a: Any, b: Any) -> bool:
+    return json.dumps(plain(a)) == json.dumps(plain(b))
+
+
+def named(measurement: Measurement, *claims: Any, verb: str = "fit", seed: int = 0, **options: Any) -> str:
+    return asked(verb, least_squares, [measurement], claims or [PLAIN], {"seed": seed, **options}).name
+
+
+def test_the_folder_says_what_lies_in_it(curve: Measurement) -> None:
+    film = replace(curve, specimen=replace(curve.specimen, name="Film No. 1 / µ"))
+    assert re.fullmatch(r"film-no-1_neo_hookean_30mm_fit_[0-9a-f]{8}", named(film))
+
+
+def test_what_was_asked_decides_the_folder(curve: Measurement) -> None:
+    """Another seed, option, range or hypothesis is another answer; the same question the same one."""
+    several = [
+        named(curve),
+        named(curve, seed=1),
+        named(curve, loss="weighted"),
+        named(curve, verb="diagnose"),
+        named(curve.up_to(0.02)),
+        named(curve, hypothesis("neo_hookean", ["zero_offset"])),
+        named(curve, hypothesis("neo_hookean", noise="ar1")),
+        named(curve, hypothesis("neo_hookean", convexity="none")),
+    ]
+    assert len(set(several)) == len(several)
+    assert named(curve) == several[0]
+
+
+def test_a_name_never_grows_beyond_what_a_disk_takes(curve: Measurement) -> None:
+    long = replace(curve, specimen=replace(curve.specimen, name="film " * 100))
+    assert len(named(long, *[PLAIN] * 40)) < 200
+    assert Asked("reconstruct", "published losses", "", float("nan"), 8 * "0a").name == (
+        "published-losses_reconstruct_0a0a0a0a"
+    )
+
+
+def test_without_a_folder_nothing_is_stored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = kept("fit", 1, {"loss_N": 2.0}, Asked("fit", "a", "b", 1.0, "0a"), None)
+    assert found.document == {"loss_N": 2.0, "stored": None}
+    assert found.folder is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_fit_and_diagnosis_come_back_as_they_were(curve: Measurement, tmp_path: Path) -> None:
+    for kind, found in (
+        ("fit", analyses.fit(curve, PLAIN, out=tmp_path)),
+        ("diagnosis", analyses.diagnose(curve, PLAIN, out=tmp_path)),
+    ):
+        folder = found.folder
+        assert folder is not None
+        assert folder.parent == tmp_path
+        again = read(folder, kind)
+        assert type(again) is type(found.result)
+        assert equal(bm.as_dict(again), bm.as_dict(found.result))
+        assert equal(answer(folder, kind), found.document)
+        assert bm.load(folder) is not None
+    everything = bm.load(tmp_path)
+    assert sorted(kind for _, kind in everything) == ["diagnosis", "fit"]
+
+
+def test_valleys_with_an_effect_come_back_as_they_were(curve: Measurement, tmp_path: Path) -> None:
+    claim = hypothesis("neo_hookean", ["force_offset"])
+    found = analyses.valleys(curve, claim, out=tmp_path)
+    (again,) = lying([tmp_path])
+    assert again.kind == "valleys"
+    assert equal(bm.as_dict(again.read()), bm.as_dict(found.result))
+    np.testing.assert_array_equal(again.read().added.ranges[0].floor, found.result.added.ranges[0].floor)
+
+
+def test_a_loop_is_read_back_with_its_runs_also_where_it_was_moved(curve: Measurement, tmp_path: Path) -> None:
+    found = analyses.loop(curve, PLAIN, ess=100, out=tmp_path / "here", runs=tmp_path / "here" / "runs")
+    (tmp_path / "here").rename(tmp_path / "there")
+    (again,) = lying([tmp_path / "there"])
+    assert again.kind == "loop"
+    first, before = again.read().rounds[0], found.result.rounds[0]
+    assert first.before.run.path.is_dir()
+    np.testing.assert_array_equal(first.before.run.draws(), before.before.run.draws())
+    assert (first.after is first.before) == (before.after is before.before)
+    assert first.diagnosis.verdict == before.diagnosis.verdict
+
+
+def test_a_comparison_is_read_back(curve: Measurement, tmp_path: Path) -> None:
+    found = bm.compare(curve, [PLAIN], ess=100, out=tmp_path)
+    kinds = {f.kind: f.read() for f in lying([tmp_path])}
+    assert set(kinds) == {"comparison", "run"}
+    (again,) = kinds["comparison"].values()
+    assert equal(bm.as_dict(again), bm.as_dict(found))
+    assert again.rows[0].run == kinds["run"].path
+
+
+def test_a_folder_without_anything_is_told(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    for place in ("empty", "absent"):
+        with pytest.raises(StorageError, match=place):
+            lying([tmp_path / place])
+
+
+def test_what_is_no_result_has_no_document() -> None:
+    with pytest.raises(SettingsError, match="a float is no result"):
+        bm.as_dict(3.0)
