@@ -9,7 +9,7 @@ from bayesmembrane.data.thinning import thinned
 from bayesmembrane.diagnosis.candidates.candidate import absorbed
 from bayesmembrane.diagnosis.candidates.sudden import SuddenChange, sudden_change
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
-from bayesmembrane.diagnosis.explanation.case import Case, Tell, opened
+from bayesmembrane.diagnosis.explanation.case import OpenCase, Tell, opened
 from bayesmembrane.diagnosis.explanation.refits import left_by_form
 from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, explained
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
@@ -39,7 +39,7 @@ def diagnose(
     return replace(found, thinned=thinning(measurement, part))
 
 
-def _diagnosed(case: Case) -> Diagnosis:
+def _diagnosed(case: OpenCase) -> Diagnosis:
     if case.detection.adequate:
         return _concluded(case, adequate(case))
     form = left_by_form(case)
@@ -48,7 +48,7 @@ def _diagnosed(case: Case) -> Diagnosis:
     return _concluded(*explained(case))
 
 
-def _concluded(case: Case, found: Verdict) -> Diagnosis:
+def _concluded(case: OpenCase, found: Verdict) -> Diagnosis:
     """The answer, with what was not needed to find it: power, errors on other points, what to measure next."""
     known = found.verdict in ("named", "ambiguous", "material")
     null, best = case.null, found.members[0].candidate if known else case.null
@@ -80,14 +80,14 @@ def _concluded(case: Case, found: Verdict) -> Diagnosis:
     )
 
 
-def _validated(case: Case, found: Verdict, known: bool) -> HeldOut | None:
+def _validated(case: OpenCase, found: Verdict, known: bool) -> HeldOut | None:
     case.tell("checking on points that were set aside")
     if not known:
         return validate(case.search, case.null, case.null, [])
     return validate(case.search, case.null, found.members[0].candidate, [j.candidate for j in found.ranking[:3]])
 
 
-def _experiments(case: Case, found: Verdict) -> tuple[Experiment, ...]:
+def _experiments(case: OpenCase, found: Verdict) -> tuple[Experiment, ...]:
     """What to measure next, where rivals are left."""
     if found.verdict != "ambiguous" or len(found.members) < 2:
         return ()
@@ -95,7 +95,7 @@ def _experiments(case: Case, found: Verdict) -> tuple[Experiment, ...]:
     return tuple(experiments(case.measurement, rivals, case.search.noise.sd, case.search.solve))
 
 
-def _sudden(case: Case, found: Verdict) -> SuddenChange | None:
+def _sudden(case: OpenCase, found: Verdict) -> SuddenChange | None:
     """The sudden change that the verdict knows of, or that comes nearest where nothing explains the curve."""
     if found.sudden is not None or found.verdict != "unknown":
         return found.sudden

@@ -32,7 +32,7 @@ Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class OpenCase:
     """Everything that the steps of a diagnosis need, and what they have found so far.
 
     search : fits candidates; it has the measurement, its noise, the seed and the solver
@@ -98,7 +98,7 @@ class Judged:
         return self.candidate.log_evidence
 
 
-def opened(measurement: Measurement, hypothesis: Hypothesis, seed: int, solve: Solve, tell: Tell) -> Case:
+def opened(measurement: Measurement, hypothesis: Hypothesis, seed: int, solve: Solve, tell: Tell) -> OpenCase:
     """The model as given, fitted and tested; first with the reference's noise, then with one that knows its slopes.
 
     Raises `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
@@ -119,10 +119,10 @@ def opened(measurement: Measurement, hypothesis: Hypothesis, seed: int, solve: S
     rng = np.random.default_rng([seed, 7])
     found = signatures(search, null, effects)
     seen = whitened(null.residual, null.slopes, smooth, search.noise.cautious())
-    return Case(search, smooth, null, effects, tuple(found), detect(measurement, seen, found, rng), rng, tell)
+    return OpenCase(search, smooth, null, effects, tuple(found), detect(measurement, seen, found, rng), rng, tell)
 
 
-def reopened(case: Case, null: Candidate) -> Case:
+def reopened(case: OpenCase, null: Candidate) -> OpenCase:
     """The same case with another null model: one that has more effects, or other parameters."""
     effects = tuple(e for e in case.effects if e.name not in null.names)
     found = signatures(case.search, null, effects)
@@ -140,7 +140,7 @@ def _check_size(measurement: Measurement, hypothesis: Hypothesis) -> None:
         )
 
 
-def judged(case: Case, candidate: Candidate) -> Judged:
+def judged(case: OpenCase, candidate: Candidate) -> Judged:
     """Its lack of fit, the part of the null model's that is left, and whether it explains the curve."""
     white = case.whitened(candidate.residual, candidate.slopes)
     fit = lack_of_fit(white)
@@ -153,7 +153,7 @@ def judged(case: Case, candidate: Candidate) -> Judged:
     return Judged(candidate, fit, left, p_value, gain, ripples, explains)
 
 
-def leaves_little(case: Case, residual: Array, slopes: Array) -> bool:
+def leaves_little(case: OpenCase, residual: Array, slopes: Array) -> bool:
     """True if what a model with these slopes (N, k) leaves (N,) is noise, or little of the null model's misfit."""
     fit = lack_of_fit(case.whitened(residual, slopes))
     left, p_value = fit.part_left_of(case.before), fit.p_if_left(EXPLANATION.unexplained_large, case.before)

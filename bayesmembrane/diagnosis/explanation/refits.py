@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import effective_weight, starts_with
-from bayesmembrane.diagnosis.explanation.case import Case, Judged, judged
+from bayesmembrane.diagnosis.explanation.case import Judged, OpenCase, judged
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.noise import orthonormal
 from bayesmembrane.diagnosis.thresholds import EXPLANATION, SEARCH
@@ -20,13 +20,13 @@ from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.base import Material
 
 
-def singles(case: Case) -> list[Judged]:
+def singles(case: OpenCase) -> list[Judged]:
     """The null model with each visible effect; the most probable first."""
     bases = [case.null.x, *case.search.material_starts(case.null.hypothesis)]
     return ranked(_added(case, case.null, effect, bases) for effect in case.visible)
 
 
-def pairs(case: Case, alone: Sequence[Judged]) -> list[Judged]:
+def pairs(case: OpenCase, alone: Sequence[Judged]) -> list[Judged]:
     """The best few single effects, each with every other visible effect; the most probable pair first.
 
     The first effect of a pair is often not the best single one: hence several are followed.
@@ -43,12 +43,12 @@ def pairs(case: Case, alone: Sequence[Judged]) -> list[Judged]:
     return ranked(out.values())
 
 
-def energies(case: Case) -> list[Judged]:
+def energies(case: OpenCase) -> list[Judged]:
     """The other strain energies, with the effects of the null model; the most probable first."""
     return ranked(_with_energy(case, case.null.hypothesis, kind, np.empty(0)) for kind in _others(case))
 
 
-def energies_with_effects(case: Case, found: Sequence[Judged]) -> list[Judged]:
+def energies_with_effects(case: OpenCase, found: Sequence[Judged]) -> list[Judged]:
     """The effects of the first few of ``found`` with every other energy; the most probable first.
 
     A wrong energy leaves structure, and an effect whose law is free may follow that instead of the true one's.
@@ -61,12 +61,12 @@ def energies_with_effects(case: Case, found: Sequence[Judged]) -> list[Judged]:
     )
 
 
-def again(case: Case, found: Iterable[Judged]) -> list[Judged]:
+def again(case: OpenCase, found: Iterable[Judged]) -> list[Judged]:
     """The same candidates fitted anew from where they are, with the case's present noise and weight."""
     return ranked(_refitted(case, j.candidate.hypothesis, [j.candidate.x]) or j for j in found)
 
 
-def renewed(case: Case, found: Sequence[Judged]) -> tuple[Case, list[Judged]]:
+def renewed(case: OpenCase, found: Sequence[Judged]) -> tuple[OpenCase, list[Judged]]:
     """Noise and weight from the best candidate, which misses less than the null model, and all candidates fitted anew.
 
     Misfit looks like noise that remembers: what the best model leaves is closer to the truth.
@@ -82,7 +82,7 @@ def renewed(case: Case, found: Sequence[Judged]) -> tuple[Case, list[Judged]]:
     return case, again(case, found)
 
 
-def better_null(case: Case, alone: Sequence[Judged]) -> Candidate | None:
+def better_null(case: OpenCase, alone: Sequence[Judged]) -> Candidate | None:
     """The plain model from where effects have led its material, if that is a better fit than the first search found.
 
     Else effects of no size would seem to explain the curve.
@@ -93,7 +93,7 @@ def better_null(case: Case, alone: Sequence[Judged]) -> Candidate | None:
     return found if found is not None and found.log_evidence > null.log_evidence + SEARCH.better_null else None
 
 
-def left_by_form(case: Case) -> float | None:
+def left_by_form(case: OpenCase) -> float | None:
     """Part of the plain material's misfit that the given effects leave, if a machine that differs a little from the
     textbook leaves as much; else, or without effects, None.
 
@@ -113,14 +113,14 @@ def ranked(found: Iterable[Judged | None]) -> list[Judged]:
     return sorted((j for j in found if j is not None), key=lambda j: -j.log_evidence)
 
 
-def _added(case: Case, base: Candidate, effect: Effect, bases: Sequence[Array]) -> Judged | None:
+def _added(case: OpenCase, base: Candidate, effect: Effect, bases: Sequence[Array]) -> Judged | None:
     """``base`` with one more effect, from starts at its own coordinates ``bases`` (k,)."""
     names = [e.title for e in base.hypothesis.effects if e.name not in case.null.names]
     case.tell(f"refitting with {' and '.join([*names, effect.title])}")
     return _refitted(case, with_effects(base.hypothesis, [effect]), starts_with(bases, effect))
 
 
-def _with_energy(case: Case, base: Hypothesis, energy: type[Material], effects: Array) -> Judged | None:
+def _with_energy(case: OpenCase, base: Hypothesis, energy: type[Material], effects: Array) -> Judged | None:
     """``base`` with another strain energy, from the coordinates of its ``effects``, or from none if they are empty."""
     case.tell(f"trying the energy {energy.title}")
     other = replace(base, material=energy)
@@ -130,11 +130,11 @@ def _with_energy(case: Case, base: Hypothesis, energy: type[Material], effects: 
     return _refitted(case, other, starts)
 
 
-def _refitted(case: Case, hypothesis: Hypothesis, starts: Sequence[Array]) -> Judged | None:
+def _refitted(case: OpenCase, hypothesis: Hypothesis, starts: Sequence[Array]) -> Judged | None:
     found = case.search.fit(hypothesis, starts)
     return None if found is None else judged(case, found)
 
 
-def _others(case: Case) -> list[type[Material]]:
+def _others(case: OpenCase) -> list[type[Material]]:
     """The strain energies that the null model does not have."""
     return [kind for name, kind in materials().items() if name != case.null.hypothesis.material.name]

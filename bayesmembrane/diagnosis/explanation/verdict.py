@@ -10,7 +10,7 @@ import numpy as np
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.sudden import SuddenChange, sudden_change
 from bayesmembrane.diagnosis.detection.scores import angle
-from bayesmembrane.diagnosis.explanation.case import Case, Judged, judged, leaves_little, reopened
+from bayesmembrane.diagnosis.explanation.case import Judged, OpenCase, judged, leaves_little, reopened
 from bayesmembrane.diagnosis.explanation.refits import (
     again,
     better_null,
@@ -46,13 +46,13 @@ class Verdict:
     form: float | None = None
 
 
-def adequate(case: Case, form: float | None = None) -> Verdict:
+def adequate(case: OpenCase, form: float | None = None) -> Verdict:
     """Nothing is seen to be missing, or no more than the ``form`` of its effects."""
     null = judged(case, case.null)
     return Verdict("adequate", (null,), (null,), form=form)
 
 
-def explained(case: Case) -> tuple[Case, Verdict]:
+def explained(case: OpenCase) -> tuple[OpenCase, Verdict]:
     """(case with the noise of the best model, verdict) of a model that misses something."""
     alone = singles(case)
     if (better := better_null(case, alone)) is not None:
@@ -81,14 +81,14 @@ def explained(case: Case) -> tuple[Case, Verdict]:
     return case, replace(_with_other_energies(verdict, elsewhere), ranking=tuple(every))
 
 
-def _more_is_missing(case: Case, best: Judged) -> bool:
+def _more_is_missing(case: OpenCase, best: Judged) -> bool:
     """True if the best single effect leaves structure behind that another one could take away."""
     if best.ripples:
         return False
     return not best.explains or not reopened(case, best.candidate).detection.adequate
 
 
-def _earns_its_place(case: Case, pair: Judged, first: Judged) -> bool:
+def _earns_its_place(case: OpenCase, pair: Judged, first: Judged) -> bool:
     """True if two effects are worth their parameters beside the best single one, and take away misfit that matters.
 
     An effect whose textbook form differs a little from the machine's leaves something that a second effect could take:
@@ -101,7 +101,7 @@ def _earns_its_place(case: Case, pair: Judged, first: Judged) -> bool:
 # ---- rivals ----------------------------------------------------------------------------------------------------------
 
 
-def _rivals(case: Case, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
+def _rivals(case: OpenCase, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
     """The best and those that the evidence does not put out of its reach; of look-alikes it must say more."""
     if not explaining:
         return ()
@@ -110,7 +110,7 @@ def _rivals(case: Case, explaining: Sequence[Judged]) -> tuple[Judged, ...]:
     return (best, *near)
 
 
-def _needed(case: Case, best: Judged, other: Judged) -> float:
+def _needed(case: OpenCase, best: Judged, other: Judged) -> float:
     """ln of the Bayes factor that sets two candidates apart: more where their traces, as fitted, look alike, where the
     better one leaves much, or where the law of the other is known to vary.
     """
@@ -126,7 +126,7 @@ def _needed(case: Case, best: Judged, other: Judged) -> float:
     return max(needed, limits.form_share * left, varies * best.gain)
 
 
-def _degrees_apart(case: Case, a: Candidate, b: Candidate) -> float:
+def _degrees_apart(case: OpenCase, a: Candidate, b: Candidate) -> float:
     """Between what two candidates take away from the null model's residual, freed of noise.
 
     What two pairs have in common tells nothing of what sets them apart.
@@ -139,7 +139,7 @@ def _degrees_apart(case: Case, a: Candidate, b: Candidate) -> float:
     return angle(one, two, fold=False)
 
 
-def _follows_deflection(case: Case, candidate: Candidate) -> bool:
+def _follows_deflection(case: OpenCase, candidate: Candidate) -> bool:
     """True if its effects change the curve by a function of deflection alone, on this path."""
     measurement = case.measurement
     if np.all(np.diff(measurement.path.deflection) >= 0) and not measurement.holds:
@@ -156,7 +156,9 @@ def _follows_deflection(case: Case, candidate: Candidate) -> bool:
 # ---- the verdict -----------------------------------------------------------------------------------------------------
 
 
-def _decided(case: Case, explaining: Sequence[Judged], alone: Sequence[Judged], others: Sequence[Judged]) -> Verdict:
+def _decided(
+    case: OpenCase, explaining: Sequence[Judged], alone: Sequence[Judged], others: Sequence[Judged]
+) -> Verdict:
     """The verdict from what explains the curve, the single effects that do, and the energies that may do so."""
     if not explaining:
         return _without_effects(others)
@@ -185,7 +187,7 @@ def _decided(case: Case, explaining: Sequence[Judged], alone: Sequence[Judged], 
     return Verdict("named" if single else "ambiguous", rivals, sudden=change if single else None)
 
 
-def _sudden_rival(case: Case, best: float) -> SuddenChange | None:
+def _sudden_rival(case: OpenCase, best: float) -> SuddenChange | None:
     """A sudden change that explains the curve and that the best effect's ln K does not put out."""
     change = sudden_change(case.search, case.null)
     if change is None or change.gain <= best - EXPLANATION.decisive:
