@@ -19,8 +19,9 @@ from bayesmembrane.app.answers import asked, kept
 from bayesmembrane.calibration.beside_paper import compare_with_paper, paper_break_points
 from bayesmembrane.calibration.run import load_run
 from bayesmembrane.comparison.compare import Range
-from bayesmembrane.data.measurement import Measurement, read_measurement
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.published import read_published_table
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.ground.jobs import Tell, silent, workers
 from bayesmembrane.ground.plain import plain

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 from scipy.interpolate import CubicSpline
 
-from bayesmembrane.data.published import PublishedTable, Row
+from bayesmembrane.data.published import PrintedSet, PublishedTable
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.reconstruction.fit import Mode, again, find_mode
 from bayesmembrane.reconstruction.model import Model, Simulate
@@ -175,12 +175,12 @@ def suspect(table: PublishedTable, model: Model, mode: Mode, check: RowCheck, si
     )
 
 
-def _predicted(table: PublishedTable, row: Row, check: RowCheck) -> tuple[PredictedLoss, ...]:
+def _predicted(table: PublishedTable, row: PrintedSet, check: RowCheck) -> tuple[PredictedLoss, ...]:
     parts = zip(table.ranges, row.losses, row.loss, check.excess, check.sd, strict=True)
     return tuple(PredictedLoss(name, printed, float(loss + e), float(s)) for name, printed, loss, e, s in parts)
 
 
-def _loss_corrections(table: PublishedTable, row: Row, check: RowCheck) -> tuple[Correction, ...]:
+def _loss_corrections(table: PublishedTable, row: PrintedSet, check: RowCheck) -> tuple[Correction, ...]:
     """The losses that disagree, replaced by what the other rows predict."""
     found = []
     for name, printed, loss, excess, sd in zip(table.ranges, row.losses, row.loss, check.excess, check.sd, strict=True):
@@ -190,7 +190,9 @@ def _loss_corrections(table: PublishedTable, row: Row, check: RowCheck) -> tuple
     return tuple(found)
 
 
-def _parameter_corrections(row: Row, model: Model, mode: Mode, check: RowCheck, simulate: Simulate) -> list[Correction]:
+def _parameter_corrections(
+    row: PrintedSet, model: Model, mode: Mode, check: RowCheck, simulate: Simulate
+) -> list[Correction]:
     """Single parameters whose change makes all losses agree."""
     state = model.evaluate(mode.theta[None], mode.knobs)
     order = np.argsort(state.x[0])

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesmembrane.data.measurement import read_measurement
 from bayesmembrane.data.published import PublishedTable, read_published_table
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import data_folder
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array

@@ -13,7 +13,8 @@ from scipy.optimize import minimize_scalar
 from typer.testing import CliRunner
 
 from bayesmembrane.app.cli import assembled
-from bayesmembrane.data.measurement import Measurement, Specimen, write_measurement
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.writing import write_measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.ground.stored import read, store
