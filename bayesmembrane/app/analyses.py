@@ -1,12 +1,10 @@
-"""The verbs as library calls: each computes its result, says it as the JSON answer, and stores both.
-
-``out`` is the folder of all answers; None stores nothing, unless runs are needed: then they are not kept either.
-"""
+"""The verbs as library calls: each computes its result, says it as the JSON answer, and stores both."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,19 +19,20 @@ from bayesmembrane.calibration.fit import fit as run_fit
 from bayesmembrane.calibration.predictions import Wanted
 from bayesmembrane.calibration.run import Run, predictions_of
 from bayesmembrane.calibration.run import sample as run_sample
-from bayesmembrane.calibration.sampling.walk import Callback
+from bayesmembrane.calibration.sampling.walk import Progress
 from bayesmembrane.comparison.compare import Range, compare_ranges
 from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.diagnosis.diagnose import diagnose as run_diagnose
-from bayesmembrane.diagnosis.loop import Loop, LoopSettings, Watch
+from bayesmembrane.diagnosis.loop import Loop, LoopSettings
 from bayesmembrane.diagnosis.loop import loop as run_loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.jobs import Tell, silent
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.cache import CachedSolver
+from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.reconstruction.reconstruct import reconstruct as run_reconstruct
@@ -43,45 +42,60 @@ from bayesmembrane.valleys.follow import RISE, valleys_of
 from bayesmembrane.valleys.follow import valleys as run_valleys
 from bayesmembrane.valleys.result import Valleys
 
-Say = Callable[[str], None]
 CURVES = "curves"  # the folder beside the runs in which the solver keeps what it has computed
 
 
-def reconstruct(seed: int = 0, out: str | Path | None = None) -> Answer[Reconstruction]:
+@dataclass(frozen=True)
+class Work:
+    """How a verb works.
+
+    out : folder of all answers; None stores nothing
+    ess : effective sample size of posteriors
+    tell : is told (label, what is being done for it: a text, or the `Progress` of sampling)
+    """
+
+    seed: int = 0
+    out: Path | None = None
+    ess: float = 1000.0
+    tell: Tell = silent
+
+    @property
+    def solve(self) -> Solve:
+        """The solver; with a folder one that remembers there what it has solved."""
+        return api.solve if self.out is None else CachedSolver(self.out / CURVES)
+
+
+def reconstruct(work: Work) -> Answer[Reconstruction]:
     """The measured curve behind the published losses of the paper."""
-    found = run_reconstruct(read_published_table(), seed=seed)
-    mark = fingerprint(run_reconstruct.__module__, (), (), {}, seed)
+    found = run_reconstruct(read_published_table(), seed=work.seed)
+    mark = fingerprint(run_reconstruct.__module__, (), (), {}, work.seed)
     what = Asked("reconstruct", "published losses", "", float("nan"), mark)
-    return kept("reconstruction", found, document(found), what, out)
+    return kept("reconstruction", found, document(found), what, work.out)
 
 
 def fit(
     measurement: Measurement,
     claim: Hypothesis,
+    work: Work,
     *,
     loss: str = "euclidean",
-    seed: int = 0,
     starts: Sequence[Sequence[float]] = (),
-    out: str | Path | None = None,
 ) -> Answer[Fit]:
     """The least-squares optimum; ``starts`` are membrane parameters to search from as well."""
-    found = run_fit(measurement, claim, loss=loss, seed=seed, starts=starts)
-    settings = {"seed": seed, "loss": loss, "starts": [list(s) for s in starts]}
+    found = run_fit(measurement, claim, loss=loss, seed=work.seed, starts=starts)
+    settings = {"seed": work.seed, "loss": loss, "starts": [list(s) for s in starts]}
     what = asked("fit", run_fit, [measurement], [claim], settings)
-    return kept("fit", found, document(found), what, out)
+    return kept("fit", found, document(found), what, work.out)
 
 
 def sample(
     measurement: Measurement,
     claim: Hypothesis,
+    work: Work,
     *,
-    ess: float = 1000.0,
-    seed: int = 0,
-    out: str | Path | None = None,
     name: str | None = None,
     whole: Measurement | None = None,
     breaks: Sequence[BreakPoint] = (),
-    progress: Callback | None = None,
 ) -> Answer[Run]:
     """The posterior with its predictions, in a folder of its own.
 
@@ -89,9 +103,13 @@ def sample(
     whole : the measurement whose first part ``measurement`` is; the rest is predicted and shown beside the prediction
     breaks : break points of other films of the same silicone, predicted likewise
     """
-    solve = api.solve if out is None else CachedSolver(Path(out) / CURVES)
-    options: dict[str, Any] = {"seed": seed, "out": out, "name": name, "ess": ess, "progress": progress}
-    run = run_sample(measurement, claim, solve=solve, predictions=False, **options)
+
+    def tell(progress: Progress) -> None:
+        work.tell(claim.label(), progress)
+
+    solve = work.solve
+    options: dict[str, Any] = {"seed": work.seed, "out": work.out, "name": name, "ess": work.ess}
+    run = run_sample(measurement, claim, solve=solve, predictions=False, progress=tell, **options)
     rest = _rest(measurement, whole)
     if run.path is not None and not run.interrupted:
         predictions_of(run, Wanted(rest=rest, breaks=tuple(breaks)) if breaks or rest is not None else None, solve)
@@ -106,87 +124,60 @@ def _rest(measurement: Measurement, whole: Measurement | None) -> Measurement | 
 
 
 def compare(
-    ranges: Mapping[str, Range],
-    claims: Sequence[Hypothesis],
-    *,
-    ess: float = 1000.0,
-    seed: int = 0,
-    out: str | Path | None = None,
-    workers: int | None = None,
-    progress: Tell = silent,
+    ranges: Mapping[str, Range], claims: Sequence[Hypothesis], work: Work, *, workers: int | None = None
 ) -> Answer[dict[str, Comparison]]:
     """The evidence for each hypothesis on each range; the result is by the names of the ranges."""
-    judging = Judging(seed, ess, out=out, processes=workers)
-    found = compare_ranges(ranges, claims, judging, progress=progress)
+    judging = Judging(work.seed, work.ess, out=work.out, processes=workers)
+    found = compare_ranges(ranges, claims, judging, progress=work.tell)
     parts = [r.measurement for r in ranges.values()]
     wholes = [None if r.whole is None else r.whole.data_hash for r in ranges.values()]
-    settings = {"seed": seed, "ess": ess, "names": list(ranges), "wholes": wholes}
+    settings = {"seed": work.seed, "ess": work.ess, "names": list(ranges), "wholes": wholes}
     what = asked("compare", compare_ranges, parts, claims, settings)
-    return kept("comparison", found, document(found), what, out)
+    return kept("comparison", found, document(found), what, work.out)
 
 
 def valleys(
-    measurement: Measurement,
-    claim: Hypothesis,
-    *,
-    ends: Sequence[float] = (),
-    rise: float = RISE,
-    seed: int = 0,
-    out: str | Path | None = None,
+    measurement: Measurement, claim: Hypothesis, work: Work, *, ends: Sequence[float] = (), rise: float = RISE
 ) -> Answer[Valleys | Beside]:
     """The valleys of the loss over ranges that end at ``ends`` (m), with effects also those without."""
     how = valleys_beside if claim.effects else run_valleys
-    found: Valleys | Beside = how(measurement, claim, ends, rise=rise, seed=seed)
-    settings = {"seed": seed, "ends": list(ends), "rise": rise}
+    found: Valleys | Beside = how(measurement, claim, ends, rise=rise, seed=work.seed)
+    settings = {"seed": work.seed, "ends": list(ends), "rise": rise}
     what = asked("valleys", how, [measurement], [claim], settings)
-    return kept("valleys", found, document(found), what, out)
+    return kept("valleys", found, document(found), what, work.out)
 
 
 def valleys_with_draws(
-    measurements: Sequence[Measurement],
-    claim: Hypothesis,
-    draws: Sequence[Array],
-    *,
-    seed: int = 0,
-    out: str | Path | None = None,
+    measurements: Sequence[Measurement], claim: Hypothesis, work: Work, draws: Sequence[Array]
 ) -> Answer[Valleys]:
     """`valleys` over measurements of one film, with posterior draws (B, k) of each."""
-    found = valleys_of(measurements, claim, seed=seed, draws=draws)
-    what = asked("valleys", valleys_of, measurements, [claim], {"seed": seed, "draws": [_mark(d) for d in draws]})
-    return kept("valleys", found, document(found), what, out)
+    found = valleys_of(measurements, claim, seed=work.seed, draws=draws)
+    settings = {"seed": work.seed, "draws": [_mark(d) for d in draws]}
+    what = asked("valleys", valleys_of, measurements, [claim], settings)
+    return kept("valleys", found, document(found), what, work.out)
 
 
-def diagnose(
-    measurement: Measurement,
-    claim: Hypothesis,
-    *,
-    seed: int = 0,
-    out: str | Path | None = None,
-    tell: Say | None = None,
-) -> Answer[Diagnosis]:
+def diagnose(measurement: Measurement, claim: Hypothesis, work: Work) -> Answer[Diagnosis]:
     """Whether the hypothesis misses something, and what."""
-    found = run_diagnose(measurement, claim, seed=seed, tell=tell)
-    what = asked("diagnose", run_diagnose, [measurement], [claim], {"seed": seed})
-    return kept("diagnosis", found, document(found), what, out)
+    found = run_diagnose(measurement, claim, seed=work.seed, tell=lambda text: work.tell(claim.label(), text))
+    what = asked("diagnose", run_diagnose, [measurement], [claim], {"seed": work.seed})
+    return kept("diagnosis", found, document(found), what, work.out)
 
 
 def loop(
     measurement: Measurement,
     claim: Hypothesis,
+    work: Work,
     *,
-    ess: float = 1000.0,
-    seed: int = 0,
     adapt_noise: bool = True,
-    out: str | Path | None = None,
-    runs: str | Path | None = None,
-    tell: Say | None = None,
-    watch: Watch | None = None,
+    runs: Path | None = None,
 ) -> Answer[Loop]:
-    """Diagnose, add what is missing, calibrate again; its runs lie beside it in ``out``, with their predictions."""
-    settings = LoopSettings(seed, out, ess, adapt_noise)
-    found = run_loop(measurement, claim, settings, tell=tell, watch=watch)
-    what = asked("loop", run_loop, [measurement], [claim], {"seed": seed, "ess": ess, "adapt_noise": adapt_noise})
-    return kept("loop", found, document(found), what, out)
+    """Diagnose, add what is missing, calibrate again; its runs lie in ``runs``, or where the answers do."""
+    how = LoopSettings(work.seed, runs or work.out, work.ess, adapt_noise)
+    found = run_loop(measurement, claim, how, tell=lambda text: work.tell(claim.label(), text))
+    settings = {"seed": work.seed, "ess": work.ess, "adapt_noise": adapt_noise}
+    what = asked("loop", run_loop, [measurement], [claim], settings)
+    return kept("loop", found, document(found), what, work.out)
 
 
 def _mark(draws: Array) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from bayesmembrane.app import analyses
+from bayesmembrane.app.analyses import Work
 from bayesmembrane.app.answers import asked, kept
 from bayesmembrane.calibration.beside_paper import compare_with_paper, paper_break_points
 from bayesmembrane.calibration.run import load_run
@@ -27,7 +28,6 @@ from bayesmembrane.ground.jobs import Tell, silent, workers
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.ground.stored import answer, answer_folders, store
-from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.page import write_report
 
@@ -44,28 +44,7 @@ LOOPS = (("yeoh", "elastosil_50um_first_loading"), ("yeoh", "elastosil_50um_op1"
 LOOP_ESS = 400.0
 
 
-@dataclass(frozen=True)
-class Place:
-    """Where the demonstration works, and how well.
-
-    folder : of its answers and runs
-    """
-
-    folder: Path
-    seed: int
-    ess: float
-
-    @property
-    def loop_runs(self) -> Path:
-        """Where the runs on the way of the loops lie: a page about the answers shows them with their loop."""
-        return self.folder / "loops"
-
-    def run(self, name: str, range_name: str) -> Path:
-        """The folder of a material's run."""
-        return self.folder / f"elastosil_50um_{range_name.lower()}_{name}"
-
-
-Verb = Callable[[Place, Tell], None]
+Verb = Callable[[Work], None]
 
 
 def stages() -> tuple[dict[str, Verb], ...]:
@@ -76,93 +55,93 @@ def stages() -> tuple[dict[str, Verb], ...]:
     return {**first, "reconstruct": reconstruct}, then
 
 
-def demo(page_folder: Path, folder: Path, *, seed: int = 0, ess: float = 1000.0, tell: Tell = silent) -> dict[str, Any]:
+def demo(page_folder: Path, work: Work) -> dict[str, Any]:
     """Run it all on the cores there are, and write the page to ``page_folder``.
 
     Returns the JSON answer: where the page lies, the runs, and the seconds it took. Runs of an earlier demonstration
     with the same data, settings and code are read back. Raises `StorageError` if a folder cannot be written.
     """
-    began = time.perf_counter()
-    place = Place(folder, seed, ess)
-    with workers(tell) as submit:
+    began, folder = time.perf_counter(), _folder(work)
+    with workers(work.tell) as submit:
         for stage in stages():
-            for job in [submit(_labelled, verb, label, place) for label, verb in stage.items()]:
+            for job in [submit(_done, label, verb, replace(work, tell=silent)) for label, verb in stage.items()]:
                 job.result()
-    compare(place, tell)
+    compare(work)
     page = write_report([folder], page_folder, TITLE)
     return {
         "report": str(page),
-        "verdicts": [_verdict(c) for c in _answers(folder, "loop")],
-        "runs": [str(place.run(name, r)) for name in materials() for r in RANGES if (name, r) in ORDER],
+        "verdicts": [_verdict(found) for found in _answers(folder, "loop")],
+        "runs": [str(folder / run_of(name, r)) for name in materials() for r in RANGES if (name, r) in ORDER],
         "suspect_rows": [row for found in _answers(folder, "reconstruction") for row in found["suspect_rows"]],
         "stored": str(folder),
         "seconds": time.perf_counter() - began,
     }
 
 
-def _labelled(verb: Verb, label: str, place: Place, tell: Tell) -> None:
-    """A verb that tells when it begins and when it has ended."""
+def _done(label: str, verb: Verb, work: Work, tell: Tell) -> None:
+    """A verb in a process of the pool, told of under its own label."""
     tell(label, "working")
-    verb(place, tell)
+    verb(replace(work, tell=lambda _, now: tell(label, now)))
     tell(label, "")
 
 
 # ---- the verbs -------------------------------------------------------------------------------------------------------
 
 
-def reconstruct(place: Place, tell: Tell) -> None:
+def reconstruct(work: Work) -> None:
     """The curve behind the published losses, and those losses beside it."""
-    found = analyses.reconstruct(place.seed, place.folder)
+    found, printed = analyses.reconstruct(work), read_published_table()
     assert found.folder is not None
-    printed = read_published_table()
     store(found.folder, "published", printed, plain(printed))
 
 
-def calibrate(name: str, range_name: str, place: Place, tell: Tell) -> None:
+def calibrate(name: str, range_name: str, work: Work) -> None:
     """Fit one material on one range, lay that beside the paper, and sample it."""
     claim, measurement = hypothesis(name), shipped_measurement(range_name)
     published = [list(row.values) for row in read_published_table().rows if row.material == name]
-    found = analyses.fit(measurement, claim, seed=place.seed, starts=published, out=place.folder)
-    (beside,) = compare_with_paper(
-        measurement, [found.result], range_name, solve=CachedSolver(place.folder / analyses.CURVES)
-    )
-    what = asked("paper", compare_with_paper, [measurement], [claim], {"seed": place.seed, "range": range_name})
-    kept("beside_paper", beside, plain(beside), what, place.folder)
-    last = range_name == RANGES[-1]
+    found = analyses.fit(measurement, claim, work, starts=published)
+    (beside,) = compare_with_paper(measurement, [found.result], range_name, solve=work.solve)
+    what = asked("paper", compare_with_paper, [measurement], [claim], {"seed": work.seed, "range": range_name})
+    kept("beside_paper", beside, plain(beside), what, work.out)
     run = analyses.sample(
         measurement,
         claim,
-        ess=place.ess,
-        seed=place.seed,
-        out=place.folder,
-        name=place.run(name, range_name).name,
+        work,
+        name=run_of(name, range_name),
         whole=shipped_measurement(RANGES[-1]),
-        breaks=paper_break_points() if last else (),
-        progress=lambda progress: tell(f"{name}, {range_name}", progress),
-    ).result
-    if run.interrupted:
+        breaks=paper_break_points() if range_name == RANGES[-1] else (),
+    )
+    if run.result.interrupted:
         raise KeyboardInterrupt
 
 
-def follow_valleys(name: str, place: Place, tell: Tell) -> None:
+def follow_valleys(name: str, work: Work) -> None:
     """The valleys of one material on both ranges, with the draws of its runs."""
-    draws = [load_run(place.run(name, r)).draws() for r in RANGES]
-    both = [shipped_measurement(r) for r in RANGES]
-    analyses.valleys_with_draws(both, hypothesis(name), draws, seed=place.seed, out=place.folder)
+    draws = [load_run(_folder(work) / run_of(name, r)).draws() for r in RANGES]
+    analyses.valleys_with_draws([shipped_measurement(r) for r in RANGES], hypothesis(name), work, draws)
 
 
-def close_loop(name: str, stem: str, place: Place, tell: Tell) -> None:
-    """The loop on one curve that ships."""
+def close_loop(name: str, stem: str, work: Work) -> None:
+    """The loop on one curve that ships; its runs lie deeper, for the page shows them with their loop."""
     measurement = read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
-    ess = min(place.ess, LOOP_ESS)
-    analyses.loop(measurement, hypothesis(name), seed=place.seed, ess=ess, out=place.folder, runs=place.loop_runs)
+    well = replace(work, ess=min(work.ess, LOOP_ESS))
+    analyses.loop(measurement, hypothesis(name), well, runs=_folder(work) / "loops")
 
 
-def compare(place: Place, tell: Tell) -> None:
+def compare(work: Work) -> None:
     """The five materials on each range of the paper, from the runs that are there."""
     ranges = {name: shipped_ranges()[name] for name in RANGES}
-    claims = [hypothesis(name) for name in materials()]
-    analyses.compare(ranges, claims, ess=place.ess, seed=place.seed, out=place.folder, progress=tell)
+    analyses.compare(ranges, [hypothesis(name) for name in materials()], work)
+
+
+def run_of(name: str, range_name: str) -> str:
+    """The name of a material's run."""
+    return f"elastosil_50um_{range_name.lower()}_{name}"
+
+
+def _folder(work: Work) -> Path:
+    assert work.out is not None
+    return work.out
 
 
 # ---- the data --------------------------------------------------------------------------------------------------------

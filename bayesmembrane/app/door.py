@@ -56,7 +56,7 @@ def fit(
     """The global minimum of |F(x) - y| ("euclidean", N) or of the same in standard deviations of the noise
     ("weighted"), with standard errors, with and without the convexity prior.
     """
-    return analyses.fit(measurement, hypothesis, loss=loss, seed=seed, out=out).result
+    return analyses.fit(measurement, hypothesis, _work(seed, out), loss=loss).result
 
 
 def sample(
@@ -73,7 +73,7 @@ def sample(
     With ``out`` the run is stored, and read back or continued if it is there; ``whole`` is the measurement whose first
     part ``measurement`` is, so that the rest is shown beside its prediction.
     """
-    return analyses.sample(measurement, hypothesis, ess=ess, seed=seed, out=out, whole=whole).result
+    return analyses.sample(measurement, hypothesis, _work(seed, out, ess), whole=whole).result
 
 
 def compare(
@@ -90,7 +90,7 @@ def compare(
     ``workers`` processes share the work (None: one for each core; scripts then need ``if __name__ == "__main__"``).
     """
     ranges = {f"up to {1e3 * float(measurement.deflection.max()):.4g} mm": Range(measurement)}
-    (found,) = analyses.compare(ranges, hypotheses, ess=ess, seed=seed, out=out, workers=workers).result.values()
+    (found,) = analyses.compare(ranges, hypotheses, _work(seed, out, ess), workers=workers).result.values()
     return found
 
 
@@ -108,14 +108,14 @@ def valleys(
     With effects also what it is without them (`Beside`).
     """
     ends = [1e-3 * end for end in ranges_mm]
-    return analyses.valleys(measurement, hypothesis, ends=ends, rise=loss_rise, seed=seed, out=out).result
+    return analyses.valleys(measurement, hypothesis, _work(seed, out), ends=ends, rise=loss_rise).result
 
 
 def diagnose(
     measurement: Measurement, hypothesis: Hypothesis, *, seed: int = 0, out: Folder | None = None
 ) -> Diagnosis:
     """Whether the hypothesis leaves structure in the residual, and which effect or energy explains it."""
-    return analyses.diagnose(measurement, hypothesis, seed=seed, out=out).result
+    return analyses.diagnose(measurement, hypothesis, _work(seed, out)).result
 
 
 def loop(
@@ -131,12 +131,12 @@ def loop(
 
     ``adapt_noise`` samples with correlated noise where neighbouring readings turn out to be correlated.
     """
-    return analyses.loop(measurement, hypothesis, ess=ess, seed=seed, adapt_noise=adapt_noise, out=out).result
+    return analyses.loop(measurement, hypothesis, _work(seed, out, ess), adapt_noise=adapt_noise).result
 
 
 def reconstruct(*, seed: int = 0, out: Folder | None = None) -> Reconstruction:
     """The measured curve behind the losses that the paper prints, with its covariance."""
-    return analyses.reconstruct(seed, out).result
+    return analyses.reconstruct(_work(seed, out)).result
 
 
 def report(*shown: Any, out: Folder, title: str | None = None) -> Path:
@@ -159,3 +159,7 @@ def load(folder: Folder) -> Any:
 def as_dict(result: Any) -> dict[str, Any]:
     """A result as plain values, the ones that ``--json`` prints: for JSON, pandas or a notebook of one's own."""
     return documents.document(result)
+
+
+def _work(seed: int, out: Folder | None, ess: float = 1000.0) -> analyses.Work:
+    return analyses.Work(seed, None if out is None else Path(out), ess)

@@ -13,6 +13,7 @@ import pytest
 
 import bayesmembrane as bm
 from bayesmembrane.app import analyses
+from bayesmembrane.app.analyses import Work
 from bayesmembrane.app.answers import Asked, asked, kept
 from bayesmembrane.app.folders import lying
 from bayesmembrane.calibration.fit import fit as least_squares
@@ -78,8 +79,8 @@ def test_without_a_folder_nothing_is_stored(tmp_path: Path, monkeypatch: pytest.
 
 def test_fit_and_diagnosis_come_back_as_they_were(curve: Measurement, tmp_path: Path) -> None:
     for kind, found in (
-        ("fit", analyses.fit(curve, PLAIN, out=tmp_path)),
-        ("diagnosis", analyses.diagnose(curve, PLAIN, out=tmp_path)),
+        ("fit", analyses.fit(curve, PLAIN, Work(out=tmp_path))),
+        ("diagnosis", analyses.diagnose(curve, PLAIN, Work(out=tmp_path))),
     ):
         folder = found.folder
         assert folder is not None
@@ -95,7 +96,7 @@ def test_fit_and_diagnosis_come_back_as_they_were(curve: Measurement, tmp_path: 
 
 def test_valleys_with_an_effect_come_back_as_they_were(curve: Measurement, tmp_path: Path) -> None:
     claim = hypothesis("neo_hookean", ["force_offset"])
-    found = analyses.valleys(curve, claim, out=tmp_path)
+    found = analyses.valleys(curve, claim, Work(out=tmp_path))
     (again,) = lying([tmp_path])
     assert again.kind == "valleys"
     assert equal(bm.as_dict(again.read()), bm.as_dict(found.result))
@@ -103,7 +104,7 @@ def test_valleys_with_an_effect_come_back_as_they_were(curve: Measurement, tmp_p
 
 
 def test_a_loop_is_read_back_with_its_runs_also_where_it_was_moved(curve: Measurement, tmp_path: Path) -> None:
-    found = analyses.loop(curve, PLAIN, ess=100, out=tmp_path / "here", runs=tmp_path / "here" / "runs")
+    found = analyses.loop(curve, PLAIN, Work(out=tmp_path / "here", ess=100), runs=tmp_path / "here" / "runs")
     (tmp_path / "here").rename(tmp_path / "there")
     (again,) = lying([tmp_path / "there"])
     assert again.kind == "loop"

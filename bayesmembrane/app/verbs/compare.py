@@ -40,7 +40,8 @@ def verb(
     only = [] if used.max_deflection_mm is None else [1e-3 * used.max_deflection_mm]
     ranges = ranges_of(curve.read(), several.ends or only)
     with resumable(stored.folder), lines() as tell:
-        found = analyses.compare(ranges, claims, ess=sampling.ess, seed=output.seed, out=stored.folder, progress=tell)
+        work = analyses.Work(output.seed, stored.folder, sampling.ess, tell)
+        found = analyses.compare(ranges, claims, work)
     answer(found.document, output.as_json, lambda: show(found.result))
 
 

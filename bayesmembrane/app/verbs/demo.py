@@ -20,9 +20,10 @@ def verb(
     chains: Annotated[Path, typer.Option(help="Folder of the answers and runs.")] = CHAINS / "demo",
 ) -> None:
     """Reconstruct, fit and sample five materials on both ranges of the data that ship, compare, close loops, report."""
+    from bayesmembrane.app.analyses import Work
     from bayesmembrane.app.demo import demo
 
     note("Five materials on two ranges; the first run compiles the solvers, which takes about a minute.")
     with bars() as tell:
-        document = demo(page_folder, chains, seed=output.seed, ess=sampling.ess, tell=tell)
+        document = demo(page_folder, Work(output.seed, chains, sampling.ess, tell))
     answer(document, output.as_json, lambda: say(f"The report lies in {document['report']}"))

@@ -23,7 +23,8 @@ def verb(curve: Curve, material: Material, beside: Beside, used: Range, stored: 
     measurement = used.of(curve.read())
     say_thinning(measurement)
     with status(f"Diagnosing {claim.label()}") as tell:
-        found = analyses.diagnose(measurement, claim, seed=output.seed, out=stored.folder, tell=tell)
+        work = analyses.Work(output.seed, stored.folder, tell=lambda _, text: tell(text))
+        found = analyses.diagnose(measurement, claim, work)
     answer(found.document, output.as_json, lambda: show(found.document, measurement))
 
 

@@ -30,7 +30,7 @@ def verb(
     claim = beside.with_material(material.material)
     measurement = used.of(curve.read())
     with status(f"Fitting {claim.label()}"):
-        found = analyses.fit(measurement, claim, loss=loss, seed=output.seed, out=stored.folder)
+        found = analyses.fit(measurement, claim, analyses.Work(output.seed, stored.folder), loss=loss)
     title = f"{claim.material.title} on {curve.curve}"
     answer(found.document, output.as_json, lambda: show(found.result, title))
 

@@ -37,15 +37,8 @@ def verb(
     measurement = used.of(curve.read())
     say_thinning(measurement)
     with resumable(stored.folder), lines() as tell:
-        found = analyses.loop(
-            measurement,
-            claim,
-            ess=sampling.ess,
-            seed=output.seed,
-            adapt_noise=adapt,
-            out=stored.folder,
-            tell=lambda text: tell(claim.label(), text),
-        )
+        work = analyses.Work(output.seed, stored.folder, sampling.ess, tell)
+        found = analyses.loop(measurement, claim, work, adapt_noise=adapt)
     page = write_report([*analyses.loop_runs(found.result), found.result], report_folder)
     document = {**found.document, "report": str(page)}
     answer(document, output.as_json, lambda: show(document, measurement))

@@ -28,7 +28,7 @@ def verb(
     from bayesmembrane.reconstruction.files import write_reconstruction
 
     with status("Locating the curve from 30 losses"):
-        found = analyses.reconstruct(output.seed, folder or CHAINS)
+        found = analyses.reconstruct(analyses.Work(output.seed, folder or CHAINS))
     document = found.document
     if folder is not None:
         document |= {"files": [str(f) for f in write_reconstruction(found.result, read_published_table(), folder)]}

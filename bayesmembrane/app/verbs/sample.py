@@ -27,15 +27,8 @@ def verb(
     claim, whole = beside.with_material(material.material), curve.read()
     with bars() as tell:
         tell(claim.label(), "finding starts")
-        found = analyses.sample(
-            used.of(whole),
-            claim,
-            ess=sampling.ess,
-            seed=output.seed,
-            out=stored.folder,
-            whole=whole,
-            progress=lambda progress: tell(claim.label(), progress),
-        )
+        work = analyses.Work(output.seed, stored.folder, sampling.ess, tell)
+        found = analyses.sample(used.of(whole), claim, work, whole=whole)
     if found.result.interrupted:
         note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")
         raise typer.Exit(INTERRUPTED)

@@ -42,9 +42,8 @@ def verb(
     claim = beside.with_material(material.material)
     measurement = curve.read()
     with status(f"Following the valleys of {claim.label()}"):
-        found = analyses.valleys(
-            measurement, claim, ends=ranges.ends, rise=loss_rise, seed=output.seed, out=folder or CHAINS
-        )
+        work = analyses.Work(output.seed, folder or CHAINS)
+        found = analyses.valleys(measurement, claim, work, ends=ranges.ends, rise=loss_rise)
     document = found.document
     if folder is not None:
         document |= {"files": [str(f) for f in write_valleys(found.result, folder)]}
