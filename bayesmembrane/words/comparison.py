@@ -138,7 +138,8 @@ def preferred(found: Comparison) -> str:
     by_z = sorted(both, key=lambda r: -_best(r)[0])
     gap = _best(by_z[0])[0] - _best(by_z[1])[0]
     sd = float(np.hypot(_best(by_z[0])[1], _best(by_z[1])[1]))
-    start = f"The evidence prefers {called(by_z[0])} to {called(by_z[1])} by {gap:.1f} +- {sd:.2g} in ln Z{_bayes(gap)}"
+    names = f"{called(by_z[0])} to {called(by_z[1])}"
+    start = f"The evidence prefers {names} by {gap:.1f} +- {sd:.2g} in ln Z{_bayes(gap)}"
     if predicts is by_z[0]:
         d, se = _elpd_gap(predicts, next_best)
         return (

@@ -15,6 +15,7 @@ from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.calibration.prediction_store import FILE
 from bayesmembrane.calibration.run import Run, predictions_of
 from bayesmembrane.ground.errors import SettingsError, StorageError
+from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.cache import Tally
 from bayesmembrane.reconstruction.result import Influence, LossCheck, RangeResult, Reconstruction
 from bayesmembrane.reconstruction.rows import Correction, PredictedLoss, Suspect
@@ -166,8 +167,9 @@ def test_the_twin_holds_the_tables_as_numbers(whole: Path) -> None:
     assert fits["Yeoh"]["verdict"] == "describes the curve"
     assert fits["neo-Hookean"]["rmse_mN"] > 20
     losses = twin["tables"]["losses"]
-    assert losses[0]["ratio"] == pytest.approx(0.01 / 0.09)
-    assert losses[1]["paper_evaluated_N"] is None
+    assert [row["material"] for row in losses] == ["neo-Hookean", "Yeoh"]
+    assert losses[1]["ratio"] == pytest.approx(0.01 / 0.09)
+    assert losses[0]["paper_evaluated_N"] is None
     names = list(twin["tables"])
     assert len(names) == len(set(names))
     assert any(s.startswith("Up to 35 mm") for s in twin["answer"])
@@ -272,3 +274,10 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path, yeoh: S
     (tmp_path / "file").write_text("x")
     with pytest.raises(StorageError, match="cannot be written"):
         write_report([yeoh], tmp_path / "file" / "report")
+
+
+def test_a_stored_reconstruction_gives_the_same_page(tmp_path: Path) -> None:
+    store(tmp_path / "answer", "reconstruction", reconstruction(), {})
+    assert write_report([tmp_path / "answer"], tmp_path / "a").read_text() == (
+        write_report([reconstruction()], tmp_path / "b").read_text()
+    )

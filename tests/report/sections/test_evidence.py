@@ -13,6 +13,7 @@ from bayesmembrane.comparison.leave_out.score import LeaveOneOut
 from bayesmembrane.comparison.prior_widths import Unknown, Widened
 from bayesmembrane.comparison.result import Comparison, Row, ranked
 from bayesmembrane.data.published import read_published_table
+from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.page import TWIN, write_report
 from bayesmembrane.report.sections.evidence import sentences
@@ -100,3 +101,10 @@ def test_two_hypotheses_of_one_name_are_told_apart() -> None:
     ]
     told = [c[1] for c in evidence_table({"OP1": replace(one, rows=tuple(rows))}).cells()]
     assert told == ["neo-Hookean (white, reached)", "neo-Hookean (ar1, reached)"]
+
+
+def test_a_stored_comparison_gives_the_same_page(tmp_path: Path) -> None:
+    store(tmp_path / "answer", "comparison", compared(), {})
+    assert write_report([tmp_path / "answer"], tmp_path / "a").read_text() == (
+        write_report([compared()], tmp_path / "b").read_text()
+    )
