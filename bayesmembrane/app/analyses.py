@@ -51,7 +51,7 @@ class Work:
 
     out : folder of all answers; None stores nothing
     ess : effective sample size of posteriors
-    tell : is told how far it is
+    tell : is told (label, what is being done for it: a text, or the `Progress` of sampling)
     """
 
     seed: int = 0
@@ -127,8 +127,8 @@ def compare(
     ranges: Mapping[str, Range], claims: Sequence[Hypothesis], work: Work, *, workers: int | None = None
 ) -> Answer[dict[str, Comparison]]:
     """The evidence for each hypothesis on each range; the result is by the names of the ranges."""
-    how = Judging(work.seed, work.ess, out=work.out, processes=workers)
-    found = compare_ranges(ranges, claims, how, progress=work.tell)
+    judging = Judging(work.seed, work.ess, out=work.out, processes=workers)
+    found = compare_ranges(ranges, claims, judging, progress=work.tell)
     parts = [r.measurement for r in ranges.values()]
     wholes = [None if r.whole is None else r.whole.data_hash for r in ranges.values()]
     settings = {"seed": work.seed, "ess": work.ess, "names": list(ranges), "wholes": wholes}

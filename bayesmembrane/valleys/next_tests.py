@@ -11,7 +11,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.rigs.base import Rig, rig_of
-from bayesmembrane.valleys.posterior import Normal, Spread
+from bayesmembrane.valleys.posterior import NormalPosterior, Spread
 from bayesmembrane.valleys.surface import Surface
 
 FURTHER = (1.25, 1.5)
@@ -49,7 +49,9 @@ Information = Callable[[Array, Array], Array]
 """x (B, k), z (B, k) -> signal slopes dS/dz (B, M, k) over the noise's standard deviation."""
 
 
-def rank(surface: Surface, normal: Normal, spread: Spread, scale: Callable[[Array], Array]) -> tuple[NextTest, ...]:
+def rank(
+    surface: Surface, normal: NormalPosterior, spread: Spread, scale: Callable[[Array], Array]
+) -> tuple[NextTest, ...]:
     """All candidates, best first: those for which less than half of the draws have a film are left out.
 
     With the Fisher information I of the data, prior precision P and the candidate's information K = sum of
@@ -74,7 +76,7 @@ def rank(surface: Surface, normal: Normal, spread: Spread, scale: Callable[[Arra
     return tuple(sorted(out, key=lambda t: -t.reduction))
 
 
-def _draws(normal: Normal, spread: Spread) -> Array:
+def _draws(normal: NormalPosterior, spread: Spread) -> Array:
     """The mode and up to `DRAWS` posterior draws (B, k) that have a film."""
     step = max(1, len(spread.draws) // DRAWS)
     z = np.concatenate([normal.z[None, :], spread.draws[::step][:DRAWS]])
@@ -89,10 +91,10 @@ def _longest(precision: Array, scale: Array) -> Array:
     return np.asarray(1 / np.sqrt(np.maximum(least, 1e-300)))
 
 
-def _candidates(surface: Surface, normal: Normal, z: Array, x: Array) -> Iterator[tuple[str, str, Array]]:
+def _candidates(surface: Surface, normal: NormalPosterior, z: Array, x: Array) -> Iterator[tuple[str, str, Array]]:
     m = surface.measurement
     n, end = len(m), float(np.max(m.deflection))
-    root = normal._root
+    root = normal.whitening
     yield "the same test once more", "repeat", np.einsum("mn,bnk->bmk", root, surface.batch(z)[1])
     most = np.full(len(z), 3.0)
     if not rig_of(m).homogeneous:

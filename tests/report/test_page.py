@@ -18,7 +18,7 @@ from bayesmembrane.ground.errors import SettingsError, StorageError
 from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.cache import Tally
 from bayesmembrane.reconstruction.result import Influence, LossCheck, RangeResult, Reconstruction
-from bayesmembrane.reconstruction.rows import Correction, Suspect
+from bayesmembrane.reconstruction.rows import Correction, PredictedLoss, Suspect
 from bayesmembrane.report.page import PAGE, TWIN, write_report
 from bayesmembrane.report.runs import Shown, read
 
@@ -57,7 +57,8 @@ class Page(HTMLParser):
 
 def reconstruction() -> Reconstruction:
     x, f, sd = np.linspace(0.001, 0.035, 5), np.linspace(0.01, 2.2, 5), np.full(5, 5e-3)
-    suspect = Suspect("yeoh", "INI", "the others say <so>", 0.99, (Correction("c1", "7.0", 7.5, 7.5, 0.01),), ())
+    losses = (PredictedLoss("<OP1>", "0.1", 0.2, 0.01),)
+    suspect = Suspect("yeoh", "INI", losses, 0.99, (Correction("c1", "7.0", 7.5, 7.5, 0.01),), ())
     return Reconstruction(
         (RangeResult("OP1", {5: 0.9, 6: 0.1}, {5: (0.0, 0.001)}, 0.001, 1e-5, x, f, sd),),
         np.diag(sd**2),
@@ -115,7 +116,7 @@ def test_every_figure_has_alt_text_and_a_caption_with_units(whole: Path, page: P
 def test_names_are_shown_as_they_are(whole: Path, page: Page) -> None:
     assert '<b>&"film' in page.text
     assert "bench <2> & 3" in page.text
-    assert "the others say <so>" in page.text
+    assert "over <OP1> printed 0.1 N, predicted 0.2 +- 0.01 N" in page.text
     assert "<b>" not in whole.read_text(encoding="utf-8")
 
 

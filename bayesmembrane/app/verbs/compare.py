@@ -57,7 +57,7 @@ def show(found: dict[str, Comparison]) -> None:
             rows = [[row[i] for i in columns] for row in shown.cells()]
             table(f"{name}: {text}", [shown.columns[i].head for i in columns], rows)
         for row in comparison.rows:
-            if reason := remark(row):
-                say(f"{row.label}: {reason}")
+            if not row.fitted:
+                say(f"{row.label}: {remark(row)}")
         for sentence in sentences(comparison):
             say(sentence)
