@@ -136,6 +136,10 @@ absorbed what it can. Four cycles with rising peaks; the last two run five times
 """
 
 
+def _rigs(e: Effect) -> list[str]:
+    return [name for name, rig in components("rigs").items() if e.occurs_on(rig)]
+
+
 def page(effects: list[Effect]) -> str:
     by_stage: dict[str, list[str]] = {}
     for e in effects:
@@ -153,7 +157,7 @@ def page(effects: list[Effect]) -> str:
             bounds = f"{p.bounds[0]:g} to {p.bounds[1]:g}"
             out.append(f"| `{e.name}.{p.name}` | {p.unit} | {p.meaning} | {null} | {bounds} | {p.prior} |")
         needs = "; needs times" if e.needs_time else ""
-        out.append(f"\nRigs: {', '.join(e.rigs)}{needs}. Reference: {e.reference}.\n")
+        out.append(f"\nRigs: {', '.join(_rigs(e))}{needs}. Reference: {e.reference}.\n")
     return "\n".join(out)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from bayesmembrane.calibration.run import Run, predictions_of
 from bayesmembrane.calibration.run import sample as run_sample
 from bayesmembrane.calibration.sampling.walk import Progress
 from bayesmembrane.comparison.compare import Range, compare_ranges
+from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.published import read_published_table
@@ -28,6 +29,7 @@ from bayesmembrane.diagnosis.diagnose import diagnose as run_diagnose
 from bayesmembrane.diagnosis.loop import Loop, LoopSettings
 from bayesmembrane.diagnosis.loop import loop as run_loop
 from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.ground.jobs import Tell, silent
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.forward import Solve
@@ -42,13 +44,6 @@ from bayesmembrane.valleys.result import Valleys
 
 CURVES = "curves"  # the folder beside the runs in which the solver keeps what it has computed
 
-Tell = Callable[[str, Any], None]
-"""(label, what is being done for it: a text, or the `Progress` of sampling)."""
-
-
-def silent(label: str, now: Any) -> None:
-    """A `Tell` that tells nobody."""
-
 
 @dataclass(frozen=True)
 class Work:
@@ -56,7 +51,7 @@ class Work:
 
     out : folder of all answers; None stores nothing
     ess : effective sample size of posteriors
-    tell : is told how far it is
+    tell : is told (label, what is being done for it: a text, or the `Progress` of sampling)
     """
 
     seed: int = 0
@@ -132,8 +127,8 @@ def compare(
     ranges: Mapping[str, Range], claims: Sequence[Hypothesis], work: Work, *, workers: int | None = None
 ) -> Answer[dict[str, Comparison]]:
     """The evidence for each hypothesis on each range; the result is by the names of the ranges."""
-    options: dict[str, Any] = {"out": work.out, "ess": work.ess, "workers": workers, "progress": work.tell}
-    found = compare_ranges(ranges, claims, work.seed, **options)
+    judging = Judging(work.seed, work.ess, out=work.out, processes=workers)
+    found = compare_ranges(ranges, claims, judging, progress=work.tell)
     parts = [r.measurement for r in ranges.values()]
     wholes = [None if r.whole is None else r.whole.data_hash for r in ranges.values()]
     settings = {"seed": work.seed, "ess": work.ess, "names": list(ranges), "wholes": wholes}

@@ -15,15 +15,16 @@ from typing import Any
 import numpy as np
 
 from bayesmembrane.app import analyses
-from bayesmembrane.app.analyses import Tell, Work, silent
+from bayesmembrane.app.analyses import Work
 from bayesmembrane.app.answers import asked, kept
-from bayesmembrane.app.pool import workers
 from bayesmembrane.calibration.beside_paper import compare_with_paper, paper_break_points
 from bayesmembrane.calibration.run import load_run
 from bayesmembrane.comparison.compare import Range
-from bayesmembrane.data.measurement import Measurement, read_measurement
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.published import read_published_table
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import shipped
+from bayesmembrane.ground.jobs import Tell, silent, workers
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.ground.stored import answer, answer_folders, store

@@ -15,7 +15,7 @@ from bayesmembrane.ground.plain import plain
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
-from bayesmembrane.words import diagnosis, loop, sampling
+from bayesmembrane.words import comparison, diagnosis, loop, reconstruction, sampling, valleys
 
 
 def document(result: Any) -> dict[str, Any]:
@@ -25,19 +25,20 @@ def document(result: Any) -> dict[str, Any]:
 
 def _document(result: Any) -> Mapping[str, Any]:
     match result:
-        case Fit() | Valleys() | Beside():
+        case Fit():
             return result.summary()
         case Run():
             return sampling.document(result)
-        case Comparison():
-            return sampling.with_notes(result)
-        case Reconstruction():
-            return result.to_json_dict()
-        case Loop():
-            return loop.document(result)
+        case Valleys() | Beside():
+            return valleys.document(result)
         case Diagnosis():
             return diagnosis.document(result)
+        case Loop():
+            return loop.document(result)
+        case Comparison():
+            return comparison.document(result)
+        case Reconstruction():
+            return reconstruction.document(result)
         case Mapping() if result and all(isinstance(c, Comparison) for c in result.values()):
-            answers = {name: sampling.with_notes(c) for name, c in result.items()}
-            return {**list(answers.values())[-1], "ranges": [{"range": n, **a} for n, a in answers.items()]}
+            return comparison.document_of_ranges(result)
     raise SettingsError(f"a {type(result).__name__} is no result of a verb", remedy="give what fit or sample returned")

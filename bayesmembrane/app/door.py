@@ -15,7 +15,8 @@ from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.comparison.compare import Range
 from bayesmembrane.comparison.result import Comparison
-from bayesmembrane.data.measurement import Measurement, read_measurement
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.physics import hypothesis as hypotheses

@@ -78,7 +78,7 @@ class Curve(Group):
 
     def read(self) -> Measurement:
         """The whole measurement; what was left aside while reading is said on stderr."""
-        from bayesmembrane.data.measurement import read_measurement
+        from bayesmembrane.data.reading import read_measurement
 
         measurement = read_measurement(self.curve, self.specimen)
         for left_aside in measurement.provenance.notes:

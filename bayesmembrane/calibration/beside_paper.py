@@ -9,15 +9,15 @@ import numpy as np
 
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.published import PublishedTable, Row, read_published_table
+from bayesmembrane.data.published import PrintedSet, PublishedTable, read_published_table
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.data.tables import parse_table, read_text
 from bayesmembrane.ground.errors import SettingsError, unknown_name
 from bayesmembrane.ground.registry import material
 from bayesmembrane.ground.units import FORCE, LENGTH, SPEED
-from bayesmembrane.physics.forward import Solve, annulus
+from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.mechanics import api
-from bayesmembrane.physics.mechanics.request import request
+from bayesmembrane.physics.rigs.base import Films, rig_of
 
 
 @dataclass(frozen=True)
@@ -94,11 +94,10 @@ def _short(found: Fit) -> dict[str, float]:
     return {name.partition(".")[2]: e.value for name, e in found.parameters.items()}
 
 
-def _loss(measurement: Measurement, row: Row, solve: Solve) -> float | None:
+def _loss(measurement: Measurement, row: PrintedSet, solve: Solve) -> float | None:
     """|F - y| of a published parameter set on our curve, N; None where the film has no curve."""
-    rig = annulus(measurement)
-    radii = rig.inner_radius, rig.outer_radius
-    force = solve(request(material(row.material), row.values, measurement.deflection, *radii)).force[0]
+    films = Films(material(row.material), np.array([row.values]), solve=solve)
+    force = rig_of(measurement).curves(films, measurement, measurement.deflection).force[0]
     loss = float(np.linalg.norm(force - measurement.force))
     return loss if np.isfinite(loss) else None
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen
-from bayesmembrane.data.motion import Path as Motion
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.ground.registry import component

@@ -15,7 +15,7 @@ from bayesmembrane.ground.errors import SettingsError, unknown_name
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.forward import Forward, Prediction, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
-from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.base import rig_of
 
 LOSSES = ("euclidean", "weighted")
 SCREENED, INFLATED = 768, 256
@@ -124,11 +124,10 @@ class Objective:
 
         Films without are told late, and hardly ever reach the data: they are not worth a solution in a search.
         """
-        rig = self.measurement.rig
-        if not isinstance(rig, Annulus):
+        mean = rig_of(self.measurement).mean_stretch(float(np.max(np.abs(self.measurement.deflection))))
+        if mean is None:
             return np.ones(len(films), bool)
-        rise = np.max(np.abs(self.measurement.deflection)) / (rig.outer_radius - rig.inner_radius)
-        stretch = np.linspace(1.0, np.sqrt(1.0 + rise * rise), ON_THE_WAY + 1)[1:, None]
+        stretch = np.linspace(1.0, mean, ON_THE_WAY + 1)[1:, None]
         with np.errstate(all="ignore"):
             _, p1, _, p11, _, _ = self.hypothesis.material.derivatives(
                 films.T[:, None, :], stretch, np.ones_like(stretch)

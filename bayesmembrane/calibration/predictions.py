@@ -16,13 +16,13 @@ from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.convexity import RESTRICTING
-from bayesmembrane.physics.forward import Forward, Solve, annulus
+from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.convexity import least_eigenvalue
 from bayesmembrane.physics.mechanics.solution import Status
-from bayesmembrane.physics.rigs.base import Strip
+from bayesmembrane.physics.rigs.base import rig_of
 
 QUANTILES = (0.05, 0.5, 0.95)
 DRAWS, SHAPE_DRAWS = 400, 30
@@ -276,14 +276,7 @@ def _total_sd(hypothesis: Hypothesis, measurement: Measurement, x: Array, given:
 
 def _profiles(film: Material, at: Array, measurement: Measurement) -> Array:
     """(4, D, M): radius, height, l1 and l2 at each deflection; nan where the film has no state."""
-    if isinstance(measurement.rig, Strip):
-        l1 = np.repeat(1.0 + at[:, None] / measurement.rig.length, POINTS, axis=1)
-        along = np.linspace(0.0, measurement.rig.length, POINTS)
-        return np.stack([l1 * along, 0.0 * l1, l1, measurement.rig.lateral(l1)[0]])
-    rig = annulus(measurement)
-    radii = {"inner_radius": rig.inner_radius, "outer_radius": rig.outer_radius}
-    found = [api.profile(film, float(d), points=POINTS, **radii) for d in at]
-    return np.stack([np.stack([p.f, p.height, p.l1, p.l2]) for p in found], axis=1)
+    return rig_of(measurement).states(film, at, POINTS)
 
 
 def _map(film: Material, states: Array) -> tuple[Array, Array, Array]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +19,21 @@ from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
 from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.plain import plain
 from bayesmembrane.physics.convexity import FREE, MODES
 
 ROUNDS, EACH, LAST = 3, 600, 2000
 KNOWN, STARTS = 1000, 64  # draws of the own mode, and starts without one, that the first proposal is fitted to
 LEAST_ESS, LARGEST_SHARE = 100.0, 0.1  # of the weights that a number may stand on
 WIDEST_MASS = 0.3  # standard error of ln mass
+
+
+class Missing(Enum):
+    """Why there is no evidence under a convexity mode."""
+
+    PRIOR = "too few films of the prior meet it"
+    DRAWS = "too few draws meet it"
+    NONE = "no film near the data meets it"
 
 
 @dataclass(frozen=True)
@@ -35,7 +46,7 @@ class ByMode:
     log_evidence, sd : with the prior renormalised by its mass; None where it cannot be said
     mass, mass_sd : part of the prior that meets it
     ess : how many draws the weights are worth
-    reason : "" or why there is no number, as a sentence
+    missing : None, or why there is no number
     """
 
     mode: str
@@ -44,7 +55,11 @@ class ByMode:
     mass: float
     mass_sd: float
     ess: float
-    reason: str
+    missing: Missing | None
+
+    def summary(self) -> dict[str, Any]:
+        """The numbers as plain values."""
+        return dict(plain({n: getattr(self, n) for n in ("mode", "log_evidence", "sd", "mass", "mass_sd", "ess")}))
 
 
 def by_convexity(
@@ -145,17 +160,14 @@ def _again(free: Posterior, found: _Weighted, mode: str, rng: np.random.Generato
 def _row(own: str, mode: str, found: _Weighted, part: _Weighted, log_evidence: float, sd: float, mass: Mass) -> ByMode:
     if mode == own:
         total = float(np.hypot(sd, mass.sd / mass.value))
-        return ByMode(mode, log_evidence - float(np.log(mass.value)), total, mass.value, mass.sd, part.ess(mode), "")
+        return ByMode(mode, log_evidence - float(np.log(mass.value)), total, mass.value, mass.sd, part.ess(mode), None)
     ess = part.ess(mode)
     if mass.sd > WIDEST_MASS * mass.value:
-        why = f"Too few films of the prior meet it: its mass is {mass.value:.2g} +- {mass.sd:.2g}."
-        return ByMode(mode, None, None, mass.value, mass.sd, ess, why)
+        return ByMode(mode, None, None, mass.value, mass.sd, ess, Missing.PRIOR)
     few = ess < LEAST_ESS or np.max(part.relative(mode)) > LARGEST_SHARE * np.sum(part.relative(mode))
     if few or found.ess(own) < LEAST_ESS:
-        why = f"The weights of this mode rest on only {ess:.0f} draws."
-        if not np.any(part.inside[mode]):
-            why = "None of the films that come near the data meets it."
-        return ByMode(mode, None, None, mass.value, mass.sd, ess, why)
+        missing = Missing.DRAWS if np.any(part.inside[mode]) else Missing.NONE
+        return ByMode(mode, None, None, mass.value, mass.sd, ess, missing)
     value = log_evidence + part.log_mean(mode) - found.log_mean(own) - float(np.log(mass.value))
     if part is found:
         a, b = found.relative(mode), found.relative(own)
@@ -164,5 +176,5 @@ def _row(own: str, mode: str, found: _Weighted, part: _Weighted, log_evidence: f
     else:
         error = float(np.hypot(part.log_sd(mode), found.log_sd(own)))
     return ByMode(
-        mode, value, float(np.sqrt(error**2 + sd**2 + (mass.sd / mass.value) ** 2)), mass.value, mass.sd, ess, ""
+        mode, value, float(np.sqrt(error**2 + sd**2 + (mass.sd / mass.value) ** 2)), mass.value, mass.sd, ess, None
     )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array, Prior, Uniform
+from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -28,6 +31,14 @@ HEAVIEST = 0.7  # tail index of the weights from which on their mean says nothin
 MOST_TAIL = 0.9
 
 
+class Unknown(Enum):
+    """Why the draws do not tell what another width would do."""
+
+    NOT_COVERED = "the other prior allows what these draws have not seen"
+    FEW = "the draws are worth too few under the other prior"
+    HEAVY = "a few draws far out count most"
+
+
 @dataclass(frozen=True)
 class Widened:
     """ln Z with one prior of another width, minus ln Z as it is.
@@ -37,7 +48,8 @@ class Widened:
     parameter, factor : whose prior, and its width relative to the one used
     change, sd : of ln Z, with its standard error
     ess : how many equally weighted draws the reweighted ones are worth
-    reason : "" if the reweighting is valid; or why it is not, as a sentence, and ``change`` is nan
+    tail_index : of the weights, nan where it was not looked at
+    unknown : None if the reweighting is valid; or why it is not, and ``change`` is nan
     """
 
     parameter: str
@@ -45,7 +57,12 @@ class Widened:
     change: float
     sd: float
     ess: float
-    reason: str
+    tail_index: float
+    unknown: Unknown | None
+
+    def summary(self) -> dict[str, Any]:
+        """The numbers as plain values."""
+        return dict(plain({n: getattr(self, n) for n in ("parameter", "factor", "change", "sd", "ess")}))
 
 
 def prior_widths(
@@ -71,8 +88,7 @@ def prior_widths(
         for factor in factors:
             wider = scaled(p.prior, factor)
             if wider is None or (isinstance(p.prior, Uniform) and factor > 1):
-                why = f"Draws under the prior of {p.name} say nothing of one that allows more: sample again with it."
-                found.append(Widened(p.name, factor, np.nan, np.nan, 0.0, why))
+                found.append(Widened(p.name, factor, np.nan, np.nan, 0.0, np.nan, Unknown.NOT_COVERED))
                 continue
             log_ratio = wider.log_density(draws[:, i]) - p.prior.log_density(draws[:, i])
             found.append(_reweighted(p.name, factor, log_ratio, worth, masses(i, factor)))
@@ -107,21 +123,16 @@ def _reweighted(name: str, factor: float, log_ratio: Array, worth: float, mass: 
     k = _tail_index(log_ratio, worth)
     thin = ess < LEAST_ESS or np.max(w) > LARGEST_SHARE * n
     if thin or not np.isfinite(log_mass):
-        why = f"Reweighted to {factor:g} times the width, the draws are worth only {ess:.0f}: sample again with it."
-        return Widened(name, factor, np.nan, np.nan, ess, why)
+        return Widened(name, factor, np.nan, np.nan, ess, k, Unknown.FEW)
     if k > min(HEAVIEST, 1 - 1 / np.log10(worth * n)):
-        why = (
-            f"Reweighted to {factor:g} times the width, a few draws far out count most (tail index {k:.2f}): "
-            "sample again with it."
-        )
-        return Widened(name, factor, np.nan, np.nan, ess, why)
+        return Widened(name, factor, np.nan, np.nan, ess, k, Unknown.HEAVY)
     if np.ptp(w) == 0:
-        return Widened(name, factor, change, log_mass_sd, ess, "")
+        return Widened(name, factor, change, log_mass_sd, ess, k, None)
     batches = np.array([np.mean(part) for part in np.array_split(w, BATCHES)])
     scatter = max(np.std(w) / np.sqrt(worth * n), np.std(batches, ddof=1) / np.sqrt(BATCHES))
     unseen = np.max(w) / (worth * n) / (1 - min(k + _index_sd(k, worth * n), MOST_TAIL))
     sd = float(np.sqrt(scatter**2 + unseen**2 + log_mass_sd**2))
-    return Widened(name, factor, change, sd, ess, "")
+    return Widened(name, factor, change, sd, ess, k, None)
 
 
 def _tail_index(log_ratio: Array, worth: float) -> float:

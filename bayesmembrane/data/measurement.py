@@ -4,33 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from pathlib import Path
-from typing import Any, TypeVar
+from functools import cached_property
+from typing import Any
 
 import numpy as np
-import tomli_w
 from numpy.typing import NDArray
 
-from bayesmembrane.data.motion import Path as Motion
-from bayesmembrane.data.motion import check_order, check_time, first_loading, holds
-from bayesmembrane.data.settings import Section, load_toml
-from bayesmembrane.data.tables import Table, parse_table, read_matrix, read_text
-from bayesmembrane.ground.errors import DataError, SettingsError, StorageError
+from bayesmembrane.data.fixture import Fixture
+from bayesmembrane.data.motion import Motion, first_loading, holds
+from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.registry import components
-from bayesmembrane.ground.units import FORCE, LENGTH, TIME
-from bayesmembrane.physics.rigs.base import Rig, Strip
-
-# What lies beyond these is a wrong unit, not a film.
-THICKNESSES = (1e-8, 5e-3)  # m
-RIGS = (1e-6, 1.0)  # m
-LARGEST_LIFT = 20.0  # largest deflection relative to the size of the rig
-LEAST_SD = 1e-12  # N
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -83,7 +67,7 @@ class Measurement:
 
     deflection: Array
     force: Array
-    rig: Rig
+    rig: Fixture
     specimen: Specimen
     time: Array | None = None
     force_sd: Array | None = None
@@ -235,249 +219,3 @@ def check_covariance(covariance: Array, where: str | None = None) -> None:
         raise DataError(
             "the covariance is not positive definite", where, "write more digits, or add the variance of the load cell"
         ) from None
-
-
-# ---- files -----------------------------------------------------------------------------------------------------------
-
-
-def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measurement:
-    """The measurement in a CSV file and the TOML file beside it, in SI.
-
-    Raises `DataError`, and nothing else, whatever the files hold: one sentence with file, line and column.
-    """
-    curve_csv, specimen_toml = Path(curve_csv), Path(specimen_toml)
-    table = parse_table(read_text(curve_csv), str(curve_csv))
-    root = load_toml(specimen_toml)
-    rig = _rig(root.section("rig"))
-    specimen = _specimen(root.section("specimen"), rig, curve_csv.stem)
-    options = root.section("measurement", required=False)
-    columns, notes = curve_columns(table, rig.columns, rig.noise)
-    found = _at(table.file, rig.from_columns, columns, specimen.thickness)
-    deflection, force, across = found["deflection"], found["force"], found.get("across")
-    if isinstance(rig, Strip):
-        _check_strip(found, table)
-    else:
-        check_samples(found, table.file, table.lines)
-    _check_size(deflection, table, rig)
-    single = _stated(options, rig, specimen.thickness)
-    sd, covariance, covariance_file = _noise(options, single, found.get("force_sd"), force.size)
-    origin = [options.text("origin"), root.section("origin", required=False).all_text()]
-    for section in (options, root):
-        section.finish()
-    provenance = Provenance(
-        curve_csv.name,
-        specimen_toml.name,
-        covariance_file,
-        "; ".join(o for o in origin if o),
-        (*notes, *rig.remarks(found)),
-    )
-    if sd is not None and np.min(sd) < LEAST_SD:
-        fault = f"a standard deviation of {np.min(sd):g} N looks like a wrong unit"
-        raise DataError(fault, options.where, "check the unit of the noise")
-    return Measurement(deflection, force, rig, specimen, found.get("time"), sd, covariance, provenance, across=across)
-
-
-def write_measurement(measurement: Measurement, curve_csv: str | Path, specimen_toml: str | Path) -> None:
-    """Write what `read_measurement` reads back: mm, N and s to 15 digits, the covariance in a file of its own.
-
-    Raises `StorageError` if a file exists already or cannot be written; nothing is overwritten.
-    """
-    curve_csv, specimen_toml = Path(curve_csv), Path(specimen_toml)
-    arrays = {"time": measurement.time, "deflection": measurement.deflection, "force": measurement.force}
-    if measurement.covariance is None:
-        arrays["force_sd"] = measurement.force_sd
-    columns = measurement.rig.to_columns(
-        {k: v for k, v in arrays.items() if v is not None}, measurement.specimen.thickness
-    )
-    options: dict[str, Any] = {"origin": measurement.provenance.origin} if measurement.provenance.origin else {}
-    texts = {curve_csv: csv_text(columns)}
-    if measurement.covariance is not None:
-        beside = specimen_toml.parent / f"{curve_csv.stem}_covariance.csv"
-        options["covariance"] = beside.name
-        texts[beside] = "".join(",".join(f"{v:.17g}" for v in row) + "\n" for row in measurement.covariance)
-    lengths = {f"{k}_mm": float(f"{1e3 * v:.15g}") for k, v in measurement.rig.lengths.items()}
-    content = {
-        "specimen": {
-            "name": measurement.specimen.name,
-            "thickness_um": float(f"{1e6 * measurement.specimen.thickness:.15g}"),
-        },
-        "rig": {"kind": measurement.rig.name, **lengths},
-        "measurement": options,
-    }
-    texts[specimen_toml] = tomli_w.dumps({k: v for k, v in content.items() if v})
-    write_new(texts)
-
-
-def csv_text(columns: dict[str, Array]) -> str:
-    """A CSV with a header, columns of equal length, and 15 digits."""
-    rows = zip(*columns.values(), strict=True)
-    return "\n".join([",".join(columns), *(",".join(f"{v:.15g}" for v in row) for row in rows)]) + "\n"
-
-
-def write_new(texts: dict[Path, str]) -> None:
-    """Write texts to files that do not exist yet; raises `StorageError` before the first if one does."""
-    for path in texts:
-        if path.exists():
-            raise StorageError("the file exists already", str(path), "remove it or choose another name")
-    try:
-        for path, text in texts.items():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with path.open("x", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-    except OSError as error:
-        raise StorageError(
-            f"the file cannot be written ({error.strerror})", str(path), "choose another folder"
-        ) from None
-
-
-def _rig(section: Section) -> Rig:
-    kind = section.text("kind", required=True)
-    known = components("rigs")
-    if kind not in known:
-        supported = f"supported: {', '.join(known)}"
-        raise DataError(f'there is no rig of the kind "{kind}"', section.where, supported)
-    cls: type[Rig] = known[kind]
-    required = {name: not cls.has_default(name) for name in cls.length_names()}
-    lengths = {name: section.measure(name, LENGTH, f"{name}_mm", need) for name, need in required.items()}
-    section.finish()
-    rig = _at(section.where, partial(cls, **{k: v for k, v in lengths.items() if v is not None}))
-    if not RIGS[0] <= rig.size() <= RIGS[1]:
-        raise DataError(f"a rig of {rig.size():g} m looks like a wrong unit", section.where, "check the units")
-    return rig
-
-
-def _specimen(section: Section, rig: Rig, default_name: str) -> Specimen:
-    name = section.text("name") or default_name
-    thickness = section.measure("thickness", LENGTH, "thickness_um")
-    section.finish()
-    specimen = _at(section.where, Specimen, name, thickness)
-    if not THICKNESSES[0] <= specimen.thickness <= THICKNESSES[1]:
-        fault = f"a film {1e3 * specimen.thickness:g} mm thick looks like a wrong unit"
-        raise DataError(fault, section.where, "check the unit in the name of the key")
-    return specimen
-
-
-def _at(where: str, cls: Callable[..., T], *values: Any) -> T:
-    """``cls(*values)``, with the place in front of what it complains about."""
-    try:
-        return cls(*values)
-    except DataError as error:
-        raise DataError(error.what, where, error.remedy) from None
-
-
-def curve_columns(
-    table: Table, required: Mapping[str, str], noise: Mapping[str, str] = Rig.noise
-) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """The columns of a curve in SI, (N,) each, by name: ``required`` ones, time and ``noise``; a note on the others.
-
-    Both map names to quantities. Raises `DataError` if one is missing or holds what is no number, and for
-    fewer than two points.
-    """
-    places = {name: table.require(name, quantity) for name, quantity in required.items()}
-    for name, quantity in (("time", TIME), *noise.items()):
-        if (place := table.find(name, quantity)) is not None:
-            places[name] = place
-    if len(table.rows) < 2:
-        raise DataError(f"a curve needs at least two points, and this one has {len(table.rows)}", table.file)
-    used = {index for index, _ in places.values()}
-    ignored = [h for i, h in enumerate(table.header) if i not in used and h]
-    notes = (f"ignored columns: {', '.join(ignored)}",) if ignored else ()
-    return {name: table.column(*place) for name, place in places.items()}, notes
-
-
-def check_samples(columns: dict[str, Array], file: str, lines: Sequence[int]) -> None:
-    """Raise `DataError` for an order or a sign that no test gives.
-
-    ``columns`` are those of a curve in SI, (N,) each; ``lines`` the N line numbers of ``file`` that errors name.
-    """
-    places = [f"{file}, line {k}" for k in lines]
-    _check_sequence(columns, places)
-    for name in ("deflection", "force"):
-        if np.mean(columns[name] < 0) > 0.5:
-            fault = f"the {name} is negative at most points, and a lifted disc has a positive one"
-            raise DataError(fault, file, "change the sign of the column")
-    if not np.any(columns["deflection"] > 0):
-        raise DataError("the disc is never lifted: no deflection is positive", file, "check the column")
-    _check_sd(columns, places)
-
-
-def _check_strip(columns: dict[str, Array], table: Table) -> None:
-    """As `check_samples`, for a homogeneous test: what pushes has a stretch below 1 and a negative stress."""
-    places = [f"{table.file}, line {k}" for k in table.lines]
-    deflection, force, across = columns["deflection"], columns["force"], columns.get("across")
-    if across is None:
-        _check_sequence(columns, places)
-    else:
-        places = 2 * places
-    pulled, pushed = deflection > 0, deflection < 0
-    if across is not None:  # held wide a film pulls below rest, and held narrow it may push above
-        pulled, pushed = pulled & (across >= 1), pushed & (across <= 1)
-    against = ((pulled & (force < 0)) | (pushed & (force > 0))) & (np.abs(force) > 0.01 * np.max(np.abs(force)))
-    if np.sum(against) > 0.5 * np.sum(pulled | pushed):
-        k = int(np.argmax(against))
-        fault = "at most points the stress is negative above a stretch of 1 or positive below it"
-        remedy = "write the stretch as length over length at rest, and the stress positive where it pulls"
-        raise DataError(fault, places[k], remedy)
-    if not np.any(deflection > 0):
-        fault = "no stretch is above 1, and a test in compression alone cannot be calibrated"
-        raise DataError(fault, table.file, "keep the signs as they are, and add the readings in tension of this rubber")
-    _check_sd(columns, places)
-
-
-def _check_sequence(columns: dict[str, Array], places: list[str]) -> None:
-    if "time" in columns:
-        check_time(columns["time"], places)
-    else:
-        check_order(columns["deflection"], places)
-
-
-def _check_sd(columns: dict[str, Array], places: list[str]) -> None:
-    if "force_sd" in columns and np.any(columns["force_sd"] <= 0):
-        k = int(np.argmax(columns["force_sd"] <= 0))
-        raise DataError("the standard deviation of the force must be positive", places[k], "correct the column")
-
-
-def _check_size(deflection: Array, table: Table, rig: Rig) -> None:
-    k = int(np.argmax(deflection))
-    row = table.lines[k % len(table.lines)]
-    if deflection[k] > LARGEST_LIFT * rig.size():
-        fault = (
-            f"a deflection of {1e3 * deflection[k]:g} mm on a rig of {1e3 * rig.size():g} mm looks like a wrong unit"
-        )
-        raise DataError(fault, f"{table.file}, line {row}", "check the unit in the header")
-
-
-def _stated(options: Section, rig: Rig, thickness: float) -> float | None:
-    """N, the standard deviation that the specimen file states for all points, or None; in any quantity of the rig."""
-    found = {}
-    for name, quantity in rig.noise.items():
-        value = options.measure(name, quantity, f"{name}_{'N' if quantity == FORCE else 'MPa'}", required=False)
-        if value is not None:
-            found[name] = value * rig.newton(quantity, thickness)
-    if len(found) > 1:
-        raise DataError(f"{' and '.join(found)} both give the noise", options.where, "remove one of them")
-    return next(iter(found.values()), None)
-
-
-def _noise(
-    options: Section, single: float | None, column: Array | None, n: int
-) -> tuple[Array | None, Array | None, str]:
-    """(force_sd, covariance, file of the covariance) from the specimen file and the column."""
-    name = options.text("covariance")
-    if single is not None and (name or column is not None):
-        other = "covariance" if name else "column force_sd"
-        raise DataError(f"force_sd and the {other} both give the noise", options.where, "remove one of them")
-    if single is not None and single <= 0:
-        raise DataError("the standard deviation of the force must be positive", options.where, "correct force_sd")
-    if name is None:
-        return (np.full(n, single) if single is not None else column), None, ""
-    path = Path(options.file).parent / name
-    covariance = read_matrix(path)
-    if covariance.shape != (n, n):
-        fault = f"the covariance is {covariance.shape[0]} x {covariance.shape[1]}, and the curve has {n} points"
-        raise DataError(fault, str(path), f"give a {n} x {n} matrix in N^2")
-    check_covariance(covariance, str(path))
-    if column is not None and not np.allclose(np.sqrt(np.diag(covariance)), column, rtol=0.02, atol=1e-9):
-        fault = "the diagonal of the covariance is not the square of the column force_sd"
-        raise DataError(fault, str(path), "it must be in N^2 and in the order of the curve")
-    return np.sqrt(np.diag(covariance)), covariance, path.name

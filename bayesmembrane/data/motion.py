@@ -24,7 +24,7 @@ SLOWEST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class Motion:
     """How the disc was moved: what the film remembers.
 
     Attributes

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.data.settings import load_toml
 from bayesmembrane.data.shipped import shipped
-from bayesmembrane.data.tables import Table, number, parse_table, read_text
+from bayesmembrane.data.tables import TextTable, number, parse_table, read_text
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import material
@@ -17,7 +17,7 @@ from bayesmembrane.ground.units import LENGTH
 
 
 @dataclass(frozen=True)
-class Row:
+class PrintedSet:
     """One printed parameter set with one printed loss per range; the texts keep the printed digits.
 
     Attributes
@@ -63,7 +63,7 @@ class PublishedTable:
     step : recording step of the measurement, m
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[PrintedSet, ...]
     ranges: tuple[str, ...]
     ends: tuple[float, ...]
     inner_radius: float
@@ -85,7 +85,7 @@ class PublishedTable:
         """(n_ranges, n_rows) printed losses, N."""
         return np.array([row.loss for row in self.rows]).T
 
-    def with_row(self, index: int, row: Row) -> PublishedTable:
+    def with_row(self, index: int, row: PrintedSet) -> PublishedTable:
         """The table with another row at ``index``."""
         rows = list(self.rows)
         rows[index] = row
@@ -116,7 +116,7 @@ def read_published_table(
             if (kind, column, name) not in printed:
                 raise DataError(f"the loss of {kind} {column} over {name} is missing", "the table of losses")
         loss = tuple(printed[kind, column, name] for name in ranges)
-        rows.append(Row(kind, column, names, tuple(constants[name] for name in names), loss))
+        rows.append(PrintedSet(kind, column, names, tuple(constants[name] for name in names), loss))
     return PublishedTable(
         tuple(rows),
         ranges,
@@ -128,22 +128,22 @@ def read_published_table(
     )
 
 
-def _load(path: Path) -> Table:
+def _load(path: Path) -> TextTable:
     return parse_table(read_text(path), str(path))
 
 
-def _parameter_sets(table: Table) -> dict[tuple[str, str], dict[str, str]]:
+def _parameter_sets(table: TextTable) -> dict[tuple[str, str], dict[str, str]]:
     sets: dict[tuple[str, str], dict[str, str]] = {}
     for kind, column, name, value in _cells(table, ("material", "column", "parameter", "value")):
         sets.setdefault((kind, column), {})[name] = value
     return sets
 
 
-def _losses(table: Table) -> dict[tuple[str, str, str], str]:
+def _losses(table: TextTable) -> dict[tuple[str, str, str], str]:
     return {(m, c, r): v for m, c, r, v in _cells(table, ("material", "column", "range", "loss_N"))}
 
 
-def _cells(table: Table, names: tuple[str, ...]) -> list[tuple[str, ...]]:
+def _cells(table: TextTable, names: tuple[str, ...]) -> list[tuple[str, ...]]:
     """The named columns as printed; the last of them must hold numbers."""
     for name in names:
         if name not in table.header:

@@ -13,11 +13,11 @@ from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.units import factor, known_units, split_header, to_si
 
 
-def load_toml(path: Path) -> Section:
+def load_toml(path: Path) -> TomlSection:
     """The root section of a TOML file; raises `DataError` if it cannot be read, with the line of a syntax error."""
     text = read_text(path)
     try:
-        return Section(tomllib.loads(text), str(path))
+        return TomlSection(tomllib.loads(text), str(path))
     except (ValueError, RecursionError) as error:
         fault = "it is nested too deeply" if isinstance(error, RecursionError) else f"{error}"
         raise DataError(
@@ -25,7 +25,7 @@ def load_toml(path: Path) -> Section:
         ) from None
 
 
-class Section:
+class TomlSection:
     """One table of a TOML file. Ask for its keys, then call `finish`, which complains about the others."""
 
     def __init__(self, table: dict[str, Any], file: str, name: str = "") -> None:
@@ -34,7 +34,7 @@ class Section:
         self._asked: set[str] = set()
         self._seen: set[str] = set()
 
-    def section(self, name: str, required: bool = True) -> Section:
+    def section(self, name: str, required: bool = True) -> TomlSection:
         """The section ``[name]``; an empty one if it is missing and not required."""
         self._note(name, name)
         if name not in self.table and required:
@@ -42,7 +42,7 @@ class Section:
         table = self.table.get(name, {})
         if not isinstance(table, dict):
             raise DataError(f'"{name}" must be a section', self.where, f"write [{name}] on a line of its own")
-        return Section(table, self.file, name)
+        return TomlSection(table, self.file, name)
 
     def text(self, key: str, required: bool = False) -> str | None:
         """The text under ``key``, None if there is none."""

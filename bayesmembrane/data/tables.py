@@ -52,7 +52,7 @@ def decode(data: bytes, file: str) -> str:
 
 
 @dataclass(frozen=True)
-class Table:
+class TextTable:
     """A header and rows of text, as they stand in a file.
 
     Attributes
@@ -123,7 +123,7 @@ class Table:
         return value
 
 
-def parse_table(text: str, file: str, delimiter: str = ",", decimal: str = ".") -> Table:
+def parse_table(text: str, file: str, delimiter: str = ",", decimal: str = ".") -> TextTable:
     """The table in ``text``: the first line that is no comment (``#``) is the header, empty lines do not count.
 
     Raises `DataError` for another delimiter, decimal commas that split cells, a missing or repeated name.
@@ -140,7 +140,7 @@ def parse_table(text: str, file: str, delimiter: str = ",", decimal: str = ".") 
     _check_header(header, f"{file}, line {header_line}")
     for k, cells in rows:
         _check_width(cells, header, f"{file}, line {k}", decimal)
-    return Table(file, header_line, header, tuple(k for k, _ in rows), tuple(c for _, c in rows), decimal)
+    return TextTable(file, header_line, header, tuple(k for k, _ in rows), tuple(c for _, c in rows), decimal)
 
 
 def read_matrix(path: Path) -> Array:

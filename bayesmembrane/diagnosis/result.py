@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.sudden import SuddenChange
@@ -16,7 +17,6 @@ from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.hypothesis import Hypothesis
-from bayesmembrane.physics.rigs.base import Rig
 
 VERDICTS = ("adequate", "named", "ambiguous", "material", "unknown")
 
@@ -61,7 +61,7 @@ class Diagnosis(Showable):
     verdict: str
     effects: tuple[str, ...]
     material: str
-    rig: Rig
+    rig: Fixture
     thickness: float
     detection: Detection
     null: Candidate

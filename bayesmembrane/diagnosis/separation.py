@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST
 from bayesmembrane.ground.errors import BayesmembraneError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Compliance
 from bayesmembrane.physics.forward import Forward, Solve
-from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.base import Rig, rig_of
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def experiments(measurement: Measurement, rivals: Sequence[Candidate], sd: float
     return sorted(out, key=lambda e: -e.separation)
 
 
-def _protocols(m: Measurement) -> list[tuple[str, Path, Annulus | None]]:
+def _protocols(m: Measurement) -> list[tuple[str, Motion, Rig | None]]:
     """(in words, path, rig if it is another one)."""
     d, t = m.path.deflection, m.path.time
     top = float(np.max(d))
@@ -59,11 +59,11 @@ def _protocols(m: Measurement) -> list[tuple[str, Path, Annulus | None]]:
     speed = NEXT_TEST.usual_speed if t is None else float(np.median(m.path.speed))
     full = m.full_range
 
-    def path(points: Array, factor: float = 1.0) -> Path:
+    def path(points: Array, factor: float = 1.0) -> Motion:
         steps = np.maximum(np.abs(np.diff(points, prepend=0.0)), 1e-9)
-        return Path(points, np.cumsum(steps) / (speed * factor), full)
+        return Motion(points, np.cumsum(steps) / (speed * factor), full)
 
-    found: list[tuple[str, Path, Annulus | None]] = []
+    found: list[tuple[str, Motion, Rig | None]] = []
     cyclic = np.any(m.leg < 0)
     if not cyclic:
         found.append(("unloading after the same loading", path(np.concatenate([up, up[::-1]])), None))
@@ -72,14 +72,11 @@ def _protocols(m: Measurement) -> list[tuple[str, Path, Annulus | None]]:
     again = np.concatenate([up, up[::-1]]) if cyclic else up
     if t is not None:
         found.append((f"the same test {NEXT_TEST.faster:g} times faster", path(again, NEXT_TEST.faster), None))
-    if isinstance(m.rig, Annulus):
-        disc = replace(m.rig, inner_radius=NEXT_TEST.wider * m.rig.inner_radius)
-        if disc.inner_radius < NEXT_TEST.widest * disc.outer_radius:
-            found.append((f"the same test with a disc {NEXT_TEST.wider:g} times as wide", path(again), disc))
+    found += [(f"the same test {words}", path(again), rig) for words, rig in rig_of(m).variants()]
     return found
 
 
-def _trial(m: Measurement, path: Path, rig: Annulus | None) -> Measurement:
+def _trial(m: Measurement, path: Motion, rig: Rig | None) -> Measurement:
     return Measurement(
         path.deflection,
         np.ones(path.deflection.size),

@@ -127,3 +127,12 @@ class Parameter:
     meaning: str
     prior: Prior
     bounds: tuple[float, float] = field(default=(-np.inf, np.inf))
+
+
+@dataclass(frozen=True)
+class Natural:
+    """A parameter as users read it: name, unit ("-" for a pure number), and what it means in a few words."""
+
+    name: str
+    unit: str
+    meaning: str

@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import (
     Carried,
     Compliance,
     Deflection,
     Effect,
+    FilmState,
     Geometry,
     Memory,
     Sensor,
     Slack,
-    State,
     ordered,
 )
 from bayesmembrane.physics.mechanics.solution import Status
@@ -50,7 +50,7 @@ class Composition:
     """
 
     effects: tuple[Effect, ...]
-    path: Path
+    path: Motion
 
     @cached_property
     def _places(self) -> list[tuple[Effect, slice]]:
@@ -135,7 +135,7 @@ class Composition:
             more = effect.excess(p, given, self.path)
             excess = more if excess is None else excess + more
         virgin, slope = law(given, excess)
-        force, state = virgin, State(self.path, given, virgin, slope)
+        force, state = virgin, FilmState(self.path, given, virgin, slope)
         for effect, p in self._acting(Carried, x):
             force = effect.carried(p, force, state)
         for effect, p in self._acting(Memory, x):

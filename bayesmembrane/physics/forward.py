@@ -11,19 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.composition import Composition, differences
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.convexity import reached_convexity, reached_ellipticity
-from bayesmembrane.physics.mechanics.film_law import film_law
-from bayesmembrane.physics.mechanics.request import Request, Spared, request
+from bayesmembrane.physics.mechanics.request import Spared
 from bayesmembrane.physics.mechanics.solution import Curves, Status
-from bayesmembrane.physics.mechanics.strip_law import StripLaw, strip_curves
-from bayesmembrane.physics.rigs.annulus import Annulus
-from bayesmembrane.physics.rigs.base import Strip
+from bayesmembrane.physics.rigs.base import Films, Law, Rig, Trial, rig_of
 
 Solve = api.Solve
 """`mechanics.api.solve`, or something in front of it, as a cache."""
@@ -36,7 +33,6 @@ LONG = 100
 AT_ONCE = 2_000_000
 """Readings that are computed in one batch."""
 
-PUSHED = 0.01  # of the largest force: a negative one beyond it is no noise about the zero of a slack film
 STEP = 1e-3  # of the differences in coordinates: h^4 and round-off are both 1e-13 there
 
 
@@ -77,8 +73,8 @@ class Forward:
     """F(delta; x) of one hypothesis on the rig of one measurement, at ``deflection`` (N,) m.
 
     At the measurement's own deflections the film remembers how the disc was moved; other deflections are one path of
-    their own, at the speed of the measurement. Effects, homogeneous rigs and long curves go through a film law that is
-    interpolated to 1e-6. A material of one modulus alone is solved once: F(c) = (c / 1) F(1).
+    their own, at the speed of the measurement. Effects and long curves go through the law of the rig, in
+    closed form or interpolated to 1e-6. A material of one modulus alone is solved once: F(c) = (c / 1) F(1).
     """
 
     hypothesis: Hypothesis
@@ -132,19 +128,24 @@ class Forward:
     @cached_property
     def composes(self) -> bool:
         """True where curves come from a film law and the effects around it, and not straight from the solver."""
-        return bool(self.hypothesis.effects) or self.deflection.size > LONG or isinstance(self.measurement.rig, Strip)
+        return bool(self.hypothesis.effects) or self.deflection.size > LONG or self.rig.closed_form
 
     @cached_property
-    def path(self) -> Path:
+    def rig(self) -> Rig:
+        """The rig; raises `SettingsError` if no film on it can be predicted."""
+        return rig_of(self.measurement)
+
+    @cached_property
+    def path(self) -> Motion:
         """How the disc moves: as in the measurement at its own deflections, else through others at its speed."""
         m = self.measurement
         if self._measured:
             return m.path
-        path = Path(self.deflection, None, m.full_range)
+        path = Motion(self.deflection, None, m.full_range)
         if m.path.time is None:
             return path
         speed = float(np.median(m.path.speed))
-        return Path(self.deflection, np.cumsum(np.maximum(path.steps, 1e-9 * m.full_range)) / speed, m.full_range)
+        return Motion(self.deflection, np.cumsum(np.maximum(path.steps, 1e-9 * m.full_range)) / speed, m.full_range)
 
     @cached_property
     def _measured(self) -> bool:
@@ -154,7 +155,7 @@ class Forward:
     def composition(self) -> Composition:
         """The effects on the path; raises `SettingsError` for one that cannot occur here."""
         for effect in self.hypothesis.effects:
-            if reason := effect.unavailable(self.measurement.rig.name, self.path):
+            if reason := effect.unavailable(self.measurement.rig, self.path):
                 raise SettingsError(reason, remedy="leave it out")
         return Composition(self.hypothesis.effects, self.path)
 
@@ -198,43 +199,22 @@ class Forward:
         sensitivities: bool = False,
         reached: bool = False,
         spare: Spared = Spared.NONE,
-    ) -> tuple[Any, tuple[Array, Array]]:
+    ) -> tuple[Law, tuple[Array, Array]]:
         """The law of ``films`` (B, n) with effect parameters ``theta`` (B, k), and margins (B, M) of its states.
 
         The margins are those of convexity and of ellipticity, -inf where the film's energy became indefinite.
         """
-        extra = self._beyond if reached else np.empty(0)
-        rig, material = self.measurement.rig, self.hypothesis.material
-        if isinstance(rig, Strip):
-            strip = StripLaw(material, films, rig, self._pushes, self.path.across)
-            shown = strip_curves(*self._states(strip, extra))
-            return strip, (shown.convexity, shown.ellipticity)
-        composition = self.composition
-        end = np.maximum(composition.end(theta), 1e-3 * self.measurement.full_range)
-        asked = Request(
-            material,
-            films,
-            np.broadcast_to(extra, (len(films), extra.size)),
-            composition.prestretch(theta),
-            *self._radii,
-            sensitivities=sensitivities,
-            spare=spare,
-            exact_up_to=np.inf if spare is Spared.NONE else float(np.max(end)),
+        trial = Trial(
+            self.measurement,
+            self.path,
+            self.composition.prestretch(theta),
+            self.composition.end(theta),
+            self._beyond if reached else np.empty(0),
         )
-        law, curves = film_law(asked, end, self.solve)
-        indefinite, bent = (curves.status == s for s in (Status.INDEFINITE, Status.NOT_ELLIPTIC))
-        convexity, ellipticity = (
-            np.where(indefinite | (bent & np.isnan(m)), -np.inf, m) for m in (curves.convexity, curves.ellipticity)
-        )
-        return law, (convexity, ellipticity)
+        return self.rig.law(self._films(films, sensitivities, "ritz", spare), trial)
 
-    def _states(self, strip: StripLaw, extra: Array) -> tuple[StripLaw, Array]:
-        """Law and deflections of a few states up to the end of the range, or of all of them in a biaxial test."""
-        d = self.path.deflection
-        if strip.across is not None:
-            return strip, d
-        states = np.unique(np.concatenate([d, extra]))
-        return strip, states[np.linspace(0, states.size - 1, min(states.size, 4 * GAPS)).astype(int)]
+    def _films(self, films: Array, sensitivities: bool, solver: str, spare: Spared) -> Films:
+        return Films(self.hypothesis.material, films, sensitivities, spare, solver, self.solve)
 
     def film_force(self, films: Array) -> Array:
         """(B, N) N: forces of films (B, n) without effects at ``deflection``; nan where there is none."""
@@ -252,19 +232,6 @@ class Forward:
     def _here(self) -> Any:
         return self.measurement.on_path if self._measured else slice(None)
 
-    @cached_property
-    def _radii(self) -> tuple[float, float]:
-        rig = annulus(self.measurement)
-        return rig.inner_radius, rig.outer_radius
-
-    @cached_property
-    def _pushes(self) -> bool:
-        """True where the specimen was compressed, and pushed back: it was a block, not a film."""
-        m = self.measurement
-        if m.across is not None:  # held across, a film may be taut below rest: only the stress tells
-            return bool(np.any(m.force < -PUSHED * np.max(np.abs(m.force))))
-        return bool(np.any((m.deflection < -0.01 * m.full_range) & (m.force < 0)))
-
     def curves(
         self,
         films: Array,
@@ -274,16 +241,9 @@ class Forward:
         spare: Spared = Spared.NONE,
     ) -> Curves:
         """Curves of ``films`` (B, n) without effects at ``deflection`` (N,) m on the rig of the measurement."""
-        if isinstance(self.measurement.rig, Strip):
-            across = self.path.across
-            if across is not None and deflection.size == len(self.measurement):  # the path may hold more points
-                across = self.measurement.across
-            strip = StripLaw(self.hypothesis.material, films, self.measurement.rig, self._pushes, across)
-            return strip_curves(strip, deflection, sensitivities)
         # What lies beyond is solved to see whether the film stays convex there.
         exact = np.inf if spare is Spared.NONE else float(np.max(self.deflection))
-        asked = request(self.hypothesis.material, films, deflection, *self._radii)
-        return self.solve(replace(asked, sensitivities=sensitivities, solver=solver, spare=spare, exact_up_to=exact))
+        return self.rig.curves(self._films(films, sensitivities, solver, spare), self.measurement, deflection, exact)
 
     def jacobian(self, x: Array) -> Array:
         """d films / d coordinates, (B, n, k), by central differences of fourth order: exact to 1e-12 or so."""
@@ -303,29 +263,6 @@ def _scaled(unit: Curves, films: Array) -> Curves:
     same = {f.name: getattr(unit, f.name) for f in fields(Curves)}
     wide = {k: np.broadcast_to(v, (*shape, *v.shape[2:])) for k, v in same.items() if v is not None}
     return Curves(**{**same, **wide, **{k: films * same[k] for k in ("force", "slope", "energy")}})
-
-
-def predict(
-    hypothesis: Hypothesis,
-    coordinates: ArrayLike,
-    measurement: Measurement,
-    deflection: ArrayLike | None = None,
-    sensitivities: bool = False,
-    solve: Solve = api.solve,
-) -> Prediction:
-    """Force curves F(delta; x) of coordinates x (B, k) at ``deflection`` (N,) m, or at those of the measurement.
-
-    Raises `SettingsError` for an effect that cannot occur on the rig or needs times that the measurement lacks.
-    """
-    at = measurement.deflection if deflection is None else np.atleast_1d(np.asarray(deflection, dtype=float))
-    return Forward(hypothesis, measurement, at, solve)(coordinates, sensitivities)
-
-
-def annulus(measurement: Measurement) -> Annulus:
-    """The rig, if it is one whose film can be solved; raises `SettingsError` otherwise."""
-    if not isinstance(measurement.rig, Annulus):
-        raise SettingsError(f'a film on the rig "{measurement.rig.name}" cannot be predicted', remedy="use an annulus")
-    return measurement.rig
 
 
 def beyond(deflection: Array, full_range: float) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
-from bayesmembrane.ground.parameters import Array, Parameter
+from bayesmembrane.ground.parameters import Array, Natural, Parameter
 from bayesmembrane.ground.registry import component, material
 from bayesmembrane.physics.convexity import REACHED, ConvexityMode, mode
 from bayesmembrane.physics.effects.base import Effect
@@ -59,17 +59,22 @@ class Hypothesis:
         return tuple(p.name for p in self.parameters)
 
     @cached_property
-    def natural_names(self) -> tuple[str, ...]:
-        """Full names of what users read: membrane parameters (``yeoh.c1``), effects, noise (``noise.sd``)."""
-        material = [f"{self.material.name}.{n}" for n in self.material.field_names()]
-        effects = [f"{e.name}.{p.name}" for e in self.effects for p in e.coordinates]
-        return (*material, *effects, *(f"noise.{n}" for n in self.noise.field_names))
+    def natural_parameters(self) -> tuple[Natural, ...]:
+        """What users read, under full names: membrane parameters (``yeoh.c1``), effects, noise (``noise.sd``)."""
+        blocks = [(self.material.name, self.material.natural_parameters())]
+        blocks += [(e.name, tuple(Natural(p.name, p.unit, p.meaning) for p in e.coordinates)) for e in self.effects]
+        blocks += [("noise", self.noise.natural_parameters)]
+        return tuple(replace(p, name=f"{block}.{p.name}") for block, ps in blocks for p in ps)
 
-    @cached_property
+    @property
+    def natural_names(self) -> tuple[str, ...]:
+        """Full names of the natural parameters."""
+        return tuple(p.name for p in self.natural_parameters)
+
+    @property
     def natural_units(self) -> tuple[str, ...]:
         """Units of the natural parameters."""
-        effects = [p.unit for e in self.effects for p in e.coordinates]
-        return (*self.material.units, *effects, *("N" if n == "sd" else "-" for n in self.noise.field_names))
+        return tuple(p.unit for p in self.natural_parameters)
 
     @property
     def material_size(self) -> int:

@@ -1,4 +1,4 @@
-"""The answer of a reconstruction, and its JSON."""
+"""The answer of a reconstruction."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class RangeResult:
     force: Array
     force_sd: Array
 
-    def to_json_dict(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, Any]:
         """Plain numbers, lengths in mm."""
         evidence = {
             str(n): {"log_evidence": e, "most_probable_first_mm": 1e3 * a} for n, (e, a) in self.positions.items()
@@ -67,7 +67,7 @@ class LossCheck:
     predicted_sd: float
     wrong: float
 
-    def to_json_dict(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, Any]:
         """Plain numbers, N."""
         return {
             "material": self.material,
@@ -126,17 +126,17 @@ class Reconstruction(Showable):
         """(N,) N, ranges one after the other."""
         return np.concatenate([r.force for r in self.ranges])
 
-    def to_json_dict(self) -> dict[str, Any]:
-        """Plain numbers and texts; lengths in mm, forces in N."""
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers; lengths in mm, forces in N."""
         influence = [
             {"changed": i.changed, "force_change_N": (i.force - self.force).tolist(), "log_evidence": i.log_evidence}
             for i in self.influence
         ]
         return {
-            **{r.name: r.to_json_dict() for r in self.ranges},
+            **{r.name: r.summary() for r in self.ranges},
             "suspect_rows": [_suspect(s) for s in self.suspects],
             "covariance_N2": self.covariance.tolist(),
-            "losses": [c.to_json_dict() for c in self.losses],
+            "losses": [c.summary() for c in self.losses],
             "influence": influence,
             "scales": self.scales,
             "acceptance": self.acceptance,
@@ -147,7 +147,6 @@ def _suspect(found: Suspect) -> dict[str, Any]:
     return {
         "material": found.material,
         "column": found.column,
-        "reason": found.reason,
         "probability": found.probability,
         "corrections": _entries(found.corrections),
         "alternatives": [_entries(a) for a in found.alternatives],

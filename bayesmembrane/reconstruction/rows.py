@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 from scipy.interpolate import CubicSpline
 
-from bayesmembrane.data.published import PublishedTable, Row
+from bayesmembrane.data.published import PrintedSet, PublishedTable
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.reconstruction.fit import Mode, again, find_mode
 from bayesmembrane.reconstruction.model import Model, Simulate
@@ -60,18 +60,44 @@ class Correction:
 
 
 @dataclass(frozen=True)
-class Suspect:
-    """A row that contradicts the others; ``corrections`` is the smallest set of changes that mends it.
+class PredictedLoss:
+    """One printed loss of a row and what the other rows say it is; nan for a row without simulated curve.
 
-    ``alternatives`` are other sets of the same or a larger size.
+    range : its name
+    printed : as printed, N
+    predicted, sd : N
+    """
+
+    range: str
+    printed: str
+    predicted: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A row that contradicts the others.
+
+    Attributes
+    ----------
+    material, column : which row
+    losses : what the others predict, range by range
+    probability : that the row is wrong
+    corrections : the smallest set of changes that mends it
+    alternatives : other sets of the same or a larger size
     """
 
     material: str
     column: str
-    reason: str
+    losses: tuple[PredictedLoss, ...]
     probability: float
     corrections: tuple[Correction, ...]
     alternatives: tuple[tuple[Correction, ...], ...]
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the forward model has a curve for the printed parameters."""
+        return bool(np.all(np.isfinite([p.predicted for p in self.losses])))
 
 
 def check_row(model: Model, mode: Mode, index: int) -> RowCheck:
@@ -142,24 +168,19 @@ def suspect(table: PublishedTable, model: Model, mode: Mode, check: RowCheck, si
     return Suspect(
         row.material,
         row.column,
-        _reason(table, row, check),
+        _predicted(table, row, check),
         check.probability,
         sets[0] if sets else (),
         tuple(sets[1:]),
     )
 
 
-def _reason(table: PublishedTable, row: Row, check: RowCheck) -> str:
-    if not np.all(np.isfinite(check.excess)):
-        return "the forward model has no force over the whole range for the printed parameters"
-    told = ", ".join(
-        f"over {name} printed {printed} N, predicted {loss + e:.4g} +- {s:.1g} N"
-        for name, printed, loss, e, s in zip(table.ranges, row.losses, row.loss, check.excess, check.sd, strict=True)
-    )
-    return f"the other rows contradict its losses: {told}"
+def _predicted(table: PublishedTable, row: PrintedSet, check: RowCheck) -> tuple[PredictedLoss, ...]:
+    parts = zip(table.ranges, row.losses, row.loss, check.excess, check.sd, strict=True)
+    return tuple(PredictedLoss(name, printed, float(loss + e), float(s)) for name, printed, loss, e, s in parts)
 
 
-def _loss_corrections(table: PublishedTable, row: Row, check: RowCheck) -> tuple[Correction, ...]:
+def _loss_corrections(table: PublishedTable, row: PrintedSet, check: RowCheck) -> tuple[Correction, ...]:
     """The losses that disagree, replaced by what the other rows predict."""
     found = []
     for name, printed, loss, excess, sd in zip(table.ranges, row.losses, row.loss, check.excess, check.sd, strict=True):
@@ -169,7 +190,9 @@ def _loss_corrections(table: PublishedTable, row: Row, check: RowCheck) -> tuple
     return tuple(found)
 
 
-def _parameter_corrections(row: Row, model: Model, mode: Mode, check: RowCheck, simulate: Simulate) -> list[Correction]:
+def _parameter_corrections(
+    row: PrintedSet, model: Model, mode: Mode, check: RowCheck, simulate: Simulate
+) -> list[Correction]:
     """Single parameters whose change makes all losses agree."""
     state = model.evaluate(mode.theta[None], mode.knobs)
     order = np.argsort(state.x[0])

@@ -14,11 +14,11 @@ import numpy as np
 from bayesmembrane.calibration.posterior import FAILURES
 from bayesmembrane.calibration.predictions import Predictions
 from bayesmembrane.calibration.run import Run, load_run, predictions_of
+from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.ground.errors import SettingsError, StorageError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
-from bayesmembrane.physics.rigs.base import Rig
 from bayesmembrane.report.canvas import Measured
 from bayesmembrane.words.calibration import LOOSE, Case
 from bayesmembrane.words.hypothesis import spoken
@@ -73,7 +73,7 @@ class Film:
 
     name: str
     thickness: float
-    rig: Rig
+    rig: Fixture
     origin: str
     files: tuple[str, ...]
     notes: tuple[str, ...]

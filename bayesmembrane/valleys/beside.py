@@ -14,10 +14,7 @@ from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.valleys.follow import RISE, between, valleys
 from bayesmembrane.valleys.result import Between, Valley, Valleys
-from bayesmembrane.valleys.sentences import CLOSE, point
 from bayesmembrane.valleys.surface import unaided
-
-SAME = 1e-4  # of the least loss: a change smaller than this is none
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,18 +29,16 @@ class Beside(Showable):
     pairs: tuple[Between, ...]
 
     @property
-    def sentences(self) -> tuple[str, ...]:
-        """What the effects do to the valley, then what is said of either."""
-        without = (f"Without effects: {s}" for s in self.without.sentences)
-        return (*(p.sentence for p in self.pairs), *self.added.sentences, *without)
+    def compared(self) -> tuple[tuple[Valley, Valley, Between], ...]:
+        """Each range: the valley without effects, that with them, and how they lie to each other."""
+        return tuple(zip(self.without.ranges, self.added.ranges, self.pairs, strict=True))
 
     def summary(self) -> dict[str, Any]:
-        """The JSON answer of ``valleys`` with effects, and what it is without beside it."""
+        """Plain values: those with effects, and what they are without beside them."""
         return {
             **self.added.summary(),
             "without_effects": self.without.summary(),
             "beside": [p.summary() for p in self.pairs],
-            "sentences": list(self.sentences),
         }
 
 
@@ -67,24 +62,4 @@ def valleys_beside(
     without = valleys(measurement, plain, ranges, rise=rise, seed=seed, solve=solve)
     added = valleys(measurement, hypothesis, ranges, rise=rise, seed=seed, draws=draws, solve=solve)
     both = zip(without.ranges, added.ranges, strict=True)
-    return Beside(without, added, tuple(between(a, b, sentence_beside) for a, b in both))
-
-
-def sentence_beside(a: Valley, b: Valley, distance: float, _: Sequence[float] | None) -> str:
-    """What effects do to the valley ``a``, in words."""
-    names = " and ".join(e.name.replace("_", " ") for e in b.hypothesis.effects)
-    change = 100 * (b.best_loss / a.best_loss - 1)
-    n = a.best.size
-    loss = (
-        f"{abs(change):.2g} % {'lower' if change < 0 else 'higher'}, {b.best_loss:.3g} N instead of {a.best_loss:.3g}"
-    )
-    start = (
-        f"Up to {1e3 * a.end:.4g} mm, with {names} the least loss is {loss}, and the optimum of "
-        f"{a.hypothesis.material.title} moves from ({point(a, a.best)}) to ({point(a, b.best[:n])})"
-    )
-    if distance < CLOSE:
-        return f"{start}; the valleys with and without come as close as {distance:.2g} posterior standard deviations."
-    return (
-        f"{start}; the valleys with and without stay {distance:.3g} posterior standard deviations apart, so that the "
-        "material's parameters depend on the effects assumed."
-    )
+    return Beside(without, added, tuple(between(a, b) for a, b in both))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -23,16 +23,15 @@ from bayesmembrane.valleys.between import closest_approach
 from bayesmembrane.valleys.next_tests import rank
 from bayesmembrane.valleys.posterior import (
     Grid,
-    Normal,
+    NormalPosterior,
     Spread,
     grid,
     posterior_margin,
     spread_of_draws,
     spread_of_grid,
 )
-from bayesmembrane.valleys.profile import Profile, floor, optimum, pair_maps, profiles
+from bayesmembrane.valleys.profile import LossProfile, floor, optimum, pair_maps, profiles
 from bayesmembrane.valleys.result import Between, Metric, PublishedPoint, Spectrum, Valley, Valleys, metric_of
-from bayesmembrane.valleys.sentences import sentence_between, sentences_of
 from bayesmembrane.valleys.surface import Surface, unaided
 
 RISE = 0.1
@@ -92,7 +91,6 @@ def valleys_of(
     if hypothesis.curve_size <= 2:
         coarse = _coarse(surfaces, found)
         found = [replace(v, coarse=g) for v, g in zip(found, coarse, strict=True)]
-    found = [replace(v, sentences=sentences_of(v)) for v in found]
     pairs = tuple(between(a, b) for a, b in combinations(found, 2))
     return Valleys(hypothesis, tuple(found), pairs)
 
@@ -113,7 +111,7 @@ def _valley(surface: Surface, rise: float, seed: int, draws: Array | None) -> Va
     k = best.size
     points = MAP_OF_MANY if h.effects else MAP.get(k, MAP_OF_MANY)
     maps = pair_maps(surface, best, lines, points) if k > 2 else ()
-    normal = Normal(surface, best)
+    normal = NormalPosterior(surface, best)
     band = _band(surface, lines[along], least, normal) if k <= 2 else None
     spread = _spread(surface, normal, band, along, draws, seed)
     valley = Valley(
@@ -146,7 +144,7 @@ def _valley(surface: Surface, rise: float, seed: int, draws: Array | None) -> Va
     return replace(valley, published=tuple(_placed(surface, valley, label, p) for label, p in published))
 
 
-def _lines(surface: Surface, start: Array, rise: float) -> tuple[Array, float, list[Profile]]:
+def _lines(surface: Surface, start: Array, rise: float) -> tuple[Array, float, list[LossProfile]]:
     """Optimum (k,), its loss, and all profiles; again from where a profile finds a lower optimum."""
     for _ in range(AGAIN):
         best, least = optimum(surface, start)
@@ -186,14 +184,14 @@ def _spectrum(surface: Surface, best: Array, metric: Metric) -> Spectrum:
     return Spectrum(metric, values**2, (axes * signs[:, None]).T)
 
 
-def _along(lines: Sequence[Profile], spectrum: Spectrum) -> int:
+def _along(lines: Sequence[LossProfile], spectrum: Spectrum) -> int:
     """The parameter with an open end, if there is one; else the largest in the weakest direction."""
     weakest = np.abs(np.nan_to_num(spectrum.vectors[:, -1]))
     opened = [i for i, p in enumerate(lines) if any(e.open for e in p.ends)]
     return max(opened or range(len(lines)), key=lambda i: weakest[i])
 
 
-def _band(surface: Surface, line: Profile, least: float, normal: Normal) -> Grid:
+def _band(surface: Surface, line: LossProfile, least: float, normal: NormalPosterior) -> Grid:
     """A grid that follows the floor: `ALONG` places, and `ACROSS` to both sides, dense near the floor.
 
     It holds the profile and `SDS` standard deviations of the normal posterior to every side of its mode.
@@ -235,7 +233,9 @@ def _cells(band: Grid, along: int) -> Array:
     return np.abs(np.gradient(p[:, 0, along])[:, None] * np.gradient(p[:, :, 1 - along], axis=1))
 
 
-def _spread(surface: Surface, normal: Normal, band: Grid | None, along: int, draws: Array | None, seed: int) -> Spread:
+def _spread(
+    surface: Surface, normal: NormalPosterior, band: Grid | None, along: int, draws: Array | None, seed: int
+) -> Spread:
     if draws is not None and len(draws):
         return spread_of_draws(surface, draws)
     if band is not None:
@@ -255,8 +255,8 @@ def _coarse(surfaces: Sequence[Surface], found: Sequence[Valley]) -> list[Grid]:
     return [grid(s, nodes) for s in surfaces]
 
 
-def _limit(surface: Surface, line: Profile, seed: int) -> str:
-    """Which simpler material the loss at an open end belongs to."""
+def _limit(surface: Surface, line: LossProfile, seed: int) -> str:
+    """Name of the simpler material that the loss at an open end belongs to."""
     ends = [e for e in line.ends if e.open]
     if not ends or surface.hypothesis.effects:
         return ""
@@ -265,7 +265,7 @@ def _limit(surface: Surface, line: Profile, seed: int) -> str:
             continue
         simple = fit(surface.measurement, replace(surface.hypothesis, material=kind, convexity=FREE), seed=seed)
         if abs(simple.loss_N - ends[-1].loss) <= SAME * ends[-1].loss:
-            return kind.title
+            return name
     return ""
 
 
@@ -289,11 +289,7 @@ def _placed(surface: Surface, valley: Valley, label: str, p: Array) -> Published
     return PublishedPoint(label, natural, known, loss <= valley.best_loss + valley.rise, distance)
 
 
-Words = Callable[[Valley, Valley, float, Sequence[float] | None], str]
-"""(two valleys, their distance, where they cross) -> a sentence."""
-
-
-def between(a: Valley, b: Valley, words: Words = sentence_between) -> Between:
+def between(a: Valley, b: Valley) -> Between:
     """Closest approach of two floors, in units of C_a + C_b: that of a difference of independent estimates.
 
     Where ``b`` has more parameters, they come last and are left out.
@@ -303,7 +299,7 @@ def between(a: Valley, b: Valley, words: Words = sentence_between) -> Between:
     approach = closest_approach(a.floor_z, b.floor_z[:, :k], covariance)
     one, two = (tuple(float(v) for v in a.chart.natural(p)) for p in (approach.first, approach.second))
     crossing = None if approach.crossing is None else tuple(float(v) for v in a.chart.natural(approach.crossing))
-    return Between(a.end, b.end, approach, (one, two), crossing, words(a, b, approach.distance, crossing))
+    return Between(a.end, b.end, approach, (one, two), crossing)
 
 
 __all__ = ["RISE", "Valleys", "between", "valleys", "valleys_of"]

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.forward import Forward
-from bayesmembrane.physics.rigs.annulus import Annulus
-from bayesmembrane.valleys.posterior import Normal, Spread
+from bayesmembrane.physics.rigs.base import Rig, rig_of
+from bayesmembrane.valleys.posterior import NormalPosterior, Spread
 from bayesmembrane.valleys.surface import Surface
 
 FURTHER = (1.25, 1.5)
@@ -48,7 +49,9 @@ Information = Callable[[Array, Array], Array]
 """x (B, k), z (B, k) -> signal slopes dS/dz (B, M, k) over the noise's standard deviation."""
 
 
-def rank(surface: Surface, normal: Normal, spread: Spread, scale: Callable[[Array], Array]) -> tuple[NextTest, ...]:
+def rank(
+    surface: Surface, normal: NormalPosterior, spread: Spread, scale: Callable[[Array], Array]
+) -> tuple[NextTest, ...]:
     """All candidates, best first: those for which less than half of the draws have a film are left out.
 
     With the Fisher information I of the data, prior precision P and the candidate's information K = sum of
@@ -73,7 +76,7 @@ def rank(surface: Surface, normal: Normal, spread: Spread, scale: Callable[[Arra
     return tuple(sorted(out, key=lambda t: -t.reduction))
 
 
-def _draws(normal: Normal, spread: Spread) -> Array:
+def _draws(normal: NormalPosterior, spread: Spread) -> Array:
     """The mode and up to `DRAWS` posterior draws (B, k) that have a film."""
     step = max(1, len(spread.draws) // DRAWS)
     z = np.concatenate([normal.z[None, :], spread.draws[::step][:DRAWS]])
@@ -88,13 +91,13 @@ def _longest(precision: Array, scale: Array) -> Array:
     return np.asarray(1 / np.sqrt(np.maximum(least, 1e-300)))
 
 
-def _candidates(surface: Surface, normal: Normal, z: Array, x: Array) -> Iterator[tuple[str, str, Array]]:
+def _candidates(surface: Surface, normal: NormalPosterior, z: Array, x: Array) -> Iterator[tuple[str, str, Array]]:
     m = surface.measurement
     n, end = len(m), float(np.max(m.deflection))
-    root = normal._root
+    root = normal.whitening
     yield "the same test once more", "repeat", np.einsum("mn,bnk->bmk", root, surface.batch(z)[1])
     most = np.full(len(z), 3.0)
-    if isinstance(m.rig, Annulus):
+    if not rig_of(m).homogeneous:
         most = surface.objective.forward.curves(surface.hypothesis.films(x), m.deflection).max_stretch.max(axis=1)
         ends = sorted({end * f for f in FURTHER} | ({m.full_range} if m.full_range > end * (1 + 1e-9) else set()))
         spaces = []
@@ -109,18 +112,11 @@ def _candidates(surface: Surface, normal: Normal, z: Array, x: Array) -> Iterato
     stretch = float(np.nanmedian(most))
     if not np.isfinite(stretch) or stretch <= 1:
         return
-    for kind, text, across in STRIPS:
-        words = f"{text}, stretched up to {stretch:.3g}"
-        yield words, kind, _strip_slopes(surface, z, np.linspace(1, stretch, n + 1)[1:], across, normal.noise_share)
-
-
-STRIPS: tuple[tuple[str, str, Callable[[Array], Array]], ...] = (
-    ("uniaxial", "a strip pulled lengthwise (uniaxial)", lambda l1: l1**-0.5),
-    ("planar", "a wide short strip pulled lengthwise (planar)", np.ones_like),
-    ("equibiaxial", "a sheet pulled equally both ways (equibiaxial)", lambda l1: l1),
-    ("biaxial", "a sheet pulled half as far across as along (biaxial)", lambda l1: 1 + 0.5 * (l1 - 1)),
-)
-"""Name, words and stretch across of the tests whose nominal tensions are closed forms of an incompressible film."""
+    proposing: list[type[Rig]] = [r for r in components("rigs").values() if r.proposal]
+    at = np.linspace(1, stretch, n + 1)[1:]
+    for rig in proposing:
+        words = f"{rig.proposal}, stretched up to {stretch:.3g}"
+        yield words, rig.name, _strip_slopes(surface, z, at, rig, normal.noise_share)
 
 
 def _film_slopes(surface: Surface, z: Array, x: Array, at: Array, share: float) -> Array:
@@ -135,14 +131,11 @@ def _film_slopes(surface: Surface, z: Array, x: Array, at: Array, share: float) 
     return np.asarray(slopes / sd[:, None, None])
 
 
-def _strip_slopes(surface: Surface, z: Array, l1: Array, across: Callable[[Array], Array], share: float) -> Array:
-    """d(nominal tensions)/dz over the noise (B, M or 2 M, k); only those that carry a load count.
-
-    Incompressible and free across (uniaxial), l2 = l1^-1/2 whatever the parameters are.
-    """
+def _strip_slopes(surface: Surface, z: Array, l1: Array, rig: type[Rig], share: float) -> Array:
+    """d(nominal tensions)/dz over the noise (B, M or 2 M, k) of the test that the rig proposes; measured ones count."""
     n = surface.hypothesis.material_size
     p = surface.chart.natural(z)[:, :n]
-    l2 = across(l1)
+    l2, measured = rig.proposed(l1)
     columns = p.T[:, :, None]
     with np.errstate(all="ignore"):
         _, p1, p2, *_ = surface.hypothesis.material.derivatives(columns, l1[None, :], l2[None, :])
@@ -150,9 +143,8 @@ def _strip_slopes(surface: Surface, z: Array, l1: Array, across: Callable[[Array
     shape = (len(z), l1.size)
     tensions = [np.broadcast_to(p1, shape), np.broadcast_to(p2, shape)]
     slopes = [np.stack([np.broadcast_to(part[i], shape) for part in parts], axis=2) for i in (1, 2)]
-    loaded = [0] if np.allclose(l2, l1**-0.5) or np.allclose(l2, 1.0) or np.allclose(l2, l1) else [0, 1]
-    out = np.zeros((len(z), l1.size * len(loaded), z.shape[1]))
-    for row, i in enumerate(loaded):
+    out = np.zeros((len(z), l1.size * len(measured), z.shape[1]))
+    for row, i in enumerate(m - 1 for m in measured):
         sd = share * np.max(np.abs(tensions[i]), axis=1)
         part = slopes[i] * surface.chart.stretch(z)[:, None, :n] / sd[:, None, None]
         out[:, row * l1.size : (row + 1) * l1.size, :n] = part

@@ -138,7 +138,7 @@ def spread_of_grid(found: Grid, cells: Array, mode: ConvexityMode, seed: int = 0
     return Spread(mean, (centred * w[:, None]).T @ centred, z[cell] + within, "grid")
 
 
-class Normal:
+class NormalPosterior:
     """The posterior as a normal distribution: covariance (J^T Sigma^-1 J + prior precision)^-1 at its mode.
 
     Sigma is the noise with its own coordinates at their most probable values, given the residual at the mode; both
@@ -155,7 +155,7 @@ class Normal:
         x = np.clip(surface.chart.coordinates(start[None, :]), self.objective.low, self.objective.high)
         for _ in range(ROUNDS):
             self.noise_covariance = self._noise(self.objective.batch(x)[0][0])
-            self._root = np.linalg.inv(np.linalg.cholesky(self.noise_covariance))
+            self.whitening = np.linalg.inv(np.linalg.cholesky(self.noise_covariance))
             x, _ = descend(self._residuals, x, (self.objective.low, self.objective.high), ITERATIONS)
         self.x = x[0]
 
@@ -174,8 +174,8 @@ class Normal:
         r, j = o.batch(x)
         pull = np.broadcast_to(np.diag(1 / o.spread), (len(x), o.spread.size, o.spread.size))
         return (
-            np.concatenate([r @ self._root.T, (x - o.centre) / o.spread], axis=1),
-            np.concatenate([np.einsum("mn,bnk->bmk", self._root, j), pull], axis=1),
+            np.concatenate([r @ self.whitening.T, (x - o.centre) / o.spread], axis=1),
+            np.concatenate([np.einsum("mn,bnk->bmk", self.whitening, j), pull], axis=1),
         )
 
     @cached_property
@@ -191,7 +191,7 @@ class Normal:
 
     def information(self, z: Array) -> Array:
         """J^T Sigma^-1 J (B, k, k) of the data in z (B, k)."""
-        j = np.einsum("mn,bnk->bmk", self._root, self.surface.batch(z)[1])
+        j = np.einsum("mn,bnk->bmk", self.whitening, self.surface.batch(z)[1])
         return np.asarray(np.einsum("bmk,bml->bkl", j, j))
 
     def precision(self, z: Array) -> Array:

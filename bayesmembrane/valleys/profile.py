@@ -1,8 +1,9 @@
-"""Profile likelihoods: the least loss with one parameter, or two, held; and where a valley ends, or does not."""
+"""LossProfile likelihoods: the least loss with one parameter, or two, held; and where a valley ends, or does not."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -21,26 +22,42 @@ FLAT = 0.02  # of the stated rise: a loss that changes by less over the last ten
 LOWER = 1e-4  # relative: a loss lower by this is another optimum
 
 
-@dataclass(frozen=True, eq=False)
+class Ending(Enum):
+    """How one side of a profile ends."""
+
+    RISES = "the loss leaves the rise"
+    NO_FILM = "no film reaches the data beyond"
+    NOT_FOLLOWED = "not followed to the end"
+    TENDS = "the loss tends to a limit"
+    CHANGES = "the loss still changes where the search ends"
+
+
+@dataclass(frozen=True)
 class End:
     """Where a profile leaves the stated rise on one side.
 
     value : natural parameter there; where it is followed to no further if ``open``
     loss : N, there
-    open : the loss is within the stated rise as far as the parameter is followed
-    tends : the loss has a limit there: it hardly changes any more; None unless open
-    reason : in words, "" if the loss simply rises
+    ending : how
     """
 
     value: float
     loss: float
-    open: bool
-    tends: bool | None
-    reason: str
+    ending: Ending
+
+    @property
+    def open(self) -> bool:
+        """Whether the loss is within the stated rise as far as the parameter is followed."""
+        return self.ending not in (Ending.RISES, Ending.NO_FILM)
+
+    @property
+    def tends(self) -> bool | None:
+        """Whether the loss has a limit there: it hardly changes any more; None unless that is known."""
+        return {Ending.TENDS: True, Ending.CHANGES: False}.get(self.ending)
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class LossProfile:
     """min over the others of the loss, with parameter ``index`` held.
 
     points : (M, k) z, ordered along the held parameter
@@ -79,7 +96,7 @@ def optimum(surface: Surface, z: Array) -> tuple[Array, float]:
 
 def profiles(
     surface: Surface, best: Array, rise: float, far: float | None = None, nodes: int = NODES
-) -> tuple[list[Profile], Array]:
+) -> tuple[list[LossProfile], Array]:
     """One profile per parameter around the optimum ``best`` (k,), and the lowest point (k,) met on any of them.
 
     ``rise`` (N) is the stated rise of the loss above its least value; profiles go on until it has risen by ``far``.
@@ -94,7 +111,7 @@ def profiles(
         path, loss = marches[i]
         ends = _ends(surface, path, loss, i, least + rise)
         z, size = _resampled(surface, path, loss, i, nodes)
-        out.append(Profile(i, z, size, ends))
+        out.append(LossProfile(i, z, size, ends))
         if np.min(size) < least * (1 - LOWER):
             lowest = z[int(np.argmin(size))]
     return out, lowest
@@ -200,7 +217,7 @@ def _crossing(surface: Surface, inside: Array, outside: Array, size: float, i: i
         found, norm = surface.minimise(start[None, :], held)
         value = float(norm[0])
         if abs(value - limit) <= (5e-7 if few else 1e-9) * limit:
-            return End(float(surface.chart.natural(found[0])[i]), value, False, None, "")
+            return End(float(surface.chart.natural(found[0])[i]), value, Ending.RISES)
         if value <= limit:
             a = z = found[0]
         else:
@@ -216,7 +233,7 @@ def _crossing(surface: Surface, inside: Array, outside: Array, size: float, i: i
     reached = float(surface.loss(z[None, :])[0])
     natural = float(surface.chart.natural(z)[i])
     short = reached < limit * (1 - 1e-4)
-    return End(natural, reached, False, None, "beyond it no film reaches the data" if short else "")
+    return End(natural, reached, Ending.NO_FILM if short else Ending.RISES)
 
 
 def _open(surface: Surface, z: Array, size: Array, i: int, rise: float, stop: float) -> End:
@@ -224,11 +241,10 @@ def _open(surface: Surface, z: Array, size: Array, i: int, rise: float, stop: fl
     way = np.abs(z[:, i] - z[0, i])
     natural = float(surface.chart.natural(z[-1])[i])
     if abs(z[-1, i] - stop) > 1e-6 * (1 + abs(stop)) and way[-1] > 0:
-        return End(natural, float(size[-1]), True, None, "not followed to the end")
+        return End(natural, float(size[-1]), Ending.NOT_FOLLOWED)
     before = float(np.interp(0.9 * way[-1], way, size)) if way[-1] > 0 else float(size[-1])
     tends = abs(float(size[-1]) - before) <= FLAT * rise
-    word = "tends to a limit" if tends else "still changes"
-    return End(natural, float(size[-1]), True, tends, f"the loss stays within the rise and {word}")
+    return End(natural, float(size[-1]), Ending.TENDS if tends else Ending.CHANGES)
 
 
 def _resampled(surface: Surface, path: Array, loss: Array, i: int, nodes: int) -> tuple[Array, Array]:
@@ -264,7 +280,7 @@ def _settled(surface: Surface, start: Array, i: int, neighbours: bool) -> tuple[
     return z[good], size[good]
 
 
-def floor(surface: Surface, profile: Profile, points: int, best: Array) -> tuple[Array, Array]:
+def floor(surface: Surface, profile: LossProfile, points: int, best: Array) -> tuple[Array, Array]:
     """(z (M, k), loss (M,)) of the valley's floor between the profile's ends: evenly spaced, with the optimum.
 
     The floor is the profile minimum: each point is the least loss with z_i held.
@@ -283,8 +299,8 @@ def floor(surface: Surface, profile: Profile, points: int, best: Array) -> tuple
     return _settled(surface, start, i, best.size > 2)
 
 
-def pair_maps(surface: Surface, best: Array, found: list[Profile], points: int) -> tuple[PairMap, ...]:
-    """Profile maps of all pairs on grids of ``points`` x ``points`` over what the profiles span.
+def pair_maps(surface: Surface, best: Array, found: list[LossProfile], points: int) -> tuple[PairMap, ...]:
+    """LossProfile maps of all pairs on grids of ``points`` x ``points`` over what the profiles span.
 
     All cells of all maps descend side by side: the solver's price is per batch. Starts are where a parabola, and where
     the profile of the first parameter, have their minimum.
@@ -306,7 +322,7 @@ def pair_maps(surface: Surface, best: Array, found: list[Profile], points: int) 
 
 
 def _starts(
-    best: Array, inverse: Array, found: list[Profile], pair: tuple[int, int], axes: list[Array]
+    best: Array, inverse: Array, found: list[LossProfile], pair: tuple[int, int], axes: list[Array]
 ) -> tuple[Array, Array]:
     """Starts (cells, k) of one map: along the parabola at the optimum, and along the profile of its first parameter."""
     i, j = pair

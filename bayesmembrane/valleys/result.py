@@ -1,9 +1,10 @@
-"""What is known of the valleys of a loss, as frozen values and as the JSON answer."""
+"""What is known of the valleys of a loss, as frozen values."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,9 @@ from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.convexity import MODES, RESTRICTING
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.valleys.between import Approach, arc_length
-from bayesmembrane.valleys.next_tests import ASSUMPTION, NextTest
+from bayesmembrane.valleys.next_tests import NextTest
 from bayesmembrane.valleys.posterior import Grid, Spread
-from bayesmembrane.valleys.profile import PairMap, Profile
+from bayesmembrane.valleys.profile import LossProfile, PairMap
 from bayesmembrane.valleys.surface import Chart
 
 DIP = 1e-6  # relative: a minimum along the floor must be this much lower than its neighbours
@@ -100,7 +101,9 @@ class Valley:
     profiles, maps : one per parameter, one per pair
     coarse, band : grids for one and two parameters: regular, and fine around the floor; else None
     spread : posterior
-    limit : what the loss tends to at an open end, in words; "" without any
+    next_tests : what would shorten it, the best first
+    limit : name of the simpler material whose loss is that of an open end; "" without any
+    unreached : part of the cells of all maps that hold no film that reaches the data
     """
 
     hypothesis: Hypothesis
@@ -119,7 +122,7 @@ class Valley:
     floor_loss: Array
     kept: Mapping[str, NDArray[np.bool_]]
     spectra: tuple[Spectrum, ...]
-    profiles: tuple[Profile, ...]
+    profiles: tuple[LossProfile, ...]
     maps: tuple[PairMap, ...]
     coarse: Grid | None
     band: Grid | None
@@ -128,7 +131,6 @@ class Valley:
     next_tests: tuple[NextTest, ...]
     limit: str
     unreached: float
-    sentences: tuple[str, ...] = field(default_factory=tuple)
 
     @property
     def open_end(self) -> bool:
@@ -197,7 +199,6 @@ class Valley:
                 for s in self.spectra
             },
             "open_end": self.open_end,
-            "limit": self.limit,
             "other_basins": [{**dict(zip(names, p, strict=True)), "loss_N": loss} for p, loss in self.basins],
             "kept_by_convexity": {mode: self.share(mode) for mode in MODES},
             "profiles": {names[p.index]: self._profile(p) for p in self.profiles},
@@ -211,11 +212,9 @@ class Valley:
             },
             "published": [{**vars(p), "natural": dict(zip(names, p.natural, strict=True))} for p in self.published],
             "next_measurements": [t.summary() for t in self.next_tests],
-            "next_measurements_assume": ASSUMPTION,
-            "sentences": list(self.sentences),
         }
 
-    def _profile(self, p: Profile) -> dict[str, Any]:
+    def _profile(self, p: LossProfile) -> dict[str, Any]:
         natural = self.chart.natural(p.points)
         low, high = p.ends
         return {
@@ -224,7 +223,6 @@ class Valley:
             "others": natural,
             "interval": [low.value, high.value],
             "open": [low.open, high.open],
-            "reason": [low.reason, high.reason],
         }
 
     def _map(self, m: PairMap, names: Sequence[str]) -> dict[str, Any]:
@@ -259,36 +257,33 @@ class Between:
     approach: Approach
     closest: tuple[tuple[float, ...], tuple[float, ...]]
     crossing: tuple[float, ...] | None
-    sentence: str
 
     def summary(self) -> dict[str, Any]:
         """Plain values."""
         return {
             "ranges_mm": [1e3 * self.first, 1e3 * self.second],
             "distance": self.approach.distance,
-            "unit": "posterior standard deviations (Mahalanobis, the sum of both posterior covariances)",
             "closest": self.closest,
             "cross": self.crossing is not None,
             "crossing": self.crossing,
-            "sentence": self.sentence,
         }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Valleys(Showable):
-    """The valleys of one hypothesis on several ranges of one film."""
+    """The valleys of one hypothesis on several ranges of one film; ``between`` each with each later one."""
 
     hypothesis: Hypothesis
     ranges: tuple[Valley, ...]
     between: tuple[Between, ...]
 
     @property
-    def sentences(self) -> tuple[str, ...]:
-        """What a reader should know, in words."""
-        return (*(s for v in self.ranges for s in v.sentences), *(b.sentence for b in self.between))
+    def compared(self) -> tuple[tuple[Valley, Valley, Between], ...]:
+        """Each valley with each later one, and how they lie to each other."""
+        return tuple((a, b, c) for (a, b), c in zip(combinations(self.ranges, 2), self.between, strict=True))
 
     def summary(self) -> dict[str, Any]:
-        """The JSON answer of ``valleys``; `closest_approach` is that of the first two ranges, None with one."""
+        """Plain values; `closest_approach` is that of the first two ranges, None with one."""
         every = [b.summary() for b in self.between]
         return {
             "material": self.hypothesis.material.name,
@@ -296,5 +291,4 @@ class Valleys(Showable):
             "ranges": [v.summary() for v in self.ranges],
             "closest_approach": every[0] if every else None,
             "approaches": every,
-            "sentences": list(self.sentences),
         }

@@ -324,6 +324,8 @@ def verdict(case: Case) -> str:
 def fit_sentence(found: Fit) -> str:
     """The optimum of one fit: how far it misses the data, and whether it can be trusted as one."""
     end = millimetres(float(np.max(found.deflection)))
+    if not math.isfinite(found.rmse_N):
+        return f"{spoken(found.hypothesis)} up to {end}: {found.status}"
     told = f"{spoken(found.hypothesis)} fitted up to {end} misses the forces by {newtons(found.rmse_N)} rms"
     told += f", at most {newtons(found.max_N)}"
     if found.at_bound:

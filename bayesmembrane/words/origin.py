@@ -6,6 +6,7 @@ from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.reconstruction.rows import Suspect
 from bayesmembrane.words.hypothesis import material_title
 from bayesmembrane.words.language import listed
+from bayesmembrane.words.reconstruction import contradiction
 
 
 def origin(found: Reconstruction) -> str:
@@ -23,4 +24,4 @@ def suspect(found: Suspect) -> str:
     """A printed row that contradicts the rest, why, and the smallest change that mends it."""
     changes = listed(f"{c.entry} {c.printed} to {c.consistent:g}" for c in found.corrections)
     mend = f"; smallest change that mends it: {changes}" if changes else ""
-    return f"{material_title(found.material)} {found.column}: {found.reason}{mend}."
+    return f"{material_title(found.material)} {found.column}: {contradiction(found)}{mend}."

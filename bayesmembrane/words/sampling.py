@@ -7,7 +7,6 @@ from typing import Any
 from bayesmembrane.calibration.quality import Quality
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.calibration.sampling.convergence import LEAST_TAUS
-from bayesmembrane.comparison.result import Comparison
 
 
 def document(run: Run) -> dict[str, Any]:
@@ -51,11 +50,3 @@ def noise_sentence(quality: Quality) -> str:
         f"The inferred extra noise ({1e3 * quality.extra_noise:.3g} mN) exceeds what the measurement states "
         f"({1e3 * quality.own_noise:.3g} mN): the model misses something, and its misfit is counted as noise."
     )
-
-
-def with_notes(comparison: Comparison) -> dict[str, Any]:
-    """The JSON answer of ``compare`` on one range, each hypothesis with the sentences on its run."""
-    answer = comparison.summary()
-    rows = zip(answer["table"], comparison.rows, strict=True)
-    table = [{**row, "notes": list(sentences(r.quality)) if r.quality else []} for row, r in rows]
-    return {**answer, "table": table}

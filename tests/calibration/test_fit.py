@@ -12,10 +12,10 @@ from bayesmembrane.data.shipped import shipped
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.ground.stored import answer, read, store
-from bayesmembrane.physics.forward import predict
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import Request, request, solve
 from bayesmembrane.physics.mechanics.solution import Curves
+from tests.physics.predicting import predict
 
 FILMS = {
     "neo_hookean": (7.5,),

@@ -6,8 +6,8 @@ import pytest
 from bayesmembrane.calibration.prior import JointPrior
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.convexity import MODES
-from bayesmembrane.physics.forward import predict
 from bayesmembrane.physics.hypothesis import hypothesis
+from tests.physics.predicting import predict
 
 
 @pytest.mark.parametrize("name", materials())

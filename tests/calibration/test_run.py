@@ -16,10 +16,10 @@ from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.ground.stored import read, store
 from bayesmembrane.physics.cache import CachedSolver
-from bayesmembrane.physics.forward import predict
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import request, solve
 from bayesmembrane.words.sampling import sentences
+from tests.physics.predicting import predict
 
 
 def test_a_linear_posterior_is_exact(film) -> None:  # type: ignore[no-untyped-def]

@@ -7,7 +7,7 @@ import pytest
 
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.starts import starting_points
-from bayesmembrane.data.measurement import read_measurement
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.physics.hypothesis import hypothesis
 

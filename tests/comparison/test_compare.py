@@ -1,4 +1,4 @@
-"""Hypotheses side by side: rows, ranking, words, and what is stored and used again."""
+"""Hypotheses side by side: rows, ranking, and what is stored and used again."""
 
 import json
 import shutil
@@ -10,17 +10,23 @@ import pytest
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.comparison import jobs as comparison_jobs
 from bayesmembrane.comparison.compare import claimed, compare, ranges_of
-from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, together
-from bayesmembrane.comparison.evidence.target import Estimate
+from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, Disagreement, together
+from bayesmembrane.comparison.evidence.target import EvidenceEstimate
+from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.leave_out.score import LeaveOneOut
-from bayesmembrane.comparison.prior_widths import Widened
+from bayesmembrane.comparison.parts import kept
+from bayesmembrane.comparison.prior_widths import Unknown, Widened
 from bayesmembrane.comparison.result import Row, ranked
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
+from bayesmembrane.ground.stored import read, store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.words import comparison as comparison_words
+from bayesmembrane.words.comparison import no_ranking, preferred
+from tests.ground.values import stored_equals_given
 
 
 def film(name: str = "gent", parameters: tuple[float, ...] = (7.0, 20.0), end: float = 0.06) -> Measurement:
@@ -36,23 +42,14 @@ def compared(tmp_path_factory):
     out, told = tmp_path_factory.mktemp("chains"), []
     claims = [hypothesis(n) for n in ("neo_hookean", "gent")]
     whole = film()
-    found = compare(
-        whole.up_to(0.049),
-        claims,
-        seed=402,
-        out=out,
-        ess=300,
-        whole=whole,
-        modes=False,
-        workers=1,
-        progress=lambda *words: told.append(words),
-    )
+    judging = Judging(402, 300, False, out, 1)
+    found = compare(whole.up_to(0.049), claims, judging, whole=whole, progress=lambda *words: told.append(words))
     return found, out, told, claims, whole
 
 
 def test_the_right_material_wins_and_every_field_is_there(compared):
     found, _, told, _, _ = compared
-    assert found.agreed, found.reason
+    assert found.agreed, no_ranking(found)
     rows = {r.label: r for r in found.rows}
     assert list(rows) == ["neo_hookean", "gent"]
     assert [r.label for r in found.ranking] == ["gent", "neo_hookean"]
@@ -60,10 +57,10 @@ def test_the_right_material_wins_and_every_field_is_there(compared):
     assert rows["gent"].posterior_probability > 0.9
     assert rows["gent"].prior_mass.value > 0.5
     assert rows["gent"].rest.rmse_N < rows["neo_hookean"].rest.rmse_N
-    assert found.sentence.startswith("The evidence prefers gent to neo_hookean by ")
+    assert preferred(found).startswith("The evidence prefers Gent to neo-Hookean by ")
     assert {label for label, _ in told} == set(rows)
     assert any("nested sampling" in text for _, text in told)
-    document = found.summary()
+    document = comparison_words.document(found)
     json.dumps(document, allow_nan=False)
     row = document["table"][1]
     assert set(row["log_evidence"]) == set(row["log_evidence_sd"]) == {NESTED, BRIDGE}
@@ -80,22 +77,33 @@ def test_what_is_stored_is_used_again(compared, monkeypatch):
 
     for name in ("nested", "bridge", "leave_one_out", "prior_widths", "leave_range_out"):
         monkeypatch.setattr(comparison_jobs, name, never)
-    again = compare(whole.up_to(0.049), claims, seed=402, out=out, ess=300, whole=whole, modes=False, workers=1)
+    again = compare(whole.up_to(0.049), claims, Judging(402, 300, False, out, 1), whole=whole)
     assert again.summary() == found.summary()
     with pytest.raises(AssertionError, match="computed again"):
-        compare(whole.up_to(0.049), claims, seed=403, out=None, ess=300, modes=False, workers=1)
+        compare(whole.up_to(0.049), claims, Judging(403, 300, False, None, 1))
 
 
-def test_a_damaged_result_is_made_again(tmp_path):
+def test_a_damaged_part_is_made_again(tmp_path):
     calls = []
-    make = lambda: calls.append(1) or {"x": np.float64(np.nan), "y": np.array([1.0, np.inf])}  # noqa: E731
-    first = comparison_jobs._kept(tmp_path, "piece", "a", make)
-    assert comparison_jobs._kept(tmp_path, "piece", "a", make) == first
+
+    def make():
+        calls.append(1)
+        return Widened("x", 2.0, np.nan, np.inf, 3.0, np.nan, Unknown.FEW)
+
+    first = kept(tmp_path, "piece", "a", make)
+    stored_equals_given(first, kept(tmp_path, "piece", "a", make))
     assert len(calls) == 1
-    (tmp_path / "piece.json").write_text("{")
-    assert comparison_jobs._kept(tmp_path, "piece", "a", make) == first
-    comparison_jobs._kept(tmp_path, "piece", "b", make)
+    (tmp_path / "comparison" / "piece.json").write_text("{")
+    stored_equals_given(first, kept(tmp_path, "piece", "a", make))
+    assert len(calls) == 2
+    kept(tmp_path, "piece", "b", make)
     assert len(calls) == 3
+
+
+def test_a_comparison_is_stored_as_it_is(compared, tmp_path):
+    found = compared[0]
+    store(tmp_path, "comparison", {"whole": found}, {})
+    stored_equals_given({"whole": found}, read(tmp_path, "comparison"))
 
 
 def test_a_hypothesis_that_cannot_be_fitted_does_not_spoil_the_others(monkeypatch):
@@ -108,22 +116,22 @@ def test_a_hypothesis_that_cannot_be_fitted_does_not_spoil_the_others(monkeypatc
     monkeypatch.setattr(comparison_jobs, "_mass", none_for_gent)
     m = film("neo_hookean", (7.0,), 0.03).select(np.arange(4))
     claims = [hypothesis(n) for n in ("neo_hookean", "gent", "ogden")]
-    found = compare(m, claims, seed=405, out=None, ess=200, modes=False, workers=1)
+    found = compare(m, claims, Judging(405, 200, False, None, 1))
     rows = {r.label: r for r in found.rows}
     assert rows["neo_hookean"].fitted
     assert rows["neo_hookean"].posterior_probability == 1.0
-    assert "leaves none of the prior draws" in rows["gent"].reason
+    assert "leaves none of the prior draws" in rows["gent"].failure
     assert rows["gent"].prior_mass.value == 0.0
-    assert "4 points cannot fix" in rows["ogden"].reason
+    assert "4 points cannot fix" in rows["ogden"].failure
     assert all(rows[n].posterior_probability is None and not rows[n].fitted for n in ("gent", "ogden"))
     assert found.agreed
-    assert found.sentence == "There are not two hypotheses to choose between."
-    json.dumps(found.summary(), allow_nan=False)
+    assert preferred(found) == "There are not two hypotheses to choose between."
+    json.dumps(comparison_words.document(found), allow_nan=False)
 
 
 def test_two_processes_say_what_one_says(compared):
     found, out, _, claims, whole = compared
-    again = compare(whole.up_to(0.049), claims, seed=402, out=out, ess=300, whole=whole, modes=False, workers=2)
+    again = compare(whole.up_to(0.049), claims, Judging(402, 300, False, out, 2), whole=whole)
     assert again.summary() == found.summary()
 
 
@@ -134,7 +142,7 @@ def test_names_must_differ():
         compare(film(), [])
 
 
-# ---- ranking and words -----------------------------------------------------------------------------------------------
+# ---- ranking ---------------------------------------------------------------------------------------------------------
 
 
 def row(label: str, z: float, elpd: float, sd: float = 0.1, off: float = 0.0) -> Row:
@@ -142,7 +150,7 @@ def row(label: str, z: float, elpd: float, sd: float = 0.1, off: float = 0.0) ->
     points = elpd / 10 + 0.05 * rng.standard_normal(10)
     points += elpd / 10 - points.mean()
     loo = LeaveOneOut(elpd, 1.0, 0.01, points, np.zeros(10), ())
-    pair = {NESTED: Estimate(z + off, sd, 1, 1.0), BRIDGE: Estimate(z, 0.01, 1, 1.0)}
+    pair = {NESTED: EvidenceEstimate(z + off, sd, 1, 1.0), BRIDGE: EvidenceEstimate(z, 0.01, 1, 1.0)}
     return Row(label, hypothesis("gent"), together(pair), loo)
 
 
@@ -150,26 +158,15 @@ def test_no_ranking_without_agreement():
     found = ranked([row("one", -10, 5), row("other", -12, 3, off=2.0)])
     assert not found.agreed
     assert found.ranking == ()
-    assert "other: Nested sampling and bridge sampling differ by 2.00" in found.reason
+    assert found.rows[1].evidence.disagreement is Disagreement.APART
+    assert found.doubtful == (found.rows[1],)
     assert all(r.posterior_probability is None for r in found.rows)
-    assert found.sentence.startswith("The evidence gives no ranking; leave-one-out prefers one to other by 2.0")
-
-
-def test_words_for_agreement_and_disagreement_of_evidence_and_prediction():
-    same = ranked([row("one", -10, 5), row("other", -15, 3)])
-    assert "leave-one-out prefers it too, to other by 2.0" in same.sentence
-    apart = ranked([row("one", -10, 3), row("other", -15, 5)])
-    assert "evidence and prediction disagree" in apart.sentence
-    close = ranked([row("one", -10, 5.0), row("other", -15, 5.02)])
-    assert "prediction does not contradict the evidence" in close.sentence
-    little = ranked([row("one", -10, 5), row("other", -10.5, 3)])
-    assert "which decides little" in little.sentence
 
 
 def test_probabilities_follow_the_evidence():
     rows = ranked([row("one", -10, 5), row("other", -11, 3)]).rows
     assert rows[0].posterior_probability == pytest.approx(1 / (1 + np.exp(-1)), abs=0.01)
-    unknown = replace(row("third", -9, 1), evidence=None, reason="it cannot be fitted")
+    unknown = replace(row("third", -9, 1), evidence=None, failure="it cannot be fitted")
     with_unknown = ranked([*rows, unknown])
     assert with_unknown.agreed
     assert with_unknown.rows[2].posterior_probability is None
@@ -181,28 +178,19 @@ def test_another_look_is_taken_where_chance_may_have_parted_the_estimators(compa
     _, out, _, claims, whole = compared
     shutil.copytree(out, tmp_path / "chains")
     for name in ("nested", "bridge"):
-        for stored in (tmp_path / "chains").glob(f"*/{name}.json"):
+        for stored in (tmp_path / "chains").glob(f"*/comparison/{name}.json"):
             stored.unlink()
-    looks = [Estimate(-10.3, 0.1, 5, 1.0, (-10.3,)), Estimate(-10.0, 0.1, 7, 1.0, (-10.0,))]
+    looks = [EvidenceEstimate(-10.3, 0.1, 5, 1.0, (-10.3,)), EvidenceEstimate(-10.0, 0.1, 7, 1.0, (-10.0,))]
     monkeypatch.setattr(comparison_jobs, "_nested", lambda *_: looks.pop(0))
-    monkeypatch.setattr(comparison_jobs, "_bridged", lambda *_: Estimate(-10.0, 0.01, 1, 1.0))
+    monkeypatch.setattr(comparison_jobs, "_bridged", lambda *_: EvidenceEstimate(-10.0, 0.01, 1, 1.0))
     monkeypatch.setattr(comparison_jobs, "_mass", lambda *_: Mass(1.0, 0.0))
     part = whole.up_to(0.049)
-    (row_,) = compare(part, claims[1:], 402, out=tmp_path / "chains", ess=300, modes=False, workers=1).rows
+    (row_,) = compare(part, claims[1:], Judging(402, 300, False, tmp_path / "chains", 1)).rows
     assert row_.evidence.log_evidence[NESTED] == pytest.approx(-10.15)
     assert row_.evidence.log_evidence_sd[NESTED] == pytest.approx(0.15, abs=0.001)
     assert row_.evidence.evaluations[NESTED] == 12
     assert row_.evidence.agreed
     assert looks == []
-
-
-def test_the_ranking_is_said_to_survive_other_priors_or_not():
-    widths = (Widened("gent.ln_jm", 2.0, -1.0, 0.1, 500.0, ""),)
-    one, other = replace(row("one", -10, 5), widths=widths), row("other", -15, 3)
-    assert "stays first" in ranked([one, other]).survival
-    assert "falls to 4.0 at worst, with the prior of gent.ln_jm 2 times as wide" in ranked([one, other]).survival
-    rising = replace(other, widths=(replace(widths[0], change=6.0),))
-    assert "is lost by 1.0" in ranked([one, rising]).survival
 
 
 def test_hypotheses_are_named_with_their_effects():

@@ -34,7 +34,7 @@ def started(out: Path) -> "subprocess.Popen[str]":
 def test_what_is_finished_is_kept_and_the_printed_command_goes_on(tmp_path: Path) -> None:
     first = started(tmp_path)
     give_up = time.monotonic() + LONGEST
-    while not list(tmp_path.glob("*/bridge.json")) and time.monotonic() < give_up and first.poll() is None:
+    while not list(tmp_path.glob("*/comparison/bridge.json")) and time.monotonic() < give_up and first.poll() is None:
         time.sleep(0.05)
     os.killpg(first.pid, signal.SIGINT)
     _, err = first.communicate(timeout=LONGEST)
@@ -42,7 +42,7 @@ def test_what_is_finished_is_kept_and_the_printed_command_goes_on(tmp_path: Path
     assert "Traceback" not in err
     command = err.split("The same command resumes it: ")[1].split("\n")[0]
     assert shlex.split(command)[:2] == ["bayesmembrane", "compare"]
-    kept = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*/bridge.json")}
+    kept = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*/comparison/bridge.json")}
     assert kept
     again = started(tmp_path)
     out, err = again.communicate(timeout=LONGEST)

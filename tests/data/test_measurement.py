@@ -9,7 +9,9 @@ import tomli_w
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bayesmembrane.data.measurement import Measurement, Specimen, read_measurement, write_measurement
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.reading import read_measurement
+from bayesmembrane.data.writing import write_measurement
 from bayesmembrane.ground.errors import DataError, SettingsError, StorageError
 from bayesmembrane.physics.rigs.annulus import Annulus
 

@@ -5,7 +5,7 @@ import pytest
 
 from bayesmembrane.calibration.layout import inference_data, measurement_of
 from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.data.motion import NOMINAL_SPEED, Path, holds
+from bayesmembrane.data.motion import NOMINAL_SPEED, Motion, holds
 from bayesmembrane.physics.rigs.annulus import Annulus
 
 D = np.concatenate([np.linspace(1e-3, 0.02, 20), np.linspace(0.019, 1e-3, 19), np.linspace(2e-3, 0.04, 39)])
@@ -15,25 +15,25 @@ CURVE = Measurement(D, 30 * D, Annulus(0.01, 0.035), Specimen("film", 5e-5), tim
 
 def test_the_clock_starts_where_the_disc_stood_at_zero() -> None:
     assert CURVE.path.clock == pytest.approx(TIME)
-    late = Path(D, TIME + 1000.0, 0.04)
+    late = Motion(D, TIME + 1000.0, 0.04)
     assert late.clock == pytest.approx(TIME)
-    assert Path(D, None, 0.04).clock[19] == pytest.approx(0.02 / NOMINAL_SPEED)
+    assert Motion(D, None, 0.04).clock[19] == pytest.approx(0.02 / NOMINAL_SPEED)
 
 
 def test_speed_is_that_of_each_leg() -> None:
     speed = CURVE.path.speed
     assert speed[:38] == pytest.approx(1e-3)
     assert speed[42:] == pytest.approx(1e-2)
-    held = Path(np.array([0.01, 0.02, 0.02, 0.02]), np.array([1.0, 2.0, 50.0, 100.0]), 0.02)
+    held = Motion(np.array([0.01, 0.02, 0.02, 0.02]), np.array([1.0, 2.0, 50.0, 100.0]), 0.02)
     assert np.all(held.speed > 0)
-    assert np.all(Path(D, None, 0.04).speed == NOMINAL_SPEED)
+    assert np.all(Motion(D, None, 0.04).speed == NOMINAL_SPEED)
 
 
 def test_one_point_has_a_path() -> None:
-    one = Path(np.array([0.01]), np.array([5.0]), 0.01)
+    one = Motion(np.array([0.01]), np.array([5.0]), 0.01)
     assert one.clock == pytest.approx([0.0])
     assert np.all(one.speed == NOMINAL_SPEED)
-    still = Path(np.full(5, 0.01), np.arange(5.0), 0.01)
+    still = Motion(np.full(5, 0.01), np.arange(5.0), 0.01)
     assert np.all(still.speed == NOMINAL_SPEED)
 
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesmembrane.data.measurement import Measurement, Specimen, read_measurement
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.result import VERDICTS, Diagnosis
 from bayesmembrane.ground.errors import SettingsError

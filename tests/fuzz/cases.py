@@ -153,7 +153,9 @@ def _forces(found: dict[str, Array]) -> list[str]:
 def _options(verb: str, rig: str, stated: bool, found: dict[str, Array], rng: np.random.Generator) -> tuple[str, ...]:
     effects = components("effects")
     # Half of the calls keep to what can occur on the rig: the others are mostly refused before anything is solved.
-    likely = [n for n, e in effects.items() if rig in e.rigs] if rng.random() < 0.5 else list(effects)
+    likely = (
+        [n for n, e in effects.items() if e.occurs_on(components("rigs")[rig])] if rng.random() < 0.5 else list(effects)
+    )
     count = min(int(rng.choice([0, 0, 1, 1, 2])), len(likely))
     chosen = {
         "--material": str(rng.choice(list(components("materials")))),

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesmembrane.data.measurement import read_measurement
+from bayesmembrane.data.reading import read_measurement
 from tests.generator.datasets import generate
 from tests.generator.distortions import DISTORTIONS, LIBRARY, OUTSIDE, Active, convolved, give, response
 from tests.generator.energies import DECLARED, FAMILIES, relaxed

@@ -7,11 +7,12 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.convexity import MODES
-from bayesmembrane.physics.forward import GAPS, Forward, beyond, predict
+from bayesmembrane.physics.forward import GAPS, Forward, beyond
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import Curves, Request, request, solve
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from tests.physics.predicting import predict
 
 RIG = Annulus(0.012, 0.030)
 CURVE = Measurement(np.linspace(2e-3, 40e-3, 8), np.linspace(0.1, 2, 8), RIG, Specimen("film", 5e-5))

@@ -10,16 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesmembrane.data.measurement import read_measurement
 from bayesmembrane.data.published import PublishedTable, read_published_table
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import data_folder
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.stored import read, store
 from bayesmembrane.reconstruction.files import write_reconstruction
 from bayesmembrane.reconstruction.fit import find_mode, knobs_at, sample
 from bayesmembrane.reconstruction.model import Model, tabulate
 from bayesmembrane.reconstruction.reconstruct import Reconstruction, reconstruct, simulate_on
 from bayesmembrane.reconstruction.rows import _distance, _shortest, check_row
+from bayesmembrane.words.reconstruction import document
+from tests.ground.values import stored_equals_given
 
 STEMS = ("elastosil_50um_op1", "elastosil_50um_op2", "elastosil_50um_first_loading")
 MIDDLE = knobs_at(0.14, 5e-3, 1.5e-4, (4e-4, 1e-3))
@@ -114,8 +117,13 @@ def test_assumptions_matter_less_than_the_uncertainty(found: Reconstruction) -> 
             assert np.max(np.abs(influence.force - found.force) / sd) < 1.5, influence.changed
 
 
+def test_it_is_stored_as_it_is(found: Reconstruction, tmp_path: Path) -> None:
+    store(tmp_path, "reconstruction", found, {})
+    stored_equals_given(found, read(tmp_path, "reconstruction"))
+
+
 def test_json_has_the_fields_of_the_contract(found: Reconstruction) -> None:
-    answer = json.loads(json.dumps(found.to_json_dict(), allow_nan=False))
+    answer = json.loads(json.dumps(document(found), allow_nan=False))
     for name in ("OP1", "OP2"):
         part = answer[name]
         assert sum(part["n_points"].values()) == pytest.approx(1.0, abs=1e-4)

@@ -15,9 +15,10 @@ from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.calibration.prediction_store import FILE
 from bayesmembrane.calibration.run import Run, predictions_of
 from bayesmembrane.ground.errors import SettingsError, StorageError
+from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.cache import Tally
 from bayesmembrane.reconstruction.result import Influence, LossCheck, RangeResult, Reconstruction
-from bayesmembrane.reconstruction.rows import Correction, Suspect
+from bayesmembrane.reconstruction.rows import Correction, PredictedLoss, Suspect
 from bayesmembrane.report.page import PAGE, TWIN, write_report
 from bayesmembrane.report.runs import Shown, read
 
@@ -56,7 +57,8 @@ class Page(HTMLParser):
 
 def reconstruction() -> Reconstruction:
     x, f, sd = np.linspace(0.001, 0.035, 5), np.linspace(0.01, 2.2, 5), np.full(5, 5e-3)
-    suspect = Suspect("yeoh", "INI", "the others say <so>", 0.99, (Correction("c1", "7.0", 7.5, 7.5, 0.01),), ())
+    losses = (PredictedLoss("<OP1>", "0.1", 0.2, 0.01),)
+    suspect = Suspect("yeoh", "INI", losses, 0.99, (Correction("c1", "7.0", 7.5, 7.5, 0.01),), ())
     return Reconstruction(
         (RangeResult("OP1", {5: 0.9, 6: 0.1}, {5: (0.0, 0.001)}, 0.001, 1e-5, x, f, sd),),
         np.diag(sd**2),
@@ -114,7 +116,7 @@ def test_every_figure_has_alt_text_and_a_caption_with_units(whole: Path, page: P
 def test_names_are_shown_as_they_are(whole: Path, page: Page) -> None:
     assert '<b>&"film' in page.text
     assert "bench <2> & 3" in page.text
-    assert "the others say <so>" in page.text
+    assert "over <OP1> printed 0.1 N, predicted 0.2 +- 0.01 N" in page.text
     assert "<b>" not in whole.read_text(encoding="utf-8")
 
 
@@ -165,8 +167,9 @@ def test_the_twin_holds_the_tables_as_numbers(whole: Path) -> None:
     assert fits["Yeoh"]["verdict"] == "describes the curve"
     assert fits["neo-Hookean"]["rmse_mN"] > 20
     losses = twin["tables"]["losses"]
-    assert losses[0]["ratio"] == pytest.approx(0.01 / 0.09)
-    assert losses[1]["paper_evaluated_N"] is None
+    assert [row["material"] for row in losses] == ["neo-Hookean", "Yeoh"]
+    assert losses[1]["ratio"] == pytest.approx(0.01 / 0.09)
+    assert losses[0]["paper_evaluated_N"] is None
     names = list(twin["tables"])
     assert len(names) == len(set(names))
     assert any(s.startswith("Up to 35 mm") for s in twin["answer"])
@@ -271,3 +274,10 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path, yeoh: S
     (tmp_path / "file").write_text("x")
     with pytest.raises(StorageError, match="cannot be written"):
         write_report([yeoh], tmp_path / "file" / "report")
+
+
+def test_a_stored_reconstruction_gives_the_same_page(tmp_path: Path) -> None:
+    store(tmp_path / "answer", "reconstruction", reconstruction(), {})
+    assert write_report([tmp_path / "answer"], tmp_path / "a").read_text() == (
+        write_report([reconstruction()], tmp_path / "b").read_text()
+    )

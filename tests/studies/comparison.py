@@ -16,6 +16,7 @@ import numpy as np
 
 from bayesmembrane.app.demo import shipped_ranges
 from bayesmembrane.comparison.compare import compare_ranges
+from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.ground.registry import materials
@@ -35,7 +36,7 @@ def main() -> None:
     parser.add_argument("--chains", type=Path, default=Path("chains"))
     asked = parser.parse_args()
     claims = [hypothesis(name) for name in materials()]
-    found = compare_ranges(shipped_ranges(), claims, asked.seed, out=asked.chains, progress=tell)
+    found = compare_ranges(shipped_ranges(), claims, Judging(asked.seed, out=asked.chains), progress=tell)
     TARGET.write_text(page(found, losses(), asked.seed), encoding="utf-8")
 
 

@@ -18,7 +18,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from bayesmembrane.data.measurement import read_measurement
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.errors import BayesmembraneError

@@ -17,7 +17,8 @@ from scipy.interpolate import PchipInterpolator
 
 from bayesmembrane.calibration.beside_paper import BreakPoint, paper_break_points, paper_rates
 from bayesmembrane.calibration.fit import fit
-from bayesmembrane.data.measurement import Measurement, read_measurement
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import material, materials

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bayesmembrane.data.measurement import Measurement, read_measurement
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.explanation.case import Judged

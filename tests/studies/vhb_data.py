@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from bayesmembrane.data.measurement import Measurement, Specimen, curve_columns
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.reading import curve_columns
 from bayesmembrane.data.tables import parse_table, read_text
 from bayesmembrane.diagnosis.reference.noise import orthonormal
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference

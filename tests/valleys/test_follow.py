@@ -13,9 +13,11 @@ from scipy.optimize import minimize_scalar
 from typer.testing import CliRunner
 
 from bayesmembrane.app.cli import assembled
-from bayesmembrane.data.measurement import Measurement, Specimen, write_measurement
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.writing import write_measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
+from bayesmembrane.ground.stored import read, store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.rigs.annulus import Annulus
@@ -23,6 +25,8 @@ from bayesmembrane.report.sections.valleys import write_valleys
 from bayesmembrane.valleys.beside import valleys_beside
 from bayesmembrane.valleys.follow import Valleys, valleys
 from bayesmembrane.valleys.surface import Chart, Surface
+from bayesmembrane.words.valleys import sentence_beside, sentences, valley_sentences
+from tests.ground.values import stored_equals_given
 from tests.reference.slow_solver import force_curve
 
 Film = Callable[..., Measurement]
@@ -118,8 +122,8 @@ def test_gent_valley_of_a_neo_hookean_film_is_open_and_no_optimum(film: Film) ->
     v = found.ranges[0]
     assert v.open_end
     assert v.summary()["open_end"] is True
-    assert v.limit == "neo-Hookean"
-    sentence = next(s for s in v.sentences if "open" in s)
+    assert v.limit == "neo_hookean"
+    sentence = next(s for s in valley_sentences(v) if "open" in s)
     assert "infinity" in sentence
     assert "neo-Hookean" in sentence
     assert "no value of c2 is an optimum" in sentence
@@ -204,11 +208,13 @@ def test_valleys_with_and_without_an_effect_lie_beside_each_other(film: Film, tm
     assert with_.best[0] == pytest.approx(7.0, rel=0.01)
     assert abs(without.best[0] - 7.0) > 10 * abs(with_.best[0] - 7.0)
     assert pair.closest[0][0] == pytest.approx(without.floor[:, 0][np.argmin(abs(without.floor[:, 0] - 7.0))], rel=1e-2)
-    assert f"moves from (c1 {without.best[0]:.4g}) to (c1 {with_.best[0]:.4g})" in pair.sentence
-    assert any(s.startswith("Without effects: Up to 30 mm") for s in found.sentences)
+    assert f"moves from (c1 {without.best[0]:.4g}) to (c1 {with_.best[0]:.4g})" in sentence_beside(without, with_, pair)
+    assert any(s.startswith("Without effects: Up to 30 mm") for s in sentences(found))
     names = [path.name for path in write_valleys(found, tmp_path)]
     assert names == ["valleys.json", "valleys_beside.png", "valleys.png"]
     assert "without_effects" in json.loads((tmp_path / "valleys.json").read_text())
+    store(tmp_path / "stored", "valleys", found, {})
+    stored_equals_given(found, read(tmp_path / "stored", "valleys"))
     with pytest.raises(SettingsError, match="no effects"):
         valleys_beside(moved, hypothesis("neo_hookean"))
 

@@ -15,7 +15,7 @@ from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.valleys.between import arc_length, closest_approach
 from bayesmembrane.valleys.next_tests import rank
-from bayesmembrane.valleys.posterior import Normal
+from bayesmembrane.valleys.posterior import NormalPosterior
 from bayesmembrane.valleys.profile import floor, pair_maps, profiles
 from bayesmembrane.valleys.result import metric_of
 from bayesmembrane.valleys.surface import Surface
@@ -148,7 +148,7 @@ def test_equibiaxial_data_shorten_a_mooney_rivlin_valley_more_than_the_same_test
     force = force_curve(material("mooney_rivlin")(6.0, 1.5), at, 0.010, 0.035)
     m = Measurement(at, force, Annulus(0.010, 0.035), Specimen("synthetic", 5e-5), force_sd=np.full(8, 0.005))
     surface = Surface(hypothesis("mooney_rivlin", convexity="none"), m)
-    normal = Normal(surface, np.array([6.0, 1.5]))
+    normal = NormalPosterior(surface, np.array([6.0, 1.5]))
     metric = metric_of(surface.chart)
     tests = {t.kind: t for t in rank(surface, normal, normal.spread(), lambda z: metric.scale(surface.chart, z))}
     assert tests["equibiaxial"].reduction > tests["repeat"].reduction > 0

@@ -48,6 +48,7 @@ def verb(
 def show(found: dict[str, Comparison]) -> None:
     """Evidence and prediction of each range, on the terminal."""
     from bayesmembrane.report.sections.evidence.tables import evidence_table
+    from bayesmembrane.words.comparison import remark, sentences
 
     for name, comparison in found.items():
         shown = evidence_table({name: comparison})
@@ -56,8 +57,7 @@ def show(found: dict[str, Comparison]) -> None:
             rows = [[row[i] for i in columns] for row in shown.cells()]
             table(f"{name}: {text}", [shown.columns[i].head for i in columns], rows)
         for row in comparison.rows:
-            if row.reason:
-                say(f"{row.label}: {row.reason}")
-        for sentence in (comparison.reason, comparison.sentence, comparison.survival):
-            if sentence:
-                say(sentence)
+            if not row.fitted:
+                say(f"{row.label}: {remark(row)}")
+        for sentence in sentences(comparison):
+            say(sentence)

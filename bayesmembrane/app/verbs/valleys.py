@@ -55,12 +55,13 @@ def show(found: Valleys | BesideValleys, title: str) -> None:
     """The valleys, what is said of them, and what would shorten them, on the terminal."""
     from bayesmembrane.report.sections.valleys.tables import valley_table
     from bayesmembrane.valleys.beside import Beside as BesideValleys
+    from bayesmembrane.words.valleys import sentences
 
     parts = [found.without, found.added] if isinstance(found, BesideValleys) else [found]
     whole = valley_table(parts)
     shown = [i for i, c in enumerate(whole.columns) if c.key in COLUMNS]
     table(title, [whole.columns[i].head for i in shown], [[row[i] for i in shown] for row in whole.cells()])
-    for sentence in found.sentences:
+    for sentence in sentences(found):
         say(sentence)
     for valley in parts[-1].ranges:
         rows = [[t.test, f"{100 * t.reduction:.0f} %"] for t in valley.next_tests[:TESTS]]

@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 from bayesmembrane.calibration.sampling.convergence import effective_steps
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture, reweighted
 from bayesmembrane.comparison.evidence.population import from_prior
-from bayesmembrane.comparison.evidence.target import Estimate, Problem, Target
+from bayesmembrane.comparison.evidence.target import EvidenceEstimate, Problem, Target
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 
@@ -28,7 +28,7 @@ def bridge(
     seed: int = 0,
     effective: float | None = None,
     log_posterior: Array | None = None,
-) -> Estimate:
+) -> EvidenceEstimate:
     """Z = E_g[p h] / E_posterior[g h] for p = prior x likelihood, a normalised g, and h = 1 / (s1 p + s2 Z g).
 
     g is a mixture of t-distributions fitted to one half of the draws, and the other half is what it is compared with;
@@ -59,7 +59,7 @@ def bridge(
     if check is not None:
         # The way from the prior gives an estimate of its own, less exact: a gross difference is an error of either.
         sd = max(sd, 0.5 * (abs(value - check[0]) - 2.0 * check[1]))
-    return Estimate(value, sd, problem.evaluations, problem.seconds, tuple(z for z, _ in found))
+    return EvidenceEstimate(value, sd, problem.evaluations, problem.seconds, tuple(z for z, _ in found))
 
 
 @dataclass(frozen=True, eq=False)

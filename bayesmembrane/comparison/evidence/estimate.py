@@ -4,19 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.nested import nested
-from bayesmembrane.comparison.evidence.target import Estimate, Target
+from bayesmembrane.comparison.evidence.target import EvidenceEstimate, Target
 from bayesmembrane.ground.parameters import Array
 
 NESTED, BRIDGE = "nested", "bridge"
 SIGMAS, WIDEST = 2.0, 0.3
 
 Tell = Callable[[str], None]
+
+
+class Disagreement(Enum):
+    """Why ln Z is not known well enough."""
+
+    NOT_FINITE = "not finite"
+    WIDE = "joint standard error too large"
+    APART = "estimators too far apart"
 
 
 @dataclass(frozen=True)
@@ -27,17 +36,29 @@ class Evidence:
     ----------
     log_evidence, log_evidence_sd : by estimator, ``nested`` and ``bridge``; divided by the prior's mass, whose error is
         in the standard errors
-    agreed : they differ by at most two joint standard errors, and the joint standard error is at most 0.3
-    reason : "" if they agree, or why they do not, as a sentence
+    difference, joint_sd : of the two, and its standard error; the mass, which both share, has no part in it
+    disagreement : None if they differ by at most two joint standard errors, and that of both, with the mass, is at most
+        0.3; or why they do not agree
     evaluations, seconds : by estimator
     """
 
     log_evidence: Mapping[str, float]
     log_evidence_sd: Mapping[str, float]
-    agreed: bool
-    reason: str
+    difference: float
+    joint_sd: float
+    disagreement: Disagreement | None
     evaluations: Mapping[str, int]
     seconds: Mapping[str, float]
+
+    @property
+    def agreed(self) -> bool:
+        """Whether the two estimators agree."""
+        return self.disagreement is None
+
+    @property
+    def total_sd(self) -> float:
+        """Joint standard error of both, that of the mass included."""
+        return float(np.hypot(self.log_evidence_sd[NESTED], self.log_evidence_sd[BRIDGE]))
 
     @property
     def best(self) -> tuple[float, float]:
@@ -79,30 +100,29 @@ def evidence(
     return together(found, mass)
 
 
-def together(found: Mapping[str, Estimate], mass: Mass | None = None) -> Evidence:
+def together(found: Mapping[str, EvidenceEstimate], mass: Mass | None = None) -> Evidence:
     """The estimates of one target, divided by the mass of its prior, and whether they agree."""
     mass = mass or Mass(1.0, 0.0)
     log_mass, log_mass_sd = float(np.log(mass.value)), mass.sd / mass.value
     z = {name: e.log_evidence - log_mass for name, e in found.items()}
     sd = {name: float(np.hypot(e.sd, log_mass_sd)) for name, e in found.items()}
-    agreed, reason = _agreement(found, sd)
+    a, b = found[NESTED], found[BRIDGE]
+    difference, joint = abs(a.log_evidence - b.log_evidence), float(np.hypot(a.sd, b.sd))
     return Evidence(
-        z, sd, agreed, reason, {n: e.evaluations for n, e in found.items()}, {n: e.seconds for n, e in found.items()}
+        z,
+        sd,
+        difference,
+        joint,
+        _disagreement(difference, joint, float(np.hypot(sd[NESTED], sd[BRIDGE]))),
+        {n: e.evaluations for n, e in found.items()},
+        {n: e.seconds for n, e in found.items()},
     )
 
 
-def _agreement(found: Mapping[str, Estimate], sd: Mapping[str, float]) -> tuple[bool, str]:
-    """Whether two estimates agree, and the reason if not; the mass of the prior cancels in their difference."""
-    a, b = found[NESTED], found[BRIDGE]
-    joint, total = float(np.hypot(a.sd, b.sd)), float(np.hypot(sd[NESTED], sd[BRIDGE]))
-    difference = abs(a.log_evidence - b.log_evidence)
+def _disagreement(difference: float, joint: float, total: float) -> Disagreement | None:
+    """What is wrong with two estimates; the mass of the prior is in ``total`` and cancels in the others."""
     if not np.isfinite(difference) or not np.isfinite(total):
-        return False, "One of the two estimates of ln Z is not a finite number."
+        return Disagreement.NOT_FINITE
     if total > WIDEST:
-        return False, f"The joint standard error of ln Z, {total:.2f}, is above {WIDEST:g}."
-    if difference > SIGMAS * joint:
-        return False, (
-            f"Nested sampling and bridge sampling differ by {difference:.2f} in ln Z, which is "
-            f"{difference / joint:.1f} joint standard errors."
-        )
-    return True, ""
+        return Disagreement.WIDE
+    return Disagreement.APART if difference > SIGMAS * joint else None

@@ -14,7 +14,7 @@ from dynesty.internal_samplers import InternalSampler, SamplerReturn, tune_slice
 from scipy.special import logsumexp
 
 from bayesmembrane.comparison.evidence.closer import Closer
-from bayesmembrane.comparison.evidence.target import Estimate, Problem, Target
+from bayesmembrane.comparison.evidence.target import EvidenceEstimate, Problem, Target
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 
@@ -42,7 +42,7 @@ def nested(
     tolerance: float = TOLERANCE,
     tell: Tell | None = None,
     around: Sequence[Array] | None = None,
-) -> Estimate:
+) -> EvidenceEstimate:
     """ln Z = ln of the integral of L dX over the prior volume X, by live points that climb the likelihood.
 
     Two independent runs climb from the prior. What they find makes a density q, broad and with heavy tails, from which
@@ -82,7 +82,7 @@ def nested(
             tell(f"nested sampling, run {len(found)}: {value:.2f} +- {sd:.2f}")
         if len(found) >= least and sd <= tolerance:
             break
-    return Estimate(value, sd, problem.evaluations, problem.seconds, tuple(r.log_evidence for r in found))
+    return EvidenceEstimate(value, sd, problem.evaluations, problem.seconds, tuple(r.log_evidence for r in found))
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,7 +67,7 @@ class PosteriorTarget:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class EvidenceEstimate:
     """ln Z of one estimator with its standard error, and what it cost.
 
     parts : ln Z of independent runs or halves, from whose scatter the standard error was checked
@@ -80,13 +80,13 @@ class Estimate:
     parts: tuple[float, ...] = ()
 
 
-def averaged(a: Estimate, b: Estimate) -> Estimate:
+def averaged(a: EvidenceEstimate, b: EvidenceEstimate) -> EvidenceEstimate:
     """Mean of two independent estimates with weights 1 / sd^2; its error is inflated if they scatter by more."""
     w = np.array([a.sd, b.sd]) ** -2.0
     z = np.array([a.log_evidence, b.log_evidence])
     mean = float(w @ z / np.sum(w))
     sd = float(np.sqrt(max(1.0, float(w @ (z - mean) ** 2)) / np.sum(w)))
-    return Estimate(mean, sd, a.evaluations + b.evaluations, a.seconds + b.seconds, (*a.parts, *b.parts))
+    return EvidenceEstimate(mean, sd, a.evaluations + b.evaluations, a.seconds + b.seconds, (*a.parts, *b.parts))
 
 
 class Problem:

@@ -17,6 +17,7 @@ from bayesmembrane.comparison.leave_out.pool import Pool
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.mechanics import api
@@ -128,6 +129,11 @@ class LeaveRangeOut:
     def points(self) -> int:
         """M"""
         return int(self.deflection.size)
+
+    def summary(self) -> dict[str, Any]:
+        """The numbers as plain values."""
+        names = ("elpd", "se", "monte_carlo_sd", "effective", "lost", "rmse_N", "max_N", "points")
+        return dict(plain({n: getattr(self, n) for n in names}))
 
 
 def leave_range_out(posterior: Posterior, draws: Array, whole: Measurement, solve: Solve = api.solve) -> LeaveRangeOut:

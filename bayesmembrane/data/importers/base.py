@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import tomli_w
 
-from bayesmembrane.data.measurement import csv_text, write_new
+from bayesmembrane.data.writing import csv_text, write_new
 from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
@@ -54,10 +54,15 @@ class Imported:
 
 
 class Importer(ABC):
-    """Reads one layout of files. A subclass has a ``name``, a ``title``, and two methods."""
+    """Reads one layout of files. A subclass has two methods, and
+
+    name, title : how answers call it, and in words what it reads
+    example : a short file of this layout
+    """
 
     name: ClassVar[str]
     title: ClassVar[str]
+    example: ClassVar[bytes]
 
     @staticmethod
     @abstractmethod

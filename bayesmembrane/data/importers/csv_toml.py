@@ -6,14 +6,14 @@ import re
 from dataclasses import replace
 from typing import ClassVar
 
+from bayesmembrane.data.fixture import Fixture, check_lifted
 from bayesmembrane.data.importers.base import Imported, Importer
-from bayesmembrane.data.measurement import check_samples, curve_columns
-from bayesmembrane.data.tables import Table, decode, number, parse_table
+from bayesmembrane.data.reading import curve_columns
+from bayesmembrane.data.tables import TextTable, decode, number, parse_table
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.units import split_header
-from bayesmembrane.physics.rigs.annulus import Annulus
 
-_NAMES = {*Annulus.columns, "time", "force_sd"}
+_NAMES = {*Fixture.columns, "time", "force_sd"}
 _BRACKETS = re.compile(r"(?P<name>[^\[\](),]+?)[\s_]*(?:\[(?P<a>[^\[\]]*)\]|\((?P<b>[^()]*)\))")
 
 
@@ -25,6 +25,8 @@ class CsvToml(Importer):
         "CSV with a header like deflection_mm;force_N or Deflection [mm];Force [N], "
         "separated by semicolons, tabs or commas, decimal points or commas"
     )
+
+    example: ClassVar[bytes] = b"Time [s];Deflection [mm];Force [mN]\n0;1,5;10,25\n1;2,5;47,5\n2;3,5;130,0\n"
 
     @staticmethod
     def recognises(data: bytes) -> bool:
@@ -42,8 +44,8 @@ class CsvToml(Importer):
         table = parse_table(text, file, delimiter)
         decimal = _decimal(table)
         table = replace(table, header=tuple(_plain(h) for h in table.header), decimal=decimal)
-        columns, notes = curve_columns(table, Annulus.columns)
-        check_samples(columns, file, table.lines)
+        columns, notes = curve_columns(table)
+        check_lifted(columns, file, table.lines)
         return Imported(columns, f"imported from {file}", notes)
 
 
@@ -65,7 +67,7 @@ def _plain(header: str) -> str:
     return f"{name}_{unit.strip()}".rstrip("_")
 
 
-def _decimal(table: Table) -> str:
+def _decimal(table: TextTable) -> str:
     """The decimal sign of a table; raises `DataError` at the first cell that contradicts the cells before it."""
     sign, place = "", ""
     for line, cells in zip(table.lines, table.rows, strict=True):

@@ -78,5 +78,5 @@ def _possible(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
     """Effects of the library that can occur in this test and are not in the hypothesis."""
     found: list[Effect] = [cls() for cls in components("effects").values()]
     have = {e.name for e in hypothesis.effects}
-    rig, path = measurement.rig.name, measurement.path
+    rig, path = measurement.rig, measurement.path
     return [e for e in found if e.name not in have and not e.unavailable(rig, path)]

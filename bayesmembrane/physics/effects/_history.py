@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.physics.effects.base import EffectParameter, running_max
 
@@ -24,7 +24,7 @@ REPEATED = EffectParameter(
 )
 
 
-def growth(exponent: Array, repeated: Array, deflection: Array, path: Path, saturation: Array | float = 0.0) -> Array:
+def growth(exponent: Array, repeated: Array, deflection: Array, path: Motion, saturation: Array | float = 0.0) -> Array:
     """G (B, N) = (1 - c) H + c (a + 1) sum over loading steps of (x / D)^a dx / D, never falling; with
     H = (1 + s) (m / D)^a / (1 + s (m / D)^a).
 

@@ -20,12 +20,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.fixture import Fixture
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, Parameter, Prior
-
-ANNULUS = ("annulus",)
-STRIPS = ("uniaxial", "equibiaxial", "planar")
-RIGS = (*ANNULUS, *STRIPS)
 
 
 @dataclass(frozen=True)
@@ -68,7 +65,7 @@ class Effect(ABC):
     name, title, reference : how users call it, how reports print it, where it comes from
     signature : what residual it leaves, in an engineer's words
     coordinates : its parameters; the first one is its size, and at its null value nothing changes, whatever the others
-    rigs : kinds of rig on which it can occur
+    needs_clamp : True if it only occurs on rigs that clamp the film all round
     needs_time : True if it means nothing without times
     absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
     law_varies : part of its evidence by which real ones may differ from this law; as a rival it is out only beyond that
@@ -80,7 +77,7 @@ class Effect(ABC):
     reference: ClassVar[str]
     signature: ClassVar[str]
     coordinates: ClassVar[tuple[EffectParameter, ...]]
-    rigs: ClassVar[tuple[str, ...]] = RIGS
+    needs_clamp: ClassVar[bool] = False
     needs_time: ClassVar[bool] = False
     absorbed: ClassVar[str] = ""
     law_varies: ClassVar[float] = 0.0
@@ -107,10 +104,15 @@ class Effect(ABC):
         """Shapes by name from which searches for it start, beside the typical ones."""
         return []
 
-    def unavailable(self, rig: str, path: Path) -> str:
+    @classmethod
+    def occurs_on(cls, rig: Fixture | type[Fixture]) -> bool:
+        """True if it can occur on such a rig: states that are no stations of one path remember nothing."""
+        return rig.has_path and (rig.clamped or not cls.needs_clamp)
+
+    def unavailable(self, rig: Fixture, path: Motion) -> str:
         """Why it cannot occur on this rig and path, as a clause; "" if it can."""
-        if rig not in self.rigs:
-            return f'the effect "{self.name}" does not occur on the rig "{rig}"'
+        if not self.occurs_on(rig):
+            return f'the effect "{self.name}" does not occur on the rig "{rig.name}"'
         if self.needs_time and path.time is None:
             return f'the effect "{self.name}" needs times, and the measurement has none'
         return ""
@@ -126,7 +128,7 @@ class Effect(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class FilmState:
     """The film at all points of a path, before what it remembers acts on its force.
 
     path : the protocol
@@ -135,7 +137,7 @@ class State:
     slope : (B, N) N/m, its derivative
     """
 
-    path: Path
+    path: Motion
     deflection: Array
     force: Array
     slope: Array
@@ -167,7 +169,7 @@ class Deflection(Effect, ABC):
     stage = "deflection"
 
     @abstractmethod
-    def deflect(self, p: Array, deflection: Array, path: Path) -> Array:
+    def deflect(self, p: Array, deflection: Array, path: Motion) -> Array:
         """(B, N) m: the deflection of the film, from that (B, N) before this effect."""
 
 
@@ -177,7 +179,7 @@ class Slack(Effect, ABC):
     stage = "history-dependent geometry"
 
     @abstractmethod
-    def excess(self, p: Array, deflection: Array, path: Path) -> Array:
+    def excess(self, p: Array, deflection: Array, path: Motion) -> Array:
         """(B, N) gain in free length relative to the length at rest, 0 or more; contributions of effects add up."""
 
 
@@ -187,7 +189,7 @@ class Carried(Effect, ABC):
     stage = "material and multiplicative history"
 
     @abstractmethod
-    def carried(self, p: Array, force: Array, state: State) -> Array:
+    def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         """(B, N) N: the force, from that (B, N) before this effect."""
 
 
@@ -197,7 +199,7 @@ class Memory(Effect, ABC):
     stage = "time"
 
     @abstractmethod
-    def remember(self, p: Array, force: Array, path: Path) -> Array:
+    def remember(self, p: Array, force: Array, path: Motion) -> Array:
         """(B, N) N: the force, from that (B, N) of a film without memory of time.
 
         What would push is for the effect to give up: a slack film carries no force.
@@ -220,7 +222,7 @@ class Sensor(Effect, ABC):
     stage = "sensor"
 
     @abstractmethod
-    def read(self, p: Array, force: Array, path: Path) -> Array:
+    def read(self, p: Array, force: Array, path: Motion) -> Array:
         """(B, N) N: the reading, from the force (B, N) before this effect."""
 
 

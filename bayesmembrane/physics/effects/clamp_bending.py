@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array, HalfNormal
-from bayesmembrane.physics.effects.base import ANNULUS, Carried, EffectParameter, State
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 
 THINNEST = 200e-6  # m
 
@@ -26,7 +26,7 @@ class ClampBending(Carried):
         "A force proportional to the deflection, seen in the flat toe of the curve, the same on all legs; stiffer "
         "materials hide it at large deflections."
     )
-    rigs: ClassVar[tuple[str, ...]] = ANNULUS
+    needs_clamp: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("stiffness", "N/m", "linear stiffness of the plate", HalfNormal(0.5), (0.0, 50.0), 0.0),
     )
@@ -37,5 +37,5 @@ class ClampBending(Carried):
             return f"a film of {1e6 * thickness:g} um bends too easily: below a millinewton"
         return ""
 
-    def carried(self, p: Array, force: Array, state: State) -> Array:
+    def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         return np.asarray(force + p[:, :1] * np.maximum(state.deflection, 0.0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal
 from bayesmembrane.physics.effects._history import EXPONENT, REPEATED, SATURATION, growth
 from bayesmembrane.physics.effects.base import EffectParameter, Slack
@@ -36,5 +36,5 @@ class ClampSlip(Slack):
         SATURATION,
     )
 
-    def excess(self, p: Array, deflection: Array, path: Path) -> Array:
+    def excess(self, p: Array, deflection: Array, path: Motion) -> Array:
         return p[:, :1] * growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4])

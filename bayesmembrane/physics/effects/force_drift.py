@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, LogNormal, Normal
 from bayesmembrane.physics.effects.base import EffectParameter, Sensor
 
@@ -32,6 +32,6 @@ class ForceDrift(Sensor):
         EffectParameter("exponent", "-", "power of the time with which it goes on", LogNormal(1.0, 0.28), (0.4, 3.0)),
     )
 
-    def read(self, p: Array, force: Array, path: Path) -> Array:
+    def read(self, p: Array, force: Array, path: Motion) -> Array:
         end = max(float(path.clock[-1]), 1e-12)
         return np.asarray(force + p[:, :1] * end * (path.clock / end) ** p[:, 1:2])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, Normal
 from bayesmembrane.physics.effects.base import EffectParameter, Sensor
 
@@ -27,5 +27,5 @@ class ForceGain(Sensor):
         EffectParameter("error", "-", "reading over true force, less one", Normal(0.0, 0.02), (-0.5, 0.5), 0.0),
     )
 
-    def read(self, p: Array, force: Array, path: Path) -> Array:
+    def read(self, p: Array, force: Array, path: Motion) -> Array:
         return force * (1.0 + p[:, :1])

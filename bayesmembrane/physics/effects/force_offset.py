@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, Normal
 from bayesmembrane.physics.effects.base import EffectParameter, Sensor
 
@@ -22,5 +22,5 @@ class ForceOffset(Sensor):
         EffectParameter("offset", "N", "reading without load", Normal(0.0, 0.03), (-1.0, 1.0), 0.0),
     )
 
-    def read(self, p: Array, force: Array, path: Path) -> Array:
+    def read(self, p: Array, force: Array, path: Motion) -> Array:
         return force + p[:, :1]

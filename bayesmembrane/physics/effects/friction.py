@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal
 from bayesmembrane.physics.effects._history import follow
 from bayesmembrane.physics.effects.base import EffectParameter, Sensor
@@ -34,7 +34,7 @@ class Friction(Sensor):
         ),
     )
 
-    def read(self, p: Array, force: Array, path: Path) -> Array:
+    def read(self, p: Array, force: Array, path: Motion) -> Array:
         gap = path.steps / p[:, 1:2]
         # A pull of one per length travelled, and its own relaxation: z = direction (1 - exp(-s / travel)).
         signed = np.cumsum(path.steps * path.leg) / p[:, 1:2]

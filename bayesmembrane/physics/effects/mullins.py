@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import erf
 
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal
-from bayesmembrane.physics.effects.base import Carried, EffectParameter, State
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Mullins(Carried):
         ),
     )
 
-    def carried(self, p: Array, force: Array, state: State) -> Array:
+    def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         m, full = state.reached, state.path.full_range
         with np.errstate(all="ignore"):
             part = np.where(m > 0, np.maximum(state.deflection, 0.0) / m, 1.0)

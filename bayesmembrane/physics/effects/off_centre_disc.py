@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array, HalfNormal
-from bayesmembrane.physics.effects.base import ANNULUS, Carried, EffectParameter, State
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,14 @@ class OffCentreDisc(Carried):
         "Slightly too stiff in the toe, where the curve is steep on a double logarithmic plot, alike on all legs; "
         "mostly absorbed by the modulus."
     )
-    rigs: ClassVar[tuple[str, ...]] = ANNULUS
+    needs_clamp: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "square", "-", "square of the eccentricity over the free length", HalfNormal(3e-3), (0.0, 0.1), 0.0
         ),
     )
 
-    def carried(self, p: Array, force: Array, state: State) -> Array:
+    def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         with np.errstate(all="ignore"):
             n = np.where(state.force > 0, state.slope * state.deflection / state.force, 0.0)
         return np.asarray(force * (1.0 + 0.25 * p[:, :1] * n * (n + 1.0)))

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, Uniform
 from bayesmembrane.physics.effects._history import EXPONENT, REPEATED, SATURATION, growth
 from bayesmembrane.physics.effects.base import Deflection, EffectParameter, running_max
@@ -45,7 +45,7 @@ class PermanentSet(Deflection):
         SATURATION,
     )
 
-    def deflect(self, p: Array, deflection: Array, path: Path) -> Array:
+    def deflect(self, p: Array, deflection: Array, path: Motion) -> Array:
         largest = running_max(deflection)
         lasting = p[:, :1] * growth(p[:, 1:2], p[:, 3:4], deflection, path, p[:, 4:5])
         with np.errstate(all="ignore"):

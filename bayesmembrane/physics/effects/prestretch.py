@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from bayesmembrane.ground.parameters import Array, HalfNormal
-from bayesmembrane.physics.effects.base import ANNULUS, EffectParameter, Geometry
+from bayesmembrane.physics.effects.base import EffectParameter, Geometry
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Prestretch(Geometry):
         "Stiff at once: the curve starts linearly instead of with a flat toe; the surplus is largest at small "
         "deflections, fades at large ones, and is alike on all legs."
     )
-    rigs: ClassVar[tuple[str, ...]] = ANNULUS
+    needs_clamp: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("stretch", "-", "equibiaxial stretch before clamping", HalfNormal(0.03, 1.0), (1.0, 1.3), 1.0),
     )

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.data.motion import NOMINAL_SPEED, Path
+from bayesmembrane.data.motion import NOMINAL_SPEED, Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal
 from bayesmembrane.physics.effects.base import EffectParameter, Memory
 
@@ -31,5 +31,5 @@ class Rate(Memory):
         EffectParameter("exponent", "-", "power of the speed", HalfNormal(0.05), (0.0, 0.5), 0.0),
     )
 
-    def remember(self, p: Array, force: Array, path: Path) -> Array:
+    def remember(self, p: Array, force: Array, path: Motion) -> Array:
         return np.asarray(force * np.exp(p[:, :1] * np.log(path.speed / NOMINAL_SPEED)))

@@ -10,7 +10,7 @@ from scipy.special import expit
 
 from bayesmembrane.ground.parameters import Array, HalfNormal, Uniform
 from bayesmembrane.physics.effects._history import EXPONENT, REPEATED, growth
-from bayesmembrane.physics.effects.base import Carried, EffectParameter, State
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 
 WIDTH = 0.015  # of the full range
 
@@ -47,7 +47,7 @@ class Tearing(Carried):
         """A jump is found from nearby only."""
         return [{"jump": 0.6, "place": place} for place in self.jumps]
 
-    def carried(self, p: Array, force: Array, state: State) -> Array:
+    def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         slow = growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path)
         quick = expit((state.reached / state.path.full_range - p[:, 4:5]) / WIDTH)
         return np.asarray(force * np.exp(-p[:, :1] * ((1 - p[:, 3:4]) * slow + p[:, 3:4] * quick)))

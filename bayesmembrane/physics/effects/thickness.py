@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from bayesmembrane.ground.parameters import Array, Normal
-from bayesmembrane.physics.effects.base import Carried, EffectParameter, State
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 
 
 @dataclass(frozen=True)
@@ -24,5 +24,5 @@ class Thickness(Carried):
         EffectParameter("error", "-", "true over stated thickness, less one", Normal(0.0, 0.05), (-0.5, 0.5), 0.0),
     )
 
-    def carried(self, p: Array, force: Array, state: State) -> Array:
+    def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         return force * (1.0 + p[:, :1])

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.physics.effects._history import follow
 from bayesmembrane.physics.effects.base import EffectParameter, Memory
@@ -43,7 +43,7 @@ class Viscoelastic(Memory):
         EffectParameter("withstood", "-", "part of a push that does not make it slack", Uniform(0.0, 1.0), (0.0, 1.0)),
     )
 
-    def remember(self, p: Array, force: Array, path: Path) -> Array:
+    def remember(self, p: Array, force: Array, path: Motion) -> Array:
         gap = np.diff(path.clock, prepend=0.0)
         start = np.zeros(len(p))
         kept = np.zeros_like(force)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, Normal
 from bayesmembrane.physics.effects.base import Deflection, EffectParameter
 
@@ -26,5 +26,5 @@ class ZeroOffset(Deflection):
         ),
     )
 
-    def deflect(self, p: Array, deflection: Array, path: Path) -> Array:
+    def deflect(self, p: Array, deflection: Array, path: Motion) -> Array:
         return deflection - p[:, :1]

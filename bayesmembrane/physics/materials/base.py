@@ -12,9 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bayesmembrane.ground.errors import SettingsError
-from bayesmembrane.ground.parameters import Array, Parameter
+from bayesmembrane.ground.parameters import Array, Natural, Normal, Parameter
 
 Derivatives = tuple[Any, Any, Any, Any, Any, Any]
+
+LN_GD = Parameter("ln_gd", "ln(N/m)", "log of shear modulus x thickness", Normal(np.log(15.0), 2.0), (-7.0, 14.0))
+"""The first coordinate of every material: materials share one prior on the modulus, and searches scale films by it."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +32,9 @@ class Material(ABC):
 
     name, title, reference : how users call it, how reports print it, where it comes from
     colour : of its curves in reports, "#rrggbb"; "" leaves the choice to the report
-    units : unit of each field
+    units, meanings : unit of each field, and what it is in a few words
     scales : per field, 1 if it scales with the modulus (N/m), 0 if it does not: F(s c) = s F(c)
-    coordinates : the `Parameter` s in which it is sampled, with their priors
+    coordinates : the `Parameter` s in which it is sampled, with their priors; the first one is `LN_GD`
     ``derivatives``, ``sensitivities`` : closed forms, see there; models of invariants find theirs in `invariants`
     ``to_coordinates``, ``from_coordinates`` : the bijection between fields and coordinates
     ``shear_modulus`` : G d in N/m
@@ -42,6 +45,7 @@ class Material(ABC):
     colour: ClassVar[str] = ""
     reference: ClassVar[str]
     units: ClassVar[tuple[str, ...]]
+    meanings: ClassVar[tuple[str, ...]]
     scales: ClassVar[tuple[int, ...]]
     coordinates: ClassVar[tuple[Parameter, ...]]
 
@@ -94,6 +98,17 @@ class Material(ABC):
     def field_names(cls) -> tuple[str, ...]:
         """Names of the membrane parameters, in the order of ``p``."""
         return tuple(f.name for f in fields(cls))
+
+    @classmethod
+    def natural_parameters(cls) -> tuple[Natural, ...]:
+        """The membrane parameters as users read them."""
+        return tuple(Natural(*each) for each in zip(cls.field_names(), cls.units, cls.meanings, strict=True))
+
+    @classmethod
+    def typical(cls) -> Array:
+        """(n_fields,) membrane parameters at the medians of the priors."""
+        medians = [float(c.prior.quantile(0.5)) for c in cls.coordinates]
+        return cls.from_coordinates(np.array(medians))
 
     @classmethod
     def from_vector(cls, p: ArrayLike) -> Self:

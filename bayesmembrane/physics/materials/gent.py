@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
-from bayesmembrane.physics.materials.base import Derivatives, Material
+from bayesmembrane.physics.materials.base import LN_GD, Derivatives, Material
 from bayesmembrane.physics.materials.invariants import first_invariant, of_first, rate_of_first
 
 
@@ -29,9 +29,10 @@ class Gent(Material):
     colour: ClassVar[str] = "#009E73"
     reference: ClassVar[str] = "A. N. Gent, Rubber Chem. Technol. 69 (1996) 59"
     units: ClassVar[tuple[str, ...]] = ("N/m", "-")
+    meanings: ClassVar[tuple[str, ...]] = ("half the shear modulus x thickness", "limit of I1 - 3")
     scales: ClassVar[tuple[int, ...]] = (1, 0)
     coordinates: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("ln_gd", "ln(N/m)", "log of shear modulus x thickness", Normal(np.log(15.0), 2.0), (-7.0, 14.0)),
+        LN_GD,
         Parameter("ln_jm", "-", "logarithm of the limit of I1 - 3", Normal(np.log(50.0), 1.5), (-3.0, 16.0)),
     )
 

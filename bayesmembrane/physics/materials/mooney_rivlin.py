@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
-from bayesmembrane.physics.materials.base import Derivatives, Material
+from bayesmembrane.physics.materials.base import LN_GD, Derivatives, Material
 from bayesmembrane.physics.materials.invariants import both_invariants, of_both, rate_of_both
 
 
@@ -31,9 +31,10 @@ class MooneyRivlin(Material):
         "M. Mooney, J. Appl. Phys. 11 (1940) 582; R. S. Rivlin, Phil. Trans. R. Soc. A 241 (1948) 379"
     )
     units: ClassVar[tuple[str, ...]] = ("N/m", "N/m")
+    meanings: ClassVar[tuple[str, ...]] = ("coefficient of I1 - 3", "coefficient of I2 - 3")
     scales: ClassVar[tuple[int, ...]] = (1, 1)
     coordinates: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("ln_gd", "ln(N/m)", "log of shear modulus x thickness", Normal(np.log(15.0), 2.0), (-7.0, 14.0)),
+        LN_GD,
         Parameter("share", "-", "share of the second coefficient, c2 / (c1 + c2)", Normal(0.0, 0.5), (-3.0, 3.0)),
     )
 

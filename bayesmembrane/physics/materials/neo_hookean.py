@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bayesmembrane.ground.parameters import Array, Normal, Parameter
-from bayesmembrane.physics.materials.base import Derivatives, Material
+from bayesmembrane.ground.parameters import Array, Parameter
+from bayesmembrane.physics.materials.base import LN_GD, Derivatives, Material
 from bayesmembrane.physics.materials.invariants import first_invariant, rate_of_first
 
 
@@ -24,10 +24,9 @@ class NeoHookean(Material):
     colour: ClassVar[str] = "#0072B2"
     reference: ClassVar[str] = "L. R. G. Treloar, Trans. Faraday Soc. 39 (1943) 241"
     units: ClassVar[tuple[str, ...]] = ("N/m",)
+    meanings: ClassVar[tuple[str, ...]] = ("half the shear modulus x thickness",)
     scales: ClassVar[tuple[int, ...]] = (1,)
-    coordinates: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("ln_gd", "ln(N/m)", "log of shear modulus x thickness", Normal(np.log(15.0), 2.0), (-7.0, 14.0)),
-    )
+    coordinates: ClassVar[tuple[Parameter, ...]] = (LN_GD,)
 
     @staticmethod
     def derivatives(p: Any, l1: Any, l2: Any) -> Derivatives:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
-from bayesmembrane.physics.materials.base import Derivatives, Material
+from bayesmembrane.physics.materials.base import LN_GD, Derivatives, Material
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,17 @@ class Ogden(Material):
     colour: ClassVar[str] = "#CC79A7"
     reference: ClassVar[str] = "R. W. Ogden, Proc. R. Soc. A 326 (1972) 565"
     units: ClassVar[tuple[str, ...]] = ("N/m", "N/m", "N/m", "-", "-", "-")
+    meanings: ClassVar[tuple[str, ...]] = (
+        "coefficient of the first power",
+        "coefficient of the second power",
+        "coefficient of the third power",
+        "first exponent",
+        "second exponent",
+        "third exponent",
+    )
     scales: ClassVar[tuple[int, ...]] = (1, 1, 1, 0, 0, 0)
     coordinates: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("ln_gd", "ln(N/m)", "log of shear modulus x thickness", Normal(np.log(15.0), 2.0), (-7.0, 14.0)),
+        LN_GD,
         Parameter("ln_r2", "-", "ln(c2 a2 / (c1 a1)), stiffness of term 2 to term 1", Normal(-3.0, 2.5), (-25.0, 15.0)),
         Parameter("ln_r3", "-", "ln(c3 a3 / (c1 a1)), stiffness of term 3 to term 1", Normal(-3.0, 2.0), (-25.0, 15.0)),
         Parameter("ln_a1", "-", "logarithm of the lower positive exponent", Normal(np.log(1.5), 0.5), (-3.0, 2.5)),

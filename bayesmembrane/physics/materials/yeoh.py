@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
-from bayesmembrane.physics.materials.base import Derivatives, Material
+from bayesmembrane.physics.materials.base import LN_GD, Derivatives, Material
 from bayesmembrane.physics.materials.invariants import first_invariant, of_first, rate_of_first
 
 
@@ -26,9 +26,14 @@ class Yeoh(Material):
     colour: ClassVar[str] = "#D55E00"
     reference: ClassVar[str] = "O. H. Yeoh, Rubber Chem. Technol. 66 (1993) 754"
     units: ClassVar[tuple[str, ...]] = ("N/m", "N/m", "N/m")
+    meanings: ClassVar[tuple[str, ...]] = (
+        "coefficient of I1 - 3",
+        "coefficient of its square",
+        "coefficient of its cube",
+    )
     scales: ClassVar[tuple[int, ...]] = (1, 1, 1)
     coordinates: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("ln_gd", "ln(N/m)", "log of shear modulus x thickness", Normal(np.log(15.0), 2.0), (-7.0, 14.0)),
+        LN_GD,
         Parameter("c2_c1", "-", "second coefficient relative to the first", Normal(0.0, 0.4), (-2.0, 2.0)),
         Parameter("c3_c1", "-", "third coefficient relative to the first", Normal(0.0, 0.015), (-0.5, 0.5)),
     )

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,17 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics.convexity import least_eigenvalue
 from bayesmembrane.physics.mechanics.solution import Curves, Note, Status
-from bayesmembrane.physics.rigs.base import Strip
+
+
+class Pulled(Protocol):
+    """What a rig tells of a homogeneous test; see `rigs.base.Strip`."""
+
+    @property
+    def length(self) -> float: ...
+    @property
+    def width(self) -> float: ...
+    def lateral(self, stretch: Array, across: Array | None = None) -> tuple[Array, Array]:
+        """(l2, dl2/dl) at stretches l (B, N); ``across`` (N,) is l2 where it was measured."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +44,7 @@ class StripLaw:
 
     material: type[Material]
     parameters: Array
-    rig: Strip
+    rig: Pulled
     pushes: bool = False
     across: Array | None = None
 

@@ -9,8 +9,8 @@ import numba
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.ground.parameters import Array, Normal, Parameter
-from bayesmembrane.physics.noise.base import LN_SD, Noise, NoiseLikelihood, conditional, force_scale
+from bayesmembrane.ground.parameters import Array, Natural, Normal, Parameter
+from bayesmembrane.physics.noise.base import LN_SD, SD, Noise, NoiseLikelihood, conditional, force_scale
 
 LN_LENGTH = Parameter(
     "ln_length",
@@ -40,8 +40,8 @@ class AR1(Noise):
         return (LN_SD, LN_LENGTH)
 
     @property
-    def field_names(self) -> tuple[str, ...]:
-        return ("sd", "rho")
+    def natural_parameters(self) -> tuple[Natural, ...]:
+        return (SD, Natural("rho", "-", "correlation of neighbours that are one median step apart"))
 
     def natural(self, x: Array, scale: float) -> Array:
         return np.stack([np.exp(x[:, 0]) * scale, np.exp(-np.exp(-x[:, 1]))], axis=1)

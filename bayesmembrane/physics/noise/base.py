@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.ground.parameters import Array, Normal, Parameter
+from bayesmembrane.ground.parameters import Array, Natural, Normal, Parameter
 
 MEDIAN_SHARE, SPREAD = 3e-3, 2.0
 
@@ -25,6 +25,8 @@ LN_SD = Parameter(
 That spans a good load cell and a model that misses the curve altogether. Where the measurement gives its own noise,
 tau comes on top of it, and a posterior that stays at the lower end says that nothing is needed on top.
 """
+
+SD = Natural("sd", "N", "standard deviation of the noise that is inferred")
 
 
 def force_scale(measurement: Measurement) -> float:
@@ -72,6 +74,8 @@ class Noise(ABC):
     Sigma_inferred has one parameter at least, tau (``sd``, in N).
 
     name, title : how users call it, how reports print it
+    ``coordinates`` : what is inferred; ``natural_parameters`` : the same as users read it, with ``natural`` from one
+        to the other
     """
 
     name: ClassVar[str]
@@ -84,12 +88,12 @@ class Noise(ABC):
 
     @property
     @abstractmethod
-    def field_names(self) -> tuple[str, ...]:
-        """Names of the natural parameters, ``sd`` first, which is in N."""
+    def natural_parameters(self) -> tuple[Natural, ...]:
+        """What users read, each with its unit: first `SD`, the standard deviation that is inferred, if any is."""
 
     @abstractmethod
     def natural(self, x: Array, scale: float) -> Array:
-        """Natural parameters (B, n) of coordinates x (B, k), with the largest force ``scale`` in N."""
+        """The ``natural_parameters`` (B, n) of coordinates x (B, k), with the largest force ``scale`` in N."""
 
     @abstractmethod
     def bind(self, measurement: Measurement) -> NoiseLikelihood:

@@ -9,8 +9,8 @@ import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
-from bayesmembrane.ground.parameters import Array, Parameter
-from bayesmembrane.physics.noise.base import LN_SD, Noise, NoiseLikelihood, conditional, force_scale
+from bayesmembrane.ground.parameters import Array, Natural, Parameter
+from bayesmembrane.physics.noise.base import LN_SD, SD, Noise, NoiseLikelihood, conditional, force_scale
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,8 @@ class White(Noise):
         return (LN_SD,) if self.extra else ()
 
     @property
-    def field_names(self) -> tuple[str, ...]:
-        return ("sd",) if self.extra else ()
+    def natural_parameters(self) -> tuple[Natural, ...]:
+        return (SD,) if self.extra else ()
 
     def natural(self, x: Array, scale: float) -> Array:
         return np.exp(x) * scale

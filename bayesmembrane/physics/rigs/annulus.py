@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
+import numpy as np
+
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import DataError
-from bayesmembrane.ground.units import FORCE, LENGTH
-from bayesmembrane.physics.rigs.base import Rig
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.materials.base import Material
+from bayesmembrane.physics.mechanics import api
+from bayesmembrane.physics.mechanics.film_law import FilmLaw, film_law
+from bayesmembrane.physics.mechanics.request import Request, Spared, request
+from bayesmembrane.physics.mechanics.solution import Curves, Status
+from bayesmembrane.physics.rigs.base import Films, Rig, Trial
+
+WIDER = 1.5
+"""How much wider a disc could be."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +33,7 @@ class Annulus(Rig):
 
     name: ClassVar[str] = "annulus"
     title: ClassVar[str] = "clamped annulus with a lifted disc"
-    columns: ClassVar[Mapping[str, str]] = {"deflection": LENGTH, "force": FORCE}
+    clamped: ClassVar[bool] = True
 
     def check(self) -> None:
         """Raise `DataError` unless R1 < R2."""
@@ -38,7 +48,60 @@ class Annulus(Rig):
     def size(self) -> float:
         return self.outer_radius
 
+    def ring(self) -> tuple[float, float]:
+        return self.inner_radius, self.outer_radius
+
+    @classmethod
+    def example(cls) -> Self:
+        """The rig of the paper."""
+        return cls(0.010, 0.035)
+
     @property
     def radius_ratio(self) -> float:
         """R2 / R1."""
         return self.outer_radius / self.inner_radius
+
+    # ---- mechanics -------------------------------------------------------------------------------------------------
+
+    def law(self, films: Films, trial: Trial) -> tuple[FilmLaw, tuple[Array, Array]]:
+        """Solved at a few deflections; margins are -inf where the film's energy became indefinite."""
+        end = np.maximum(trial.end, 1e-3 * trial.measurement.full_range)
+        count = len(films.parameters)
+        asked = Request(
+            films.material,
+            films.parameters,
+            np.broadcast_to(trial.extra, (count, trial.extra.size)),
+            np.broadcast_to(trial.prestretch, (count,)),
+            self.inner_radius,
+            self.outer_radius,
+            sensitivities=films.sensitivities,
+            spare=films.spare,
+            exact_up_to=np.inf if films.spare is Spared.NONE else float(np.max(end)),
+        )
+        law, curves = film_law(asked, np.broadcast_to(end, (count,)), films.solve)
+        indefinite, bent = (curves.status == s for s in (Status.INDEFINITE, Status.NOT_ELLIPTIC))
+        convexity, ellipticity = (
+            np.where(indefinite | (bent & np.isnan(m)), -np.inf, m) for m in (curves.convexity, curves.ellipticity)
+        )
+        return law, (convexity, ellipticity)
+
+    def curves(self, films: Films, measurement: Measurement, deflection: Array, exact_up_to: float = np.inf) -> Curves:
+        asked = request(films.material, films.parameters, deflection, self.inner_radius, self.outer_radius)
+        asked = replace(asked, sensitivities=films.sensitivities, solver=films.solver, spare=films.spare)
+        return films.solve(replace(asked, exact_up_to=exact_up_to))
+
+    def states(self, film: Material, deflection: Array, points: int) -> Array:
+        radii = {"inner_radius": self.inner_radius, "outer_radius": self.outer_radius}
+        found = [api.profile(film, float(d), points=points, **radii) for d in deflection]
+        return np.stack([np.stack([p.f, p.height, p.l1, p.l2]) for p in found], axis=1)
+
+    def mean_stretch(self, deflection: float) -> float:
+        rise = deflection / (self.outer_radius - self.inner_radius)
+        return float(np.sqrt(1.0 + rise * rise))
+
+    def variants(self) -> tuple[tuple[str, Self], ...]:
+        """A disc so wide that still a ring of film is left."""
+        if WIDER * self.inner_radius >= 0.8 * self.outer_radius:
+            return ()
+        words = f"with a disc {WIDER:g} times as wide"
+        return ((words, replace(self, inner_radius=WIDER * self.inner_radius)),)

@@ -1,88 +1,114 @@
-"""What a test rig declares. One file per rig; the registry finds it by its name."""
+"""What a test rig declares beside its `Fixture`: the forces of a film on it. One file per rig, found by its name."""
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
-from typing import ClassVar
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Self
 
-from bayesmembrane.ground.errors import DataError
+import numpy as np
+
+from bayesmembrane.data.fixture import Fixture, check_deviations, check_sequence
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.motion import Motion
+from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.units import FORCE, RATIO, STRESS
+from bayesmembrane.physics.materials.base import Material
+from bayesmembrane.physics.mechanics import api
+from bayesmembrane.physics.mechanics.request import Spared
+from bayesmembrane.physics.mechanics.solution import Curves
+from bayesmembrane.physics.mechanics.strip_law import StripLaw, strip_curves
+
+Law = Any
+"""(deflection (B, N), excess (B, N) or None) -> (force (B, N), slope (B, N)), as `FilmLaw` and `StripLaw` are."""
+
+PUSHED = 0.01  # of the largest force: a negative one beyond it is no noise about the zero of a slack film
+STATES = 40  # at which a closed form is asked for its convexity
 
 
-@dataclass(frozen=True)
-class Rig(ABC):
-    """The fixture that holds the film. A subclass is a frozen dataclass whose float fields are its lengths in m.
+@dataclass(frozen=True, eq=False)
+class Films:
+    """B films of one energy, and what is asked of them.
 
-    name, title : how a specimen file calls it (``rig.kind``) and how reports print it
-    columns : what its curve holds, column name without unit -> quantity (see `units`)
-    noise : by what names a standard deviation may be stated, likewise; one for all points in the specimen file, too
-    ``check`` : what its lengths must satisfy among themselves
+    material, parameters : class of the energy, and membrane parameters (B, n)
+    sensitivities : whether derivatives with respect to the parameters are asked for
+    spare : films on which no more effort is to be spent
+    solver, solve : which solver, and what stands in front of it
     """
 
-    name: ClassVar[str]
-    title: ClassVar[str]
-    columns: ClassVar[Mapping[str, str]]
-    noise: ClassVar[Mapping[str, str]] = {"force_sd": FORCE}
+    material: type[Material]
+    parameters: Array
+    sensitivities: bool = False
+    spare: Spared = Spared.NONE
+    solver: str = "ritz"
+    solve: api.Solve = api.solve
 
-    def __post_init__(self) -> None:
-        """Raise `DataError` unless every length is finite and positive, and `check` agrees."""
-        for name, value in self.lengths.items():
-            if not (math.isfinite(value) and value > 0):
-                raise DataError(f"{name} must be a positive length, and {value:g} m is not", self.name)
-        self.check()
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A way in which films are tested on a rig.
+
+    measurement : the test, whose forces tell whether its specimen was a block that bears compression
+    path : how the rig is moved; may be another way than that of the measurement
+    prestretch : (B,) of the films as mounted
+    end : (B,) m, the largest deflection that each film sees
+    extra : (E,) m, deflections beyond the path at which convexity is asked for, too
+    """
+
+    measurement: Measurement
+    path: Motion
+    prestretch: Array = field(default_factory=lambda: np.ones(1))
+    end: Array = field(default_factory=lambda: np.ones(1))
+    extra: Array = field(default_factory=lambda: np.empty(0))
+
+
+class Rig(Fixture, ABC):
+    """A fixture on which forces can be predicted.
+
+    closed_form : its law costs next to nothing; else films are solved at few points, and a law is drawn through them
+    proposal : "" or, in words, the test that could be made on such a rig with another specimen of the same film
+    """
+
+    closed_form: ClassVar[bool] = False
+    proposal: ClassVar[str] = ""
 
     @abstractmethod
-    def check(self) -> None:
-        """Raise `DataError` if the lengths contradict each other."""
+    def law(self, films: Films, trial: Trial) -> tuple[Law, tuple[Array, Array]]:
+        """F(delta) of the films, and margins (B, M) of convexity and of ellipticity of the states on their way.
+
+        The law knows ``status`` (B,) where it is nan, ``varied`` (by changes of the parameters) and ``stack``.
+        """
 
     @abstractmethod
-    def size(self) -> float:
-        """The length in m that deflections and thicknesses are judged against: a film much larger is a wrong unit."""
+    def curves(self, films: Films, measurement: Measurement, deflection: Array, exact_up_to: float = np.inf) -> Curves:
+        """Curves of the films at ``deflection`` (N,) m; beyond ``exact_up_to`` only their stability matters."""
 
-    def from_columns(self, found: Mapping[str, Array], thickness: float) -> dict[str, Array]:
-        """``deflection`` (m), ``force`` (N), their ``force_sd`` and others, from the columns of a curve in SI."""
-        return dict(found)
+    @abstractmethod
+    def states(self, film: Material, deflection: Array, points: int) -> Array:
+        """(4, D, points): place along the film (m), height (m), l1, l2 at each of ``deflection`` (D,) m, or nan."""
 
-    def remarks(self, found: Mapping[str, Array]) -> tuple[str, ...]:
-        """What must be said of readings, as `from_columns` gives them, that a film on this rig cannot bear."""
+    def mean_stretch(self, deflection: float) -> float | None:
+        """The stretch along the film, on average, at a deflection (m), if across it is about 1; else None."""
+        return None
+
+    def variants(self) -> tuple[tuple[str, Self], ...]:
+        """Like rigs on which the same test would tell more: ("with ...", rig)."""
         return ()
 
-    def newton(self, quantity: str, thickness: float) -> float:
-        """N of one SI unit of a quantity in which this rig's noise is stated."""
-        return 1.0
-
-    def to_columns(self, arrays: Mapping[str, Array], thickness: float) -> dict[str, Array]:
-        """The inverse of `from_columns`: header names with units -> values."""
-        units = {"time": ("time_s", 1.0), "deflection": ("deflection_mm", 1e3)}
-        names = {k: units.get(k, (f"{k}_N", 1.0)) for k in arrays}
-        return {names[k][0]: names[k][1] * v for k, v in arrays.items()}
-
-    def shown(self, thickness: float) -> Mapping[str, tuple[float, str]]:
-        """By SI unit (factor, unit): how people read forces, deflections and what is made of them on this rig."""
-        return {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "N": (1e3, "mN"), "N/s": (1e3, "mN/s")}
-
-    def place(self, deflection: float) -> str:
-        """A deflection in m in words, to follow "at"."""
-        return f"{1e3 * deflection:.3g} mm"
-
-    @property
-    def lengths(self) -> dict[str, float]:
-        """The fields by name, in m."""
-        return {f.name: float(getattr(self, f.name)) for f in fields(self)}
-
     @classmethod
-    def has_default(cls, name: str) -> bool:
-        """True if a specimen file may leave this length out."""
-        return next(f for f in fields(cls) if f.name == name).default is not MISSING
+    def proposed(cls, stretch: Array) -> tuple[Array, tuple[int, ...]]:
+        """(l2 (N,), (1,) or (1, 2)): stretch across and measured tensions of the test that ``proposal`` names."""
+        raise SettingsError(f'the rig "{cls.name}" proposes no test', remedy="ask those that have a proposal")
 
-    @classmethod
-    def length_names(cls) -> tuple[str, ...]:
-        """The fields, which a specimen file gives with a unit: ``inner_radius_mm``."""
-        return tuple(f.name for f in fields(cls))
+
+def rig_of(measurement: Measurement) -> Rig:
+    """The rig of a measurement; raises `SettingsError` if it is a fixture without mechanics."""
+    rig = measurement.rig
+    if not isinstance(rig, Rig):
+        raise SettingsError(f'a film on the rig "{rig.name}" cannot be predicted', remedy="use a rig that has a law")
+    return rig
 
 
 class Strip(Rig, ABC):
@@ -96,6 +122,8 @@ class Strip(Rig, ABC):
     width: float
     columns: ClassVar[Mapping[str, str]] = {"stretch": RATIO, "nominal_stress": STRESS}
     noise: ClassVar[Mapping[str, str]] = {"force_sd": FORCE, "nominal_stress_sd": STRESS}
+    homogeneous: ClassVar[bool] = True
+    closed_form: ClassVar[bool] = True
 
     def check(self) -> None:
         """Any length goes with any width."""
@@ -107,6 +135,37 @@ class Strip(Rig, ABC):
     @abstractmethod
     def lateral(stretch: Array, across: Array | None = None) -> tuple[Array, Array]:
         """(l2, dl2/dl) at stretches l (B, N); ``across`` (N,) is l2 where it was measured."""
+
+    # ---- mechanics -------------------------------------------------------------------------------------------------
+
+    def law(self, films: Films, trial: Trial) -> tuple[StripLaw, tuple[Array, Array]]:
+        law = self._law(films, trial.measurement, trial.path.across)
+        at = trial.path.deflection
+        if law.across is None:
+            at = np.unique(np.concatenate([at, trial.extra]))
+            at = at[np.linspace(0, at.size - 1, min(at.size, STATES)).astype(int)]
+        shown = strip_curves(law, at)
+        return law, (shown.convexity, shown.ellipticity)
+
+    def curves(self, films: Films, measurement: Measurement, deflection: Array, exact_up_to: float = np.inf) -> Curves:
+        across = measurement.path.across
+        if across is not None and deflection.size == len(measurement):  # the path may hold more points
+            across = measurement.across
+        return strip_curves(self._law(films, measurement, across), deflection, films.sensitivities)
+
+    def _law(self, films: Films, measurement: Measurement, across: Array | None) -> StripLaw:
+        return StripLaw(films.material, films.parameters, self, _pushes(measurement), across)
+
+    def states(self, film: Material, deflection: Array, points: int) -> Array:
+        l1 = np.repeat(1.0 + deflection[:, None] / self.length, points, axis=1)
+        along = np.linspace(0.0, self.length, points)
+        return np.stack([l1 * along, 0.0 * l1, l1, self.lateral(l1)[0]])
+
+    @classmethod
+    def proposed(cls, stretch: Array) -> tuple[Array, tuple[int, ...]]:
+        return cls.lateral(stretch)[0], (1,)
+
+    # ---- readings --------------------------------------------------------------------------------------------------
 
     def newton(self, quantity: str, thickness: float) -> float:
         return self.width * thickness if quantity == STRESS else 1.0
@@ -126,6 +185,28 @@ class Strip(Rig, ABC):
             return {}
         return {"force_sd": found[names[0]] * self.newton(self.noise[names[0]], thickness)}
 
+    def check_readings(self, columns: Mapping[str, Array], file: str, lines: Sequence[int]) -> None:
+        """What pushes has a stretch below 1 and a negative stress, and something must pull."""
+        places = [f"{file}, line {k}" for k in lines]
+        deflection, force, across = columns["deflection"], columns["force"], columns.get("across")
+        if across is None:
+            check_sequence(columns, places)
+        else:
+            places = 2 * places
+        pulled, pushed = deflection > 0, deflection < 0
+        if across is not None:  # held wide a film pulls below rest, and held narrow it may push above
+            pulled, pushed = pulled & (across >= 1), pushed & (across <= 1)
+        against = ((pulled & (force < 0)) | (pushed & (force > 0))) & (np.abs(force) > 0.01 * np.max(np.abs(force)))
+        if np.sum(against) > 0.5 * np.sum(pulled | pushed):
+            k = int(np.argmax(against))
+            fault = "at most points the stress is negative above a stretch of 1 or positive below it"
+            remedy = "write the stretch as length over length at rest, and the stress positive where it pulls"
+            raise DataError(fault, places[k], remedy)
+        if not np.any(deflection > 0):
+            fault = "no stretch is above 1, and a test in compression alone cannot be calibrated"
+            raise DataError(fault, file, "keep the signs as they are, and add the readings in tension of this rubber")
+        check_deviations(columns, places)
+
     def to_columns(self, arrays: Mapping[str, Array], thickness: float) -> dict[str, Array]:
         out = {"time_s": arrays["time"]} if "time" in arrays else {}
         out["stretch"] = 1.0 + arrays["deflection"] / self.length
@@ -143,5 +224,19 @@ class Strip(Rig, ABC):
             "N/s": (kPa, "kPa/s"),
         }
 
+    def remark_on_units(self, thickness: float) -> str:
+        shown = self.shown(thickness)
+        return (
+            f"forces are nominal stress times width times thickness, 1 N for {shown['N'][0]:.4g} kPa, and 1 mm of "
+            f"deflection is {1e-3 * shown['m'][0]:.4g} of stretch"
+        )
+
     def place(self, deflection: float) -> str:
         return f"a stretch of {1 + deflection / self.length:.3g}"
+
+
+def _pushes(m: Measurement) -> bool:
+    """True where the specimen was compressed, and pushed back: it was a block, not a film."""
+    if m.across is not None:  # held across, a film may be taut below rest: only the stress tells
+        return bool(np.any(m.force < -PUSHED * np.max(np.abs(m.force))))
+    return bool(np.any((m.deflection < -0.01 * m.full_range) & (m.force < 0)))

@@ -29,6 +29,8 @@ class Biaxial(Strip):
 
     name: ClassVar[str] = "biaxial"
     title: ClassVar[str] = "biaxial film"
+    proposal: ClassVar[str] = "a sheet pulled half as far across as along (biaxial)"
+    has_path: ClassVar[bool] = False
     columns: ClassVar[Mapping[str, str]] = {
         "stretch_1": RATIO,
         "stretch_2": RATIO,
@@ -46,6 +48,10 @@ class Biaxial(Strip):
     def lateral(stretch: Array, across: Array | None = None) -> tuple[Array, Array]:
         across = np.ones(1) if across is None else across
         return np.broadcast_to(across, stretch.shape), np.zeros_like(stretch)
+
+    @classmethod
+    def proposed(cls, stretch: Array) -> tuple[Array, tuple[int, ...]]:
+        return 1.0 + 0.5 * (stretch - 1.0), (1, 2)
 
     def from_columns(self, found: Mapping[str, Array], thickness: float) -> dict[str, Array]:
         l1, l2, p1, p2 = (found[k] for k in self.columns)

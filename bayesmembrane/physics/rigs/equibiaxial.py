@@ -20,6 +20,7 @@ class Equibiaxial(Strip):
 
     name: ClassVar[str] = "equibiaxial"
     title: ClassVar[str] = "equibiaxial film"
+    proposal: ClassVar[str] = "a sheet pulled equally both ways (equibiaxial)"
 
     @staticmethod
     def lateral(stretch: Array, across: Array | None = None) -> tuple[Array, Array]:

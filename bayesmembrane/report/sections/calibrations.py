@@ -36,7 +36,8 @@ class CalibrationsSection(Section):
         return read(folder, "beside_paper")
 
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
-        shown, beside = in_order(of_kind(results, Shown)), of_kind(results, Compared)
+        shown = in_order(of_kind(results, Shown))
+        beside = sorted(of_kind(results, Compared), key=lambda c: (c.material, c.end))
         out: list[Block] = []
         if shown:
             out += [*points(details([s.case for s in shown])), fits_table(shown)]

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.physics.rigs.base import Strip
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.report.blocks import Block, Table, Text, facts_table
 from bayesmembrane.report.runs import Film, Shown, by_points
@@ -59,13 +58,8 @@ def _table(s: Shown, before: str) -> Table:
 
 
 def _rig(film: Film) -> str:
-    """Its lengths, and for a strip what stress and stretch the page's forces and deflections stand for."""
+    """Its lengths, and what the page's forces and deflections stand for, if they are not what was measured."""
     rig = film.rig
     lengths = listed(f"{name.replace('_', ' ')} {1e3 * v:.4g} mm" for name, v in rig.lengths.items())
-    if not isinstance(rig, Strip):
-        return f"{rig.title}, {lengths}"
-    shown = rig.shown(film.thickness)
-    return (
-        f"{rig.title}, {lengths}; forces are nominal stress times width times thickness, 1 N for "
-        f"{shown['N'][0]:.4g} kPa, and 1 mm of deflection is {1e-3 * shown['m'][0]:.4g} of stretch"
-    )
+    remark = rig.remark_on_units(film.thickness)
+    return f"{rig.title}, {lengths}" + (f"; {remark}" if remark else "")

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bayesmembrane.data.importers.base import Written, import_export
-from bayesmembrane.data.measurement import read_measurement
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.ground.errors import BayesmembraneError, DataError, SettingsError, StorageError
 
 SPECIMEN = "[specimen]\nthickness_um = 50\n[rig]\nkind = 'annulus'\ninner_radius_mm = 10\nouter_radius_mm = 35\n"

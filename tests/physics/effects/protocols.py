@@ -3,7 +3,7 @@
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.data.motion import Path
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
@@ -11,13 +11,14 @@ from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.base import Rig
 
 RIG = Annulus(0.010, 0.035)
-FILMS = {
+CALIBRATED = {
     "neo_hookean": [7.5],
     "mooney_rivlin": [6.2, 0.4],
     "gent": [5.3, 40.0],
     "yeoh": [8.0, -0.2, 0.03],
     "ogden": [11.0, 0.2, -0.4, 1.5, 4.8, -1.2],
 }
+FILMS = {name: CALIBRATED.get(name, list(material.typical())) for name, material in materials().items()}
 
 
 def staircase(peaks: tuple[float, ...] = (0.02, 0.04, 0.04, 0.06), points: int = 25) -> np.ndarray:
@@ -63,5 +64,5 @@ def force(m: Measurement, *effects: str, x: np.ndarray | None = None, material: 
     return p.force[0]
 
 
-def path(d: np.ndarray, time: np.ndarray | None = None) -> Path:
-    return Path(d, time, float(np.max(d)))
+def path(d: np.ndarray, time: np.ndarray | None = None) -> Motion:
+    return Motion(d, time, float(np.max(d)))

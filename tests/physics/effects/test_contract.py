@@ -8,9 +8,11 @@ import pytest
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.composition import EFFECT_STEP, MOUNTING_STEP
-from bayesmembrane.physics.effects.base import RIGS, STAGES, Effect, Geometry, stage_number
+from bayesmembrane.physics.effects.base import STAGES, Effect, Geometry, stage_number
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.biaxial import Biaxial
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.physics.effects.protocols import RIG, force, measured, path, staircase, two_speeds, vector
 
 EFFECTS = {name: cls() for name, cls in components("effects").items()}
@@ -44,7 +46,7 @@ def test_it_is_documented(effect: Effect) -> None:
     assert len(effect.reference) > 20
     assert len(effect.signature) > 20
     assert effect.signature.rstrip()[-1] == "."
-    assert set(effect.rigs) <= set(RIGS)
+    assert any(effect.occurs_on(rig) for rig in components("rigs").values())
     assert effect.stage == STAGES[stage_number(effect)].stage
 
 
@@ -154,9 +156,10 @@ def test_slopes_are_those_of_the_force(effect: Effect, curve: Measurement) -> No
 @every
 def test_it_says_where_it_cannot_occur(effect: Effect) -> None:
     d = staircase()
-    assert effect.unavailable(RIG.name, path(d, two_speeds(d))) == ""
-    assert '"biaxial"' in effect.unavailable("biaxial", path(d, two_speeds(d)))
-    assert bool(effect.unavailable(RIG.name, path(d))) == effect.needs_time
+    assert effect.unavailable(RIG, path(d, two_speeds(d))) == ""
+    assert '"biaxial"' in effect.unavailable(Biaxial(), path(d, two_speeds(d)))
+    assert bool(effect.unavailable(Uniaxial(), path(d, two_speeds(d)))) == effect.needs_clamp
+    assert bool(effect.unavailable(RIG, path(d))) == effect.needs_time
 
 
 @every

@@ -10,7 +10,7 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.noise.ar1 import AR1
-from bayesmembrane.physics.noise.base import Noise
+from bayesmembrane.physics.noise.base import SD, Noise
 from bayesmembrane.physics.noise.white import White
 from bayesmembrane.physics.rigs.annulus import Annulus
 
@@ -40,7 +40,7 @@ def measurement(given: str, time: bool = False) -> Measurement:
 
 def draws(noise: Noise, count: int = 5) -> np.ndarray:
     rng = np.random.default_rng(SEED + 1)
-    return np.stack([rng.normal(p.prior.mean, 1.0, count) for p in noise.coordinates], axis=1)  # type: ignore[attr-defined]
+    return np.stack([rng.normal(p.prior.quantile(0.5), 1.0, count) for p in noise.coordinates], axis=1)
 
 
 MODELS = [components("noise")[name]() for name in components("noise")]
@@ -99,8 +99,10 @@ def test_component_is_complete(noise: Noise) -> None:
     assert pickle.loads(pickle.dumps(noise)) == noise
     x = draws(noise, 4)
     natural = noise.natural(x, 2.0)
-    assert natural.shape == (4, len(noise.field_names))
-    assert noise.field_names[0] == "sd"
+    assert natural.shape == (4, len(noise.natural_parameters))
+    assert noise.natural_parameters[0] == SD
+    assert all(p.unit and len(p.meaning) > 5 for p in noise.natural_parameters)
+    assert len(noise.title) > 5
     assert natural[:, 0] == pytest.approx(2.0 * np.exp(x[:, 0]))
     for p in noise.coordinates:
         assert np.isfinite(p.prior.log_density(p.prior.quantile(0.5)))

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from bayesmembrane.calibration.fit import fit
-from bayesmembrane.data.measurement import Measurement, Specimen, read_measurement, write_measurement
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.reading import read_measurement
+from bayesmembrane.data.writing import write_measurement
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.forward import Forward

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, together
-from bayesmembrane.comparison.evidence.target import Estimate
+from bayesmembrane.comparison.evidence.target import EvidenceEstimate
 from bayesmembrane.comparison.leave_out.score import LeaveOneOut
-from bayesmembrane.comparison.prior_widths import Widened
+from bayesmembrane.comparison.prior_widths import Unknown, Widened
 from bayesmembrane.comparison.result import Comparison, Row, ranked
 from bayesmembrane.data.published import read_published_table
+from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.page import TWIN, write_report
 from bayesmembrane.report.sections.evidence import sentences
@@ -23,16 +24,16 @@ from bayesmembrane.report.sections.evidence.tables import evidence_table, modes_
 def row(material: str, z: float, elpd: float, off: float = 0.0) -> Row:
     points = elpd / 10 + 0.02 * np.sin(np.arange(10) + len(material))
     loo = LeaveOneOut(float(points.sum()), 1.0, 0.01, points, np.zeros(10), (3,))
-    pair = {NESTED: Estimate(z + off, 0.1, 1, 1.0), BRIDGE: Estimate(z, 0.02, 1, 1.0)}
+    pair = {NESTED: EvidenceEstimate(z + off, 0.1, 1, 1.0), BRIDGE: EvidenceEstimate(z, 0.02, 1, 1.0)}
     widths = (
-        Widened(f"{material}.ln_gd", 0.5, 0.6, 0.05, 900.0, ""),
-        Widened(f"{material}.ln_gd", 2.0, float("nan"), float("nan"), 3.0, "too few"),
+        Widened(f"{material}.ln_gd", 0.5, 0.6, 0.05, 900.0, 0.1, None),
+        Widened(f"{material}.ln_gd", 2.0, float("nan"), float("nan"), 3.0, 0.1, Unknown.FEW),
     )
     return Row(material, hypothesis(material), together(pair), loo, None, None, None, widths, (), None, 1, 1.0, (), "")
 
 
 def compared(off: float = 0.0) -> dict[str, Comparison]:
-    lost = replace(row("ogden", 0, 0), evidence=None, loo=None, reason="it cannot be fitted")
+    lost = replace(row("ogden", 0, 0), evidence=None, loo=None, failure="it cannot be fitted")
     return {"OP1": ranked([row("neo_hookean", 4, 20), row("gent", 2.9, 19), row("yeoh", 10, 30, off), lost])}
 
 
@@ -86,7 +87,7 @@ def test_the_picture_is_drawn_with_and_without_a_ranking(off):
 def test_a_comparison_stands_alone_and_beside_the_published_table(tmp_path: Path) -> None:
     alone = json.loads((write_report([compared()["OP1"]], tmp_path / "a").parent / TWIN).read_text())
     assert alone["tables"]["glance"][0]["found"] == "Yeoh first"
-    assert any("prefers yeoh" in s for s in alone["answer"])
+    assert any("prefers Yeoh to neo-Hookean" in s for s in alone["answer"])
     beside = json.loads((write_report([compared(), read_published_table()], tmp_path / "b").parent / TWIN).read_text())
     assert "rankings" in beside["tables"]
     assert "rankings" not in alone["tables"]
@@ -94,6 +95,16 @@ def test_a_comparison_stands_alone_and_beside_the_published_table(tmp_path: Path
 
 def test_two_hypotheses_of_one_name_are_told_apart() -> None:
     one = compared()["OP1"]
-    twice = replace(one, rows=(one.rows[0], replace(one.rows[0], hypothesis=hypothesis("neo_hookean", noise="ar1"))))
-    told = [c[1] for c in evidence_table({"OP1": twice}).cells()]
+    rows = [
+        replace(one.rows[0], label=f"neo_hookean ({noise}, reached)", hypothesis=hypothesis("neo_hookean", noise=noise))
+        for noise in ("white", "ar1")
+    ]
+    told = [c[1] for c in evidence_table({"OP1": replace(one, rows=tuple(rows))}).cells()]
     assert told == ["neo-Hookean (white, reached)", "neo-Hookean (ar1, reached)"]
+
+
+def test_a_stored_comparison_gives_the_same_page(tmp_path: Path) -> None:
+    store(tmp_path / "answer", "comparison", compared(), {})
+    assert write_report([tmp_path / "answer"], tmp_path / "a").read_text() == (
+        write_report([compared()], tmp_path / "b").read_text()
+    )

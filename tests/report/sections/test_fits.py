@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bayesmembrane.calibration.fit import Estimate, Fit
+from bayesmembrane.calibration.fit import Fit, FittedParameter
+from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.page import TWIN, write_report
 from bayesmembrane.words.calibration import fit_sentence
@@ -16,9 +17,9 @@ AT = np.linspace(0.001, 0.035, 9)
 
 def fitted() -> Fit:
     parameters = {
-        "yeoh.c1": Estimate(8.8, 0.1, "N/m"),
-        "yeoh.c2": Estimate(-0.6, 0.02, "N/m"),
-        "yeoh.c3": Estimate(0.05, None, "N/m"),
+        "yeoh.c1": FittedParameter(8.8, 0.1, "N/m"),
+        "yeoh.c2": FittedParameter(-0.6, 0.02, "N/m"),
+        "yeoh.c3": FittedParameter(0.05, None, "N/m"),
     }
     margins = {"reached": 0.1, "box": 0.1, "elliptic": 0.1, "none": 0.1}
     found = Fit(
@@ -46,4 +47,22 @@ def test_a_bound_and_a_prior_that_is_not_met_are_said() -> None:
     assert "the least loss is 0.02 instead of 0.01 N" in told
     assert "no film that meets the convexity prior was found" in fit_sentence(
         replace(found, margins={"reached": -0.1}, constrained=None)
+    )
+
+
+def test_a_fit_that_found_nothing_says_why(tmp_path: Path) -> None:
+    nothing = np.full(9, np.nan)
+    lost = replace(
+        fitted(), force=nothing, loss_N=np.nan, rmse_N=np.nan, max_N=np.nan, margins={"reached": np.nan},
+        constrained=None, status="no film reaches the data.",
+    )  # fmt: skip
+    page = write_report([lost], tmp_path).read_text()
+    assert "Yeoh up to 35 mm: no film reaches the data." in page
+    assert "nan" not in page.split("<main>")[1].split("base64")[0]
+
+
+def test_a_stored_fit_gives_the_same_page(tmp_path: Path) -> None:
+    store(tmp_path / "answers" / "fit", "fit", fitted(), {})
+    assert write_report([tmp_path / "answers"], tmp_path / "a").read_text() == (
+        write_report([fitted()], tmp_path / "b").read_text()
     )

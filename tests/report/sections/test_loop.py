@@ -16,6 +16,7 @@ from bayesmembrane.diagnosis.left.discrepancy import discrepancy
 from bayesmembrane.diagnosis.loop import Loop, Round, Stage
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.separation import Experiment
+from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.report.blocks import Figure, Points, Table
@@ -328,3 +329,11 @@ def test_a_loop_and_a_diagnosis_stand_alone(tmp_path: Path, named: Loop) -> None
     assert (before["model"], after["model"]) == ("neo-Hookean", "neo-Hookean with friction in the guide")
     assert after["heldout_rmse_mN"] < before["heldout_rmse_mN"]
     assert twin["tables"]["glance"][0]["found"] == "named: neo-Hookean with friction in the guide"
+
+
+def test_a_stored_diagnosis_gives_the_same_page(tmp_path: Path, named: Loop) -> None:
+    d = only(named, "named")
+    store(tmp_path / "answer", "diagnosis", d, {})
+    assert write_report([tmp_path / "answer"], tmp_path / "a").read_text() == (
+        write_report([d], tmp_path / "b").read_text()
+    )

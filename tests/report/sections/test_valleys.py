@@ -13,6 +13,7 @@ from matplotlib.image import imread
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.registry import material
+from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.report.page import write_report
@@ -88,3 +89,10 @@ def test_answer_and_picture_are_written_and_read_back(one: Valleys, tmp_path: Pa
     (tmp_path / "file").write_text("")
     with pytest.raises(StorageError, match="cannot be written"):
         write_valleys(one, tmp_path / "file")
+
+
+def test_stored_valleys_give_the_same_page(two: Valleys, tmp_path: Path) -> None:
+    store(tmp_path / "answer", "valleys", two, {})
+    assert write_report([tmp_path / "answer"], tmp_path / "a").read_text() == (
+        write_report([two], tmp_path / "b").read_text()
+    )

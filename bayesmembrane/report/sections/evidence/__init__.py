@@ -13,8 +13,9 @@ from bayesmembrane.report.blocks import Block, Figure, Points
 from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
 from bayesmembrane.report.sections.evidence.figures import comparison_picture
 from bayesmembrane.report.sections.evidence.tables import evidence_table, modes_table, ranking_table, widths_table
+from bayesmembrane.words import comparison as words
 from bayesmembrane.words.beside_paper import PaperLosses, order_sentences, paper_losses
-from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.comparison import called
 from bayesmembrane.words.language import listed
 
 UNNAMED = "the data"
@@ -56,14 +57,14 @@ class EvidenceSection(Section):
             Glance(
                 "comparison",
                 f"{len(c.rows)} hypotheses on {name}",
-                f"{spoken(c.ranking[0].hypothesis)} first" if c.ranking else "no ranking",
+                f"{called(c.ranking[0])} first" if c.ranking else "no ranking",
             )
             for name, c in by_range(results).items()
         ]
 
     def subject(self, results: Sequence[Any]) -> Subject | None:
         found = by_range(results)
-        names = listed(dict.fromkeys(spoken(r.hypothesis) for c in found.values() for r in c.rows))
+        names = listed(dict.fromkeys(called(r) for c in found.values() for r in c.rows))
         return Subject((), f"A comparison of {names}.") if found else None
 
 
@@ -82,7 +83,7 @@ def sentences(found: Mapping[str, Comparison], paper: PaperLosses) -> list[str]:
     """What each range says, whether it survives other priors, and every difference to the paper's ranking."""
     told = []
     for name, c in found.items():
-        own = [s for s in (c.reason, c.sentence, c.survival) if s] + order_sentences(c, paper.get(name, {}))
+        own = words.sentences(c) + order_sentences(c, paper.get(name, {}))
         told += [f"{name}: {s}" for s in own]
     return told
 
@@ -92,5 +93,5 @@ def _paper(results: Sequence[Any]) -> PaperLosses:
 
 
 def _alternative_text(found: Mapping[str, Comparison]) -> str:
-    names = listed(dict.fromkeys(spoken(r.hypothesis) for c in found.values() for r in c.rows))
+    names = listed(dict.fromkeys(called(r) for c in found.values() for r in c.rows))
     return f"Evidence and leave-one-out prediction of {names}, relative to the best, for {listed(found)}"

@@ -14,7 +14,7 @@ from bayesmembrane.comparison.result import Comparison, Row
 from bayesmembrane.report.blocks import Picture
 from bayesmembrane.report.canvas import encoded, new_figure, style
 from bayesmembrane.report.style import FAINT, INK, MUTED, SHADE, colour
-from bayesmembrane.words.hypothesis import spoken_apart
+from bayesmembrane.words.comparison import called
 
 _FILLED = {NESTED: False, BRIDGE: True}
 LINEAR = 3.0  # differences up to here are drawn to scale, larger ones by their logarithm
@@ -36,7 +36,7 @@ def comparison_picture(found: Mapping[str, Comparison], kind: str = "svg") -> Pi
             _evidence(axes[i, 0], rows, found[name].agreed)
             _prediction(axes[i, 1], rows)
             axes[i, 0].set_title(f"Fitted {name}" if name.startswith("up to") else name)
-            axes[i, 0].set_yticks(range(len(rows)), spoken_apart([r.hypothesis for r in rows]))
+            axes[i, 0].set_yticks(range(len(rows)), [called(r) for r in rows])
             axes[i, 0].set_ylim(len(rows) - 0.5, -0.5)
         axes[-1, 0].set_xlabel("ln Z minus that of the best (-)")
         axes[-1, 1].set_xlabel("elpd minus that of the best (-)")
@@ -59,7 +59,7 @@ def _evidence(ax: Axes, rows: Sequence[Row], agreed: bool) -> None:
         for name, shift in ((NESTED, -0.14), (BRIDGE, 0.14)):
             value, sd = row.evidence.log_evidence[name] - best, row.evidence.log_evidence_sd[name]
             least = min(least, value)
-            _point(ax, value, sd, y + shift, colour(row.hypothesis.material.name), "o", _FILLED[name])
+            _point(ax, value, sd, y + shift, (colour(row.hypothesis.label()), "o", _FILLED[name]))
     _finished(ax, len(rows), least)
     if not agreed:
         ax.text(0.02, 0.04, "no ranking: the estimators disagree", transform=ax.transAxes, color=MUTED, fontsize=9)
@@ -75,11 +75,13 @@ def _prediction(ax: Axes, rows: Sequence[Row]) -> None:
         d = row.loo.pointwise - best.pointwise
         value, se = float(np.sum(d)), float(np.sqrt(d.size * np.var(d)))
         least = min(least, value)
-        _point(ax, value, se, y, colour(row.hypothesis.material.name), "s", True)
+        _point(ax, value, se, y, (colour(row.hypothesis.label()), "s", True))
     _finished(ax, len(rows), least)
 
 
-def _point(ax: Axes, value: float, sd: float, y: float, c: str, symbol: str, filled: bool) -> None:
+def _point(ax: Axes, value: float, sd: float, y: float, kind: tuple[str, str, bool]) -> None:
+    """A value with two standard errors; ``kind`` : colour, marker, whether it is filled."""
+    c, symbol, filled = kind
     ax.plot([value - 2 * sd, value + 2 * sd], [y, y], color=c, linewidth=1.8, solid_capstyle="butt", zorder=3)
     ax.plot([value], [y], symbol, color=c, markersize=6, markerfacecolor=c if filled else "white", zorder=4)
 

@@ -11,7 +11,8 @@ from bayesmembrane.comparison.result import Comparison, Row
 from bayesmembrane.physics.convexity import MODES
 from bayesmembrane.report.blocks import Column, Table, Value
 from bayesmembrane.words.beside_paper import PaperLosses
-from bayesmembrane.words.hypothesis import material_title, spoken, spoken_apart
+from bayesmembrane.words.comparison import called, remark
+from bayesmembrane.words.hypothesis import material_title
 
 _EVIDENCE = (
     Column("range", "range"),
@@ -32,11 +33,7 @@ _EVIDENCE = (
 
 def evidence_table(found: Mapping[str, Comparison]) -> Table:
     """One row for each range and hypothesis."""
-    rows = tuple(
-        _evidence(name, words, r)
-        for name, c in found.items()
-        for words, r in zip(spoken_apart([r.hypothesis for r in c.rows]), c.rows, strict=True)
-    )
+    rows = tuple(_evidence(name, r) for name, c in found.items() for r in c.rows)
     caption = (
         "Evidence ln Z by two estimators, divided by the prior mass that convexity leaves, each with its standard "
         "error; expected log predictive density of points left out, with exact refits where importance weights fail; "
@@ -45,11 +42,11 @@ def evidence_table(found: Mapping[str, Comparison]) -> Table:
     return Table("evidence", caption, _EVIDENCE, rows)
 
 
-def _evidence(name: str, words: str, row: Row) -> tuple[Value, ...]:
+def _evidence(name: str, row: Row) -> tuple[Value, ...]:
     e, loo = row.evidence, row.loo
     return (
         name,
-        words,
+        called(row),
         e.log_evidence[NESTED] if e else None,
         e.log_evidence_sd[NESTED] if e else None,
         e.log_evidence[BRIDGE] if e else None,
@@ -60,7 +57,7 @@ def _evidence(name: str, words: str, row: Row) -> tuple[Value, ...]:
         len(loo.refitted) if loo else None,
         row.rest.rmse_N if row.rest else None,
         row.prior_mass.value if row.prior_mass else None,
-        row.reason or (e.reason if e else "") or "-",
+        remark(row) or "-",
     )
 
 
@@ -74,7 +71,7 @@ def modes_table(found: Mapping[str, Comparison]) -> Table | None:
     for name, c in found.items():
         for r in (r for r in c.rows if r.modes):
             by_mode = {m.mode: m for m in r.modes}
-            cells: list[Value] = [name, spoken(r.hypothesis)]
+            cells: list[Value] = [name, called(r)]
             for mode in MODES:
                 m = by_mode[mode]
                 cells += [m.log_evidence, m.sd, m.mass]
@@ -107,7 +104,7 @@ def widths_table(found: Mapping[str, Comparison]) -> Table:
             for parameter in dict.fromkeys(w.parameter for w in r.widths):
                 half, twice = by.get((parameter, 0.5)), by.get((parameter, 2.0))
                 cells = [v for w in (half, twice) for v in ((w.change, w.sd) if w else (None, None))]
-                rows.append((name, spoken(r.hypothesis), parameter, *cells))
+                rows.append((name, called(r), parameter, *cells))
     caption = (
         "Change of ln Z when the prior of one coordinate is half or twice as wide, by reweighting the draws; a dash "
         "where the draws cannot tell."
@@ -130,8 +127,8 @@ def ranking_table(found: Mapping[str, Comparison], paper: PaperLosses) -> Table 
         fitted = [r for r in c.rows if r.evidence is not None]
         if not losses or not fitted:
             continue
-        ours = [spoken(r.hypothesis) for r in c.ranking] or ["no ranking"] * len(fitted)
-        loo = [spoken(r.hypothesis) for r in sorted(fitted, key=lambda r: -r.loo.elpd if r.loo else np.inf)]
+        ours = [called(r) for r in c.ranking] or ["no ranking"] * len(fitted)
+        loo = [called(r) for r in sorted(fitted, key=lambda r: -r.loo.elpd if r.loo else np.inf)]
         theirs = [f"{material_title(m)} ({losses[m]:.3g} N)" for m in sorted(losses, key=lambda m: losses[m])]
         for i in range(max(len(ours), len(theirs))):
             row = [names[i] if i < len(names) else "-" for names in (ours, loo, theirs)]

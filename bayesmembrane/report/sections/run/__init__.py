@@ -9,7 +9,6 @@ from typing import Any
 from bayesmembrane.calibration import store
 from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.calibration.run import Run
-from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.report.blocks import Block, Figure, Heading, Part, Text
 from bayesmembrane.report.runs import Shown, in_order, read
 from bayesmembrane.report.sections.base import Glance, Section, of_kind
@@ -177,8 +176,8 @@ def _traces(s: Shown) -> Figure:
 def _map(s: Shown) -> Figure:
     d = s.digest
     shares = listed(f"{m} {percent(v)}" for m, v in d.convex.items())
-    annulus = isinstance(s.film.rig, Annulus)
-    states = "the states that its film passes from the ring to the disc" if annulus else "the state of the film"
+    alike = s.film.rig.homogeneous
+    states = "the state of the film" if alike else "the states that its film passes from the ring to the disc"
     plane = Plane(d.map_1, d.map_2, d.eigenvalue, d.shape_at, d.state_1, d.state_2)
     return Figure(
         convexity_map(plane, s.material),
@@ -191,11 +190,11 @@ def _map(s: Shown) -> Figure:
 
 def _profiles(s: Shown) -> list[Block]:
     """The lifted film; a strip is as long as it is stretched, and needs no picture."""
-    d, rig = s.digest, s.film.rig
-    if not isinstance(rig, Annulus):
+    d, ring = s.digest, s.film.rig.ring()
+    if ring is None:
         return []
     at = listed(f"{1e3 * x:.3g}" for x in d.shape_at)
-    shapes = Shapes(d.shape_at, d.shape_radius, d.shape_height, rig.inner_radius, rig.outer_radius)
+    shapes = Shapes(d.shape_at, d.shape_radius, d.shape_height, *ring)
     return [
         Figure(
             profiles(shapes, s.look),

@@ -20,6 +20,7 @@ from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed
+from bayesmembrane.words.valleys import document, sentences
 
 ANSWER, PICTURE, BESIDE = "valleys.json", "valleys.png", "valleys_beside.png"
 
@@ -43,7 +44,7 @@ class ValleysSection(Section):
         return [valley_table(found), *each] if found else ()
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
-        return [s for r in results if isinstance(r, Valleys | Beside) for s in r.sentences[:1]]
+        return [s for r in results if isinstance(r, Valleys | Beside) for s in sentences(r)[:1]]
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
         return [
@@ -86,7 +87,7 @@ def _blocks(found: Valleys | Beside) -> list[Block]:
         caption="Films that fit nearly as well as the best one, over the membrane parameters; the loss is the "
         "Euclidean norm of the residual (N), without convexity prior.",
     )
-    return [*out, figure, Points(tuple(found.sentences)), *(next_table(v) for v in added.ranges if v.next_tests)]
+    return [*out, figure, Points(sentences(found)), *(next_table(v) for v in added.ranges if v.next_tests)]
 
 
 def write_valleys(found: Valleys | Beside, out: Path) -> tuple[Path, ...]:
@@ -97,7 +98,7 @@ def write_valleys(found: Valleys | Beside, out: Path) -> tuple[Path, ...]:
     added = found.added if isinstance(found, Beside) else found
     pictures: dict[str, Picture] = {BESIDE: beside_picture(found)} if isinstance(found, Beside) else {}
     pictures[PICTURE] = valley_picture(added)
-    written = [write_text(out / ANSWER, json_text(found.summary()), "the valleys")]
+    written = [write_text(out / ANSWER, json_text(document(found)), "the valleys")]
     for name, picture in pictures.items():
         written.append(write_whole(out / name, partial(_fill, picture), "the valleys"))
     return tuple(written)

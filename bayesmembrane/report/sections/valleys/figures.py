@@ -19,6 +19,8 @@ from bayesmembrane.report.sections.valleys.pairs import label, pairs, percent
 from bayesmembrane.report.style import FAINT, INK, MUTED, RANGE_COLOURS, with_unit
 from bayesmembrane.valleys.posterior import Grid
 from bayesmembrane.valleys.result import Valley, Valleys
+from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.valleys import limit_title
 
 HELD = 0.9
 DECADES = 1000.0  # how far an open end on a logarithmic axis is drawn past the closed one
@@ -120,7 +122,7 @@ def _overview(ax: Axes, found: Valleys, order: tuple[int, int]) -> None:
             bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.5},
         )
     rise = percent(found.ranges[0])
-    ax.set_title(f"{found.hypothesis.material.title}: all films that fit within {rise} of the best loss")
+    ax.set_title(f"{spoken(found.hypothesis)}: all films that fit within {rise} of the best loss")
     _axis_labels(ax, found.ranges[0], order)
 
 
@@ -221,7 +223,7 @@ def _open_arrow(ax: Axes, v: Valley, order: tuple[int, int], c: str) -> None:
     side = 1.0 if high.open else 0.0
     line = v.floor[np.argsort(v.floor[:, order[0]])]
     at = float(np.interp(ax.get_xlim()[int(side)], line[:, order[0]], line[:, order[1]]))
-    goal = f"open: on to the {v.limit} film" if v.limit else "open: no end"
+    goal = f"open: on to the {limit_title(v)} film" if v.limit else "open: no end"
     ax.annotate(
         goal,
         (side, at),

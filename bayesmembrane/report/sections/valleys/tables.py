@@ -9,6 +9,7 @@ from bayesmembrane.report.blocks import Column, Table, Value
 from bayesmembrane.valleys.next_tests import ASSUMPTION
 from bayesmembrane.valleys.result import Valley, Valleys
 from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.valleys import limit_title
 
 TESTS = 5
 
@@ -54,7 +55,7 @@ def _row(v: Valley) -> tuple[Value, ...]:
         v.length(v.metric),
         v.metric.unit if v.metric.unit != "-" else "ln",
         v.spectra[0].condition_number,
-        (f"{opened}: {v.limit or 'no end'}" if opened else "no"),
+        (f"{opened}: {limit_title(v) or 'no end'}" if opened else "no"),
         ", ".join(f"{100 * v.share(m.name):.3g} %" for m in RESTRICTING),
         inside,
         "-" if first is None else f"{first.test}: {100 * first.reduction:.0f} %",
@@ -71,5 +72,5 @@ def next_table(v: Valley) -> Table:
     )
     rows = tuple((t.test, t.reduction, t.axis_before, t.axis_after) for t in v.next_tests[:TESTS])
     name = f"next measurements {v.hypothesis.material.name} {1e3 * v.end:.4g} mm"
-    caption = f"{v.hypothesis.material.title}, fitted up to {1e3 * v.end:.4g} mm: what to measure next. {ASSUMPTION}"
+    caption = f"{spoken(v.hypothesis)}, fitted up to {1e3 * v.end:.4g} mm: what to measure next. {ASSUMPTION}"
     return Table(name, caption, columns, rows)

@@ -1,21 +1,86 @@
-"""What the valleys say, in words."""
+"""What the valleys say, in words, and the JSON answer of ``valleys``."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.convexity import RESTRICTING
-from bayesmembrane.valleys.profile import End
-from bayesmembrane.valleys.result import Valley
+from bayesmembrane.valleys.beside import Beside
+from bayesmembrane.valleys.next_tests import ASSUMPTION
+from bayesmembrane.valleys.profile import End, Ending
+from bayesmembrane.valleys.result import Between, Valley, Valleys
+from bayesmembrane.words.hypothesis import spoken, title
+from bayesmembrane.words.language import listed
 
 FEW = 2  # open ends that have a sentence each
 CLOSE = 2.0  # posterior standard deviations within which two valleys count as compatible
+UNIT = "posterior standard deviations (Mahalanobis, the sum of both posterior covariances)"
+ENDINGS = {
+    Ending.RISES: "",
+    Ending.NO_FILM: "beyond it no film reaches the data",
+    Ending.NOT_FOLLOWED: "not followed to the end",
+    Ending.TENDS: "the loss stays within the rise and tends to a limit",
+    Ending.CHANGES: "the loss stays within the rise and still changes",
+}
 
 
-def sentences_of(v: Valley) -> tuple[str, ...]:
+def document(found: Valleys | Beside) -> dict[str, Any]:
+    """The JSON answer of ``valleys``; with effects, that without them stands beside it."""
+    if isinstance(found, Valleys):
+        return _document(found)
+    return {
+        **_document(found.added),
+        "without_effects": _document(found.without),
+        "beside": [{**_approach(c), "sentence": sentence_beside(a, b, c)} for a, b, c in found.compared],
+        "sentences": list(sentences(found)),
+    }
+
+
+def sentences(found: Valleys | Beside) -> tuple[str, ...]:
+    """All that a reader should know; what effects do to the valley comes first."""
+    if isinstance(found, Valleys):
+        every = [s for v in found.ranges for s in valley_sentences(v)]
+        return (*every, *(sentence_between(a, b, c) for a, b, c in found.compared))
+    beside = (sentence_beside(a, b, c) for a, b, c in found.compared)
+    return (*beside, *sentences(found.added), *(f"Without effects: {s}" for s in sentences(found.without)))
+
+
+def _document(found: Valleys) -> dict[str, Any]:
+    every = [{**_approach(c), "sentence": sentence_between(a, b, c)} for a, b, c in found.compared]
+    return {
+        **found.summary(),
+        "ranges": [_valley(v) for v in found.ranges],
+        "closest_approach": every[0] if every else None,
+        "approaches": every,
+        "sentences": list(sentences(found)),
+    }
+
+
+def _approach(between: Between) -> dict[str, Any]:
+    return {**between.summary(), "unit": UNIT}
+
+
+def _valley(v: Valley) -> dict[str, Any]:
+    values = v.summary()
+    profiles = zip(values["profiles"].items(), v.profiles, strict=True)
+    return {
+        **values,
+        "limit": limit_title(v),
+        "profiles": {n: {**part, "reason": [ENDINGS[e.ending] for e in p.ends]} for (n, part), p in profiles},
+        "next_measurements_assume": ASSUMPTION,
+        "sentences": list(valley_sentences(v)),
+    }
+
+
+# ---- one valley ------------------------------------------------------------------------------------------------------
+
+
+def valley_sentences(v: Valley) -> tuple[str, ...]:
     """What is to be said of one valley."""
     told = [_where(v), *_edge(v), *_open(v), *_basins(v), *_nothing_needed(v), *_modes(v), *_published(v), *_next(v)]
     if v.unreached > 0:
@@ -25,11 +90,6 @@ def sentences_of(v: Valley) -> tuple[str, ...]:
 
 def _names(v: Valley) -> list[str]:
     return [n.partition(".")[2] for n in v.chart.names]
-
-
-def titled(v: Valley) -> str:
-    """Material and effects for people: ``Gent + zero offset``."""
-    return " + ".join([v.hypothesis.material.title, *(e.name.replace("_", " ") for e in v.hypothesis.effects)])
 
 
 def _range(v: Valley) -> str:
@@ -49,7 +109,7 @@ def _where(v: Valley) -> str:
     number = v.spectra[0].condition_number
     ratio = f", condition number {number:.3g}" if np.isfinite(number) and v.best.size > 1 else ""
     return (
-        f"{_range(v)} every {titled(v)} film between ({point(v, v.floor[0])}) and "
+        f"{_range(v)} every {spoken(v.hypothesis)} film between ({point(v, v.floor[0])}) and "
         f"({point(v, v.floor[-1])}) on the valley's floor fits within {share:.3g} % of the least loss, "
         f"{v.best_loss:.4g} N{long}{ratio}."
     )
@@ -109,7 +169,7 @@ def _open_end(v: Valley, i: int, end: End, far: str) -> str:
     goal = "zero" if abs(end.value) < abs(float(v.best[i])) or (v.chart.log[i] and far == "low") else "infinity"
     if v.chart.log[i] and v.chart.sign[i] < 0 and far == "high":
         goal = "minus infinity" if goal == "infinity" else goal
-    limit = f", that of a {v.limit} film" if v.limit and i == v.along else ""
+    limit = f", that of a {limit_title(v)} film" if v.limit and i == v.along else ""
     edge = f"the loss {'tends to' if end.tends else 'is still'} {end.loss:.4g} N{limit}"
     low, high = v.profiles[i].ends
     other = low if far == "high" else high
@@ -167,11 +227,19 @@ def _next(v: Valley) -> list[str]:
     ]
 
 
-def sentence_between(a: Valley, b: Valley, distance: float, crossing: Sequence[float] | None) -> str:
+def limit_title(v: Valley) -> str:
+    """The simpler material whose loss is that of an open end, as it is printed; "" without any."""
+    return material(v.limit).title if v.limit else ""
+
+
+# ---- two valleys -----------------------------------------------------------------------------------------------------
+
+
+def sentence_between(a: Valley, b: Valley, found: Between) -> str:
     """How two valleys lie to each other."""
-    both = f"The valleys up to {1e3 * a.end:.4g} and {1e3 * b.end:.4g} mm"
-    if crossing is not None:
-        return f"{both} cross at ({point(a, crossing)})."
+    distance, both = found.approach.distance, f"The valleys up to {1e3 * a.end:.4g} and {1e3 * b.end:.4g} mm"
+    if found.crossing is not None:
+        return f"{both} cross at ({point(a, found.crossing)})."
     if not np.isfinite(distance):
         return f"{both} cannot be compared: a posterior has no spread."
     if distance < CLOSE:
@@ -179,4 +247,25 @@ def sentence_between(a: Valley, b: Valley, distance: float, crossing: Sequence[f
     return (
         f"{both} stay apart: at their closest approach they are {distance:.3g} posterior standard deviations from each "
         "other, so that no one set of parameters serves both ranges."
+    )
+
+
+def sentence_beside(a: Valley, b: Valley, found: Between) -> str:
+    """What the effects of ``b`` do to the valley ``a``."""
+    names = listed(map(title, b.hypothesis.effects))
+    change = 100 * (b.best_loss / a.best_loss - 1)
+    n = a.best.size
+    loss = (
+        f"{abs(change):.2g} % {'lower' if change < 0 else 'higher'}, {b.best_loss:.3g} N instead of {a.best_loss:.3g}"
+    )
+    start = (
+        f"Up to {1e3 * a.end:.4g} mm, with {names} the least loss is {loss}, and the optimum of "
+        f"{a.hypothesis.material.title} moves from ({point(a, a.best)}) to ({point(a, b.best[:n])})"
+    )
+    distance = found.approach.distance
+    if distance < CLOSE:
+        return f"{start}; the valleys with and without come as close as {distance:.2g} posterior standard deviations."
+    return (
+        f"{start}; the valleys with and without stay {distance:.3g} posterior standard deviations apart, so that the "
+        "material's parameters depend on the effects assumed."
     )

@@ -1,0 +1,62 @@
+"""The parts of a comparison beside their run, in its folder ``comparison``, so that each is computed once.
+
+bridge, nested, again, loo, widths, range and modes, each with the key of what it was made from.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from bayesmembrane.calibration.store import ASKED, STATUS, claim, is_finished
+from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.stored import answer, read, store
+
+FOLDER = "comparison"
+
+Part = TypeVar("Part")
+
+
+def run_folder(out: Path, name: str, asked: dict[str, Any]) -> Path:
+    """The folder in ``out`` of the run that was ``asked`` for: one that serves, or a new one called ``name``."""
+    for path in sorted(out.glob(f"*/{ASKED}")):
+        if serves(path.parent, asked):
+            return path.parent
+    return claim(out / name, asked)
+
+
+def serves(folder: Path, asked: Mapping[str, Any]) -> bool:
+    """Whether a folder holds a finished run with the same data, hypothesis, seed and code, and no fewer draws."""
+    try:
+        held = tomllib.loads((folder / ASKED).read_text(encoding="utf-8"))
+        same = all(held[part] == asked[part] for part in ("seed", "hypothesis", "code"))
+        same = same and held["data"]["sha256"] == asked["data"]["sha256"]
+        if not same or not is_finished(folder):
+            return False
+        status = json.loads((folder / STATUS).read_text(encoding="utf-8"))
+        return bool(status["ess_bulk"] >= asked["sampling"]["ess"])
+    except (OSError, ValueError, KeyError):
+        return False
+
+
+def kept(run: Path | None, name: str, key: str, make: Callable[[], Part]) -> Part:
+    """What ``make`` returns; read from the folder of the ``run`` if that was made with the same ``key``.
+
+    Raises `StorageError` if it cannot be written. A part that cannot be read is made again.
+    """
+    if run is None:
+        return make()
+    folder, digest = run / FOLDER, hashlib.sha256(key.encode()).hexdigest()
+    try:
+        if (answer(folder, name) or {}).get("key") == digest:
+            found: Part = read(folder, name)
+            return found
+    except StorageError:
+        pass  # damaged: made again below
+    part = make()
+    store(folder, name, part, {"key": digest})
+    return part

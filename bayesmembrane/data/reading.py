@@ -1,0 +1,162 @@
+"""From a CSV file and the TOML file beside it to a `Measurement`, or to one sentence that says why not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from bayesmembrane.data.fixture import Fixture
+from bayesmembrane.data.measurement import Measurement, Provenance, Specimen, check_covariance
+from bayesmembrane.data.settings import TomlSection, load_toml
+from bayesmembrane.data.tables import TextTable, parse_table, read_matrix, read_text
+from bayesmembrane.ground.errors import DataError
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import components
+from bayesmembrane.ground.units import FORCE, LENGTH, TIME
+
+# What lies beyond these is a wrong unit, not a film.
+THICKNESSES = (1e-8, 5e-3)  # m
+RIG_SIZES = (1e-6, 1.0)  # m
+LARGEST_LIFT = 20.0  # largest deflection relative to the size of the rig
+LEAST_SD = 1e-12  # N
+
+T = TypeVar("T")
+
+
+def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measurement:
+    """The measurement in a CSV file and the TOML file beside it, in SI.
+
+    Raises `DataError`, and nothing else, whatever the files hold: one sentence with file, line and column.
+    """
+    curve_csv, specimen_toml = Path(curve_csv), Path(specimen_toml)
+    table = parse_table(read_text(curve_csv), str(curve_csv))
+    root = load_toml(specimen_toml)
+    rig = _rig(root.section("rig"))
+    specimen = _specimen(root.section("specimen"), rig, curve_csv.stem)
+    options = root.section("measurement", required=False)
+    columns, notes = curve_columns(table, rig.columns, rig.noise)
+    found = _at(table.file, rig.from_columns, columns, specimen.thickness)
+    deflection, force, across = found["deflection"], found["force"], found.get("across")
+    rig.check_readings(found, table.file, table.lines)
+    _check_size(deflection, table, rig)
+    single = _stated(options, rig, specimen.thickness)
+    sd, covariance, covariance_file = _noise(options, single, found.get("force_sd"), force.size)
+    origin = [options.text("origin"), root.section("origin", required=False).all_text()]
+    for section in (options, root):
+        section.finish()
+    provenance = Provenance(
+        curve_csv.name,
+        specimen_toml.name,
+        covariance_file,
+        "; ".join(o for o in origin if o),
+        (*notes, *rig.remarks(found)),
+    )
+    if sd is not None and np.min(sd) < LEAST_SD:
+        fault = f"a standard deviation of {np.min(sd):g} N looks like a wrong unit"
+        raise DataError(fault, options.where, "check the unit of the noise")
+    return Measurement(deflection, force, rig, specimen, found.get("time"), sd, covariance, provenance, across=across)
+
+
+def _rig(section: TomlSection) -> Fixture:
+    kind = section.text("kind", required=True)
+    known = components("rigs")
+    if kind not in known:
+        supported = f"supported: {', '.join(known)}"
+        raise DataError(f'there is no rig of the kind "{kind}"', section.where, supported)
+    cls: type[Fixture] = known[kind]
+    required = {name: not cls.has_default(name) for name in cls.length_names()}
+    lengths = {name: section.measure(name, LENGTH, f"{name}_mm", need) for name, need in required.items()}
+    section.finish()
+    rig = _at(section.where, partial(cls, **{k: v for k, v in lengths.items() if v is not None}))
+    if not RIG_SIZES[0] <= rig.size() <= RIG_SIZES[1]:
+        raise DataError(f"a rig of {rig.size():g} m looks like a wrong unit", section.where, "check the units")
+    return rig
+
+
+def _specimen(section: TomlSection, rig: Fixture, default_name: str) -> Specimen:
+    name = section.text("name") or default_name
+    thickness = section.measure("thickness", LENGTH, "thickness_um")
+    section.finish()
+    specimen = _at(section.where, Specimen, name, thickness)
+    if not THICKNESSES[0] <= specimen.thickness <= THICKNESSES[1]:
+        fault = f"a film {1e3 * specimen.thickness:g} mm thick looks like a wrong unit"
+        raise DataError(fault, section.where, "check the unit in the name of the key")
+    return specimen
+
+
+def _at(where: str, cls: Callable[..., T], *values: Any) -> T:
+    """``cls(*values)``, with the place in front of what it complains about."""
+    try:
+        return cls(*values)
+    except DataError as error:
+        raise DataError(error.what, where, error.remedy) from None
+
+
+def curve_columns(
+    table: TextTable, required: Mapping[str, str] = Fixture.columns, noise: Mapping[str, str] = Fixture.noise
+) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """The columns of a curve in SI, (N,) each, by name: ``required`` ones, time and ``noise``; a note on the others.
+
+    Both map names to quantities. Raises `DataError` if one is missing or holds what is no number, and for
+    fewer than two points.
+    """
+    places = {name: table.require(name, quantity) for name, quantity in required.items()}
+    for name, quantity in (("time", TIME), *noise.items()):
+        if (place := table.find(name, quantity)) is not None:
+            places[name] = place
+    if len(table.rows) < 2:
+        raise DataError(f"a curve needs at least two points, and this one has {len(table.rows)}", table.file)
+    used = {index for index, _ in places.values()}
+    ignored = [h for i, h in enumerate(table.header) if i not in used and h]
+    notes = (f"ignored columns: {', '.join(ignored)}",) if ignored else ()
+    return {name: table.column(*place) for name, place in places.items()}, notes
+
+
+def _check_size(deflection: Array, table: TextTable, rig: Fixture) -> None:
+    k = int(np.argmax(deflection))
+    row = table.lines[k % len(table.lines)]
+    if deflection[k] > LARGEST_LIFT * rig.size():
+        fault = (
+            f"a deflection of {1e3 * deflection[k]:g} mm on a rig of {1e3 * rig.size():g} mm looks like a wrong unit"
+        )
+        raise DataError(fault, f"{table.file}, line {row}", "check the unit in the header")
+
+
+def _stated(options: TomlSection, rig: Fixture, thickness: float) -> float | None:
+    """N, the standard deviation that the specimen file states for all points, or None; in any quantity of the rig."""
+    found = {}
+    for name, quantity in rig.noise.items():
+        value = options.measure(name, quantity, f"{name}_{'N' if quantity == FORCE else 'MPa'}", required=False)
+        if value is not None:
+            found[name] = value * rig.newton(quantity, thickness)
+    if len(found) > 1:
+        raise DataError(f"{' and '.join(found)} both give the noise", options.where, "remove one of them")
+    return next(iter(found.values()), None)
+
+
+def _noise(
+    options: TomlSection, single: float | None, column: Array | None, n: int
+) -> tuple[Array | None, Array | None, str]:
+    """(force_sd, covariance, file of the covariance) from the specimen file and the column."""
+    name = options.text("covariance")
+    if single is not None and (name or column is not None):
+        other = "covariance" if name else "column force_sd"
+        raise DataError(f"force_sd and the {other} both give the noise", options.where, "remove one of them")
+    if single is not None and single <= 0:
+        raise DataError("the standard deviation of the force must be positive", options.where, "correct force_sd")
+    if name is None:
+        return (np.full(n, single) if single is not None else column), None, ""
+    path = Path(options.file).parent / name
+    covariance = read_matrix(path)
+    if covariance.shape != (n, n):
+        fault = f"the covariance is {covariance.shape[0]} x {covariance.shape[1]}, and the curve has {n} points"
+        raise DataError(fault, str(path), f"give a {n} x {n} matrix in N^2")
+    check_covariance(covariance, str(path))
+    if column is not None and not np.allclose(np.sqrt(np.diag(covariance)), column, rtol=0.02, atol=1e-9):
+        fault = "the diagonal of the covariance is not the square of the column force_sd"
+        raise DataError(fault, str(path), "it must be in N^2 and in the order of the curve")
+    return np.sqrt(np.diag(covariance)), covariance, path.name

@@ -1,0 +1,79 @@
+"""Work on the cores there are: fresh processes, and messages on how far they are."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from queue import Empty
+from threading import Thread
+from typing import Any, Protocol, TypeVar
+
+Tell = Callable[[str, Any], None]
+"""(label of a job, how far it is)."""
+
+Result = TypeVar("Result")
+
+
+class Submit(Protocol):
+    """Starts ``work(*given, tell)``, somewhere and soon; ``work`` and what is given must be picklable."""
+
+    def __call__(self, work: Callable[..., Result], *given: Any) -> Future[Result]: ...
+
+
+def cores() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def silent(label: str, message: Any) -> None:
+    """A `Tell` that tells nobody."""
+
+
+@contextmanager
+def workers(tell: Tell = silent, count: int | None = None) -> Iterator[Submit]:
+    """Something that takes work, in ``count`` processes (None: one for each core); 1 works at once, in this one.
+
+    What the work tells arrives at ``tell``, in a thread of this process. Any exception in the body, Ctrl-C among them,
+    cancels what has not begun and waits for what has: at the terminal the processes are interrupted, too, and store
+    what they have. Scripts that use more than one process need the usual ``if __name__ == "__main__"``.
+    """
+    count = cores() if count is None else count
+    if count == 1:
+        yield lambda work, *given: _at_once(work, given, tell)
+        return
+    context = multiprocessing.get_context("spawn")
+    with context.Manager() as manager, ProcessPoolExecutor(count, mp_context=context) as pool:
+        queue, stop = manager.Queue(), list[bool]()
+        listener = Thread(target=_listen, args=(queue, tell, stop), daemon=True)
+        listener.start()
+        try:
+            yield lambda work, *given: pool.submit(_in_worker, work, given, queue)
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+        finally:
+            stop.append(True)
+            listener.join(timeout=2)
+
+
+def _at_once(work: Callable[..., Result], given: tuple[Any, ...], tell: Tell) -> Future[Result]:
+    done: Future[Result] = Future()
+    done.set_result(work(*given, tell))
+    return done
+
+
+def _in_worker(work: Callable[..., Result], given: tuple[Any, ...], queue: Any) -> Result:
+    return work(*given, lambda label, message: queue.put((label, message)))
+
+
+def _listen(queue: Any, tell: Tell, stop: list[bool]) -> None:
+    while not stop:
+        try:
+            tell(*queue.get(timeout=0.2))
+        except Empty:
+            continue
+        except (EOFError, OSError):
+            return

@@ -1,0 +1,212 @@
+"""What a comparison says, in words, and the JSON answer of ``compare``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from bayesmembrane.comparison.convexity_modes import ByMode, Missing
+from bayesmembrane.comparison.evidence.estimate import WIDEST, Disagreement, Evidence
+from bayesmembrane.comparison.prior_widths import Unknown, Widened
+from bayesmembrane.comparison.result import Comparison, Row
+from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.sampling import sentences as quality_sentences
+
+DECIDED = 2.0  # standard errors of a difference, below which it is none
+
+
+def document(found: Comparison) -> dict[str, Any]:
+    """The JSON answer of ``compare`` on one range."""
+    answer = found.summary()
+    return {
+        **answer,
+        "table": [_row(row, r) for row, r in zip(answer["table"], found.rows, strict=True)],
+        "reason": no_ranking(found),
+        "sentence": preferred(found),
+        "prior_sensitivity": survival(found),
+    }
+
+
+def document_of_ranges(found: Mapping[str, Comparison]) -> dict[str, Any]:
+    """The JSON answer of ``compare``: that on the last range, and each range by its name."""
+    answers = {name: document(comparison) for name, comparison in found.items()}
+    return {**list(answers.values())[-1], "ranges": [{"range": n, **a} for n, a in answers.items()]}
+
+
+def _row(answer: Mapping[str, Any], row: Row) -> dict[str, Any]:
+    widths = zip(answer["prior_widths"], row.widths, strict=True)
+    modes = zip(answer["convexity_modes"], row.modes, strict=True)
+    return {
+        **answer,
+        "prior_widths": [{**values, "reason": unknown_width(w)} for values, w in widths],
+        "convexity_modes": [{**values, "reason": missing_mode(m)} for values, m in modes],
+        "notes": list(quality_sentences(row.quality)) if row.quality else [],
+        "reason": remark(row),
+    }
+
+
+def sentences(found: Comparison) -> list[str]:
+    """All that is to be said of one range: why there is no ranking, what is preferred, whether that survives."""
+    return [s for s in (no_ranking(found), preferred(found), survival(found)) if s]
+
+
+def called(row: Row) -> str:
+    """The hypothesis in words; with noise model and convexity prior where its label has them to tell it apart."""
+    own = row.hypothesis.label()
+    return spoken(row.hypothesis) + row.label.removeprefix(own) if row.label.startswith(own) else row.label
+
+
+# ---- why there is no number ------------------------------------------------------------------------------------------
+
+
+def remark(row: Row) -> str:
+    """Why a hypothesis has no evidence, or one in doubt; "" if all is well."""
+    return row.failure or (doubt(row.evidence) if row.evidence else "")
+
+
+def doubt(evidence: Evidence) -> str:
+    """Why ln Z is not known well enough; "" if it is."""
+    match evidence.disagreement:
+        case Disagreement.NOT_FINITE:
+            return "One of the two estimates of ln Z is not a finite number."
+        case Disagreement.WIDE:
+            return f"The joint standard error of ln Z, {evidence.total_sd:.2f}, is above {WIDEST:g}."
+        case Disagreement.APART:
+            return (
+                f"Nested sampling and bridge sampling differ by {evidence.difference:.2f} in ln Z, which is "
+                f"{evidence.difference / evidence.joint_sd:.1f} joint standard errors."
+            )
+    return ""
+
+
+def unknown_width(widened: Widened) -> str:
+    """Why the draws do not tell what another width of a prior would do; "" if they do."""
+    start = f"Reweighted to {widened.factor:g} times the width,"
+    match widened.unknown:
+        case Unknown.NOT_COVERED:
+            name = widened.parameter
+            return f"Draws under the prior of {name} say nothing of one that allows more: sample again with it."
+        case Unknown.FEW:
+            return f"{start} the draws are worth only {widened.ess:.0f}: sample again with it."
+        case Unknown.HEAVY:
+            index = f"tail index {widened.tail_index:.2f}"
+            return f"{start} a few draws far out count most ({index}): sample again with it."
+    return ""
+
+
+def missing_mode(by_mode: ByMode) -> str:
+    """Why there is no evidence under a convexity mode; "" if there is."""
+    match by_mode.missing:
+        case Missing.PRIOR:
+            return f"Too few films of the prior meet it: its mass is {by_mode.mass:.2g} +- {by_mode.mass_sd:.2g}."
+        case Missing.DRAWS:
+            return f"The weights of this mode rest on only {by_mode.ess:.0f} draws."
+        case Missing.NONE:
+            return "None of the films that come near the data meets it."
+    return ""
+
+
+def no_ranking(found: Comparison) -> str:
+    """Why there is no ranking; "" if there is one."""
+    if not found.fitted:
+        return "None of the hypotheses could be fitted."
+    doubtful = found.doubtful
+    if not doubtful:
+        return ""
+    told = " ".join(f"{called(r)}: {doubt(r.evidence)}" for r in doubtful if r.evidence)
+    return f"There is no ranking, because ln Z is not known well enough of {len(doubtful)} of them. {told}"
+
+
+# ---- what is preferred -----------------------------------------------------------------------------------------------
+
+
+def preferred(found: Comparison) -> str:
+    """What evidence and leave-one-out prefer, by how much, and whether they disagree."""
+    both = [r for r in found.rows if r.evidence is not None and r.loo is not None]
+    if len(both) < 2:
+        return "There are not two hypotheses to choose between."
+    by_loo = sorted(both, key=lambda r: -r.loo.elpd if r.loo else 0.0)
+    predicts, next_best = by_loo[0], by_loo[1]
+    if not found.agreed:
+        gap, se = _elpd_gap(predicts, next_best)
+        return (
+            f"The evidence gives no ranking; leave-one-out prefers {called(predicts)} to {called(next_best)} by "
+            f"{gap:.1f} +- {se:.1f}{_weak(gap, se)}."
+        )
+    by_z = sorted(both, key=lambda r: -_best(r)[0])
+    gap = _best(by_z[0])[0] - _best(by_z[1])[0]
+    sd = float(np.hypot(_best(by_z[0])[1], _best(by_z[1])[1]))
+    names = f"{called(by_z[0])} to {called(by_z[1])}"
+    start = f"The evidence prefers {names} by {gap:.1f} +- {sd:.2g} in ln Z{_bayes(gap)}"
+    if predicts is by_z[0]:
+        d, se = _elpd_gap(predicts, next_best)
+        return (
+            f"{start}, and leave-one-out prefers it too, to {called(next_best)} by {d:.1f} +- {se:.1f}{_weak(d, se)}."
+        )
+    d, se = _elpd_gap(predicts, by_z[0])
+    if d > DECIDED * se:
+        return (
+            f"{start}, but leave-one-out prefers {called(predicts)} to it by {d:.1f} +- {se:.1f}: evidence and "
+            "prediction disagree, and of the two the evidence is the one that depends on the width of the priors."
+        )
+    return (
+        f"{start}, and leave-one-out puts {called(predicts)} before it by {d:.1f} +- {se:.1f}{_weak(d, se)}: "
+        "prediction does not contradict the evidence."
+    )
+
+
+def survival(found: Comparison) -> str:
+    """Whether the first of the ranking stays first when any one prior is half or twice as wide."""
+    fitted = sorted(found.fitted, key=lambda r: -_best(r)[0])
+    if len(fitted) < 2:
+        return ""
+    first, second = fitted[:2]
+    lead = _best(first)[0] - _best(second)[0]
+    # The prior of the noise is the same for all: changing it for one alone would say nothing.
+    changed = [(r, w) for r in fitted for w in r.widths if w.factor != 1.0 and not w.parameter.startswith("noise.")]
+    known = [(r, w) for r, w in changed if w.unknown is None]
+    unknown = len(changed) - len(known)
+    if not known:
+        return "What other widths of the priors would do to ln Z cannot be said from these draws."
+    # The first can fall, and any other can rise.
+    fall, down = max(((-w.change, w) for r, w in known if r is first), key=lambda c: c[0], default=(0.0, known[0][1]))
+    rise, up = max(
+        ((_best(r)[0] - _best(second)[0] + w.change, w) for r, w in known if r is not first),
+        key=lambda c: c[0],
+        default=(0.0, known[0][1]),
+    )
+    worst = lead - max(fall, rise)
+    which = down if fall >= rise else up
+    rest = f" {unknown} of the changes cannot be told from these draws." if unknown else ""
+    if worst > 0:
+        return (
+            f"{called(first)} stays first when any one prior is half or twice as wide: its lead of {lead:.1f} in ln Z "
+            f"falls to {worst:.1f} at worst, with the prior of {which.parameter} {which.factor:g} times as wide.{rest}"
+        )
+    return (
+        f"The first place depends on the priors: with the prior of {which.parameter} {which.factor:g} times as wide, "
+        f"the lead of {called(first)} of {lead:.1f} in ln Z is lost by {-worst:.1f}.{rest}"
+    )
+
+
+def _best(row: Row) -> tuple[float, float]:
+    assert row.evidence is not None
+    return row.evidence.best
+
+
+def _elpd_gap(a: Row, b: Row) -> tuple[float, float]:
+    """elpd_a - elpd_b and its standard error, from the differences point by point."""
+    assert a.loo is not None
+    assert b.loo is not None
+    d = a.loo.pointwise - b.loo.pointwise
+    return float(np.sum(d)), float(np.sqrt(d.size * np.var(d)))
+
+
+def _weak(gap: float, se: float) -> str:
+    return "" if gap > DECIDED * se else ", which is no difference"
+
+
+def _bayes(gap: float) -> str:
+    return ", which decides little" if gap < 1.0 + WIDEST else ""
