@@ -50,5 +50,5 @@ def verb(
     )
     settings = {"parameters": made.vector.tolist(), "box": edges}
     what = Asked("convexity", "", made.name, float("nan"), digest(settings))
-    kept_as = kept("convexity", document, document, what, stored.folder)
+    kept_as = kept("convexity", {**document, **settings}, document, what, stored.folder)
     answer(kept_as.document, output.as_json, lambda: say(sentence))

@@ -52,7 +52,7 @@ def verb(
     }
     settings |= {"parameters": made.vector.tolist(), "deflection_mm": where}
     what = Asked("force", "", kind.name, 1e-3 * max(where), digest(settings))
-    found = kept("force", document, document, what, stored.folder)
+    found = kept("force", {**document, **settings}, document, what, stored.folder)
     rows = zip(where, curves.force[0], curves.max_stretch[0], states, notes, strict=True)
     cells = [[f"{d:g}", f"{f:.6g}", f"{m:.4g}", f"{s.sentence} {n}".strip()] for d, f, m, s, n in rows]
     header = ["deflection, mm", "force, N", "largest stretch", "status"]
