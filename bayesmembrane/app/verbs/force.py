@@ -6,17 +6,17 @@ from typing import Annotated, Any
 
 import typer
 
-from bayesmembrane.app.options import Film, Output, StoredOnRequest
+from bayesmembrane.app.options import FilmOptions, OutputOptions, StoredOnRequestOption
 from bayesmembrane.app.terminal import answer, numbers, table
 
 place = 1
 
 
 def verb(
-    film: Film,
+    film: FilmOptions,
     deflection_mm: Annotated[str, typer.Option("--deflection-mm", help="Deflections, mm: 1,10,35.1")],
-    stored: StoredOnRequest,
-    output: Output,
+    stored: StoredOnRequestOption,
+    output: OutputOptions,
     prestretch: Annotated[float, typer.Option(help="Equibiaxial stretch of the film before it was clamped.")] = 1.0,
     inner_radius_mm: Annotated[float, typer.Option(help="Radius of the disc, mm.")] = 10.0,
     outer_radius_mm: Annotated[float, typer.Option(help="Radius of the ring, mm.")] = 35.0,

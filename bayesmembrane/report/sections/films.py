@@ -15,7 +15,7 @@ from bayesmembrane.words.language import listed
 
 
 @dataclass(frozen=True)
-class Film:
+class SingleFilm:
     """What ``force`` ("force") or ``convexity`` ("convexity") answered, and what they were asked."""
 
     kind: str
@@ -34,31 +34,31 @@ class FilmsSection(Section):
     name = "films"
     title = "Single films"
     order = 75
-    shows = Film
+    shows = SingleFilm
     aside = True
 
     def reads(self, folder: Path) -> Any | None:
         found = ((kind, read(folder, kind)) for kind in ("force", "convexity"))
-        return next((Film(kind, told) for kind, told in found if told is not None), None)
+        return next((SingleFilm(kind, told) for kind, told in found if told is not None), None)
 
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
-        films = of_kind(results, Film)
+        films = of_kind(results, SingleFilm)
         said = tuple(self.answer(films))
         tables = [forces_table(film) for film in films if film.kind == "force"]
         return [*([Points(said)] if said else []), *tables]
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
-        return [_sentence(film) for film in of_kind(results, Film)]
+        return [_sentence(film) for film in of_kind(results, SingleFilm)]
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
-        return [Glance(film.kind, film.title, _sentence(film)) for film in of_kind(results, Film)]
+        return [Glance(film.kind, film.title, _sentence(film)) for film in of_kind(results, SingleFilm)]
 
     def subject(self, results: Sequence[Any]) -> Subject | None:
-        films = of_kind(results, Film)
+        films = of_kind(results, SingleFilm)
         return Subject((), f"Single films: {listed(f.title for f in films)}.") if films else None
 
 
-def forces_table(film: Film) -> Table:
+def forces_table(film: SingleFilm) -> Table:
     """One row for each deflection."""
     columns = (
         Column("deflection_mm", "deflection (mm)"),
@@ -74,7 +74,7 @@ def forces_table(film: Film) -> Table:
     return Table("forces", caption, columns, rows)
 
 
-def _sentence(film: Film) -> str:
+def _sentence(film: SingleFilm) -> str:
     told = film.told
     if film.kind == "force":
         lost = sum(s != "ok" for s in told["status"])
