@@ -73,7 +73,7 @@ def compose(results: Sequence[Any], title: str | None = None) -> Content:
     """What the sections make of ``results``, which are no folders."""
     every = sections()
     told = [s for section in every if not section.aside for s in section.answer(results)]
-    subject = next((s for s in (section.subject(results) for section in every) if s is not None), Subject((), ""))
+    subject = _subject([s for s in (section.subject(results) for section in every) if s is not None])
     about = f"What the force curve of {listed(subject.films)} says" if subject.films else "What the force curve says"
     parts = [part for section in every for part in section.parts(results)]
     return Content(
@@ -83,6 +83,11 @@ def compose(results: Sequence[Any], title: str | None = None) -> Content:
         warnings=[s for section in every for s in section.warnings(results)],
         parts=_named_once([*_general_table(every, results), *parts]),
     )
+
+
+def _subject(told: Sequence[Subject]) -> Subject:
+    """The first that names the films; of a page without any, all that is told."""
+    return next((s for s in told if s.films), Subject((), " ".join(s.sentence for s in told)))
 
 
 def _general_table(every: Sequence[Section], results: Sequence[Any]) -> list[Part]:

@@ -13,6 +13,8 @@ from bayesmembrane.physics.convexity import RESTRICTING
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.profile import End, Ending
 from bayesmembrane.valleys.result import Between, Valley, Valleys
+from bayesmembrane.words.hypothesis import spoken, title
+from bayesmembrane.words.language import listed
 from bayesmembrane.words.next_test import ASSUMPTION, spoken_test
 
 FEW = 2  # open ends that have a sentence each
@@ -91,11 +93,6 @@ def _names(v: Valley) -> list[str]:
     return [n.partition(".")[2] for n in v.chart.names]
 
 
-def titled(v: Valley) -> str:
-    """Material and effects for people: ``Gent + zero offset``."""
-    return " + ".join([v.hypothesis.material.title, *(e.name.replace("_", " ") for e in v.hypothesis.effects)])
-
-
 def _range(v: Valley) -> str:
     return f"Up to {1e3 * v.end:.4g} mm"
 
@@ -113,7 +110,7 @@ def _where(v: Valley) -> str:
     number = v.spectra[0].condition_number
     ratio = f", condition number {number:.3g}" if np.isfinite(number) and v.best.size > 1 else ""
     return (
-        f"{_range(v)} every {titled(v)} film between ({point(v, v.floor[0])}) and "
+        f"{_range(v)} every {spoken(v.hypothesis)} film between ({point(v, v.floor[0])}) and "
         f"({point(v, v.floor[-1])}) on the valley's floor fits within {share:.3g} % of the least loss, "
         f"{v.best_loss:.4g} N{long}{ratio}."
     )
@@ -256,7 +253,7 @@ def sentence_between(a: Valley, b: Valley, found: Between) -> str:
 
 def sentence_beside(a: Valley, b: Valley, found: Between) -> str:
     """What the effects of ``b`` do to the valley ``a``."""
-    names = " and ".join(e.name.replace("_", " ") for e in b.hypothesis.effects)
+    names = listed(map(title, b.hypothesis.effects))
     change = 100 * (b.best_loss / a.best_loss - 1)
     n = a.best.size
     loss = (

@@ -79,7 +79,7 @@ class Section(ABC):
         return ()
 
     def subject(self, results: Sequence[Any]) -> Subject | None:
-        """What the page is about, if this section can tell; the first section that can is asked."""
+        """What the page is about, if this section can tell; the first that names films speaks for all."""
         return None
 
     # ---- one result alone: at a prompt, and in a notebook ------------------------------------------------------------

@@ -222,7 +222,7 @@ def _legs(leg: NDArray[np.int8]) -> list[NDArray[np.intp]]:
 
 def _handles(place: Place) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = []
-    for sign, name, colour, symbol in LEGS:
+    for sign, name, colour, symbol in LEGS if place.deflection is not None else [(1, "reading", *LEGS[0][2:])]:
         if np.any(place.leg == sign):
             handles.append(Line2D([], [], color=colour, marker=symbol, linewidth=0, markersize=5, label=name))
     if np.any(place.held_out):

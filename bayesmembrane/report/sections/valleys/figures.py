@@ -19,6 +19,7 @@ from bayesmembrane.report.sections.valleys.pairs import label, pairs, percent
 from bayesmembrane.report.style import FAINT, INK, MUTED, RANGE_COLOURS, with_unit
 from bayesmembrane.valleys.posterior import Grid
 from bayesmembrane.valleys.result import Valley, Valleys
+from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.valleys import limit_title
 
 HELD = 0.9
@@ -121,7 +122,7 @@ def _overview(ax: Axes, found: Valleys, order: tuple[int, int]) -> None:
             bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.5},
         )
     rise = percent(found.ranges[0])
-    ax.set_title(f"{found.hypothesis.material.title}: all films that fit within {rise} of the best loss")
+    ax.set_title(f"{spoken(found.hypothesis)}: all films that fit within {rise} of the best loss")
     _axis_labels(ax, found.ranges[0], order)
 
 

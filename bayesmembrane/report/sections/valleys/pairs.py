@@ -17,6 +17,7 @@ from bayesmembrane.report.canvas import encoded, new_figure, style
 from bayesmembrane.report.style import INK, MUTED, RANGE_COLOURS, with_unit
 from bayesmembrane.valleys.profile import PairMap
 from bayesmembrane.valleys.result import Valley, Valleys
+from bayesmembrane.words.hypothesis import spoken
 
 
 def label(v: Valley) -> str:
@@ -46,7 +47,7 @@ def pairs(found: Valleys, kind: str) -> Picture:
                     _pair(ax, found, (j, i))
                 _trim(ax, found.ranges[0], i, j, k)
         figure.legend(handles=_pair_handles(found), loc="upper right", bbox_to_anchor=(0.99, 0.93), fontsize=11)
-        rise, name = percent(found.ranges[0]), found.hypothesis.material.title
+        rise, name = percent(found.ranges[0]), spoken(found.hypothesis)
         told = f"{name}: films within {rise} of the best loss, the other parameters adjusted"
         figure.suptitle(told, fontweight="bold", fontsize=12)
         return encoded(figure, kind)

@@ -72,5 +72,5 @@ def next_table(v: Valley) -> Table:
     )
     rows = tuple((spoken_test(t.test), t.reduction, t.axis_before, t.axis_after) for t in v.next_tests[:TESTS])
     name = f"next measurements {v.hypothesis.material.name} {1e3 * v.end:.4g} mm"
-    caption = f"{v.hypothesis.material.title}, fitted up to {1e3 * v.end:.4g} mm: what to measure next. {ASSUMPTION}"
+    caption = f"{spoken(v.hypothesis)}, fitted up to {1e3 * v.end:.4g} mm: what to measure next. {ASSUMPTION}"
     return Table(name, caption, columns, rows)
