@@ -233,10 +233,6 @@ class NextTestThresholds:
     """Readings of a leg."""
     faster: float = 10.0
     """Times the speed: a decade shows rate and relaxation."""
-    wider: float = 1.5
-    """Times the disc's radius: the widest that is easily made and leaves a film to lift."""
-    widest: float = 0.8
-    """Of the clamp's radius: a wider disc leaves no film."""
     peaks: tuple[float, ...] = (0.5, 0.75, 1.0, 1.0)
     """Of the largest deflection: what remembers the past shows on rising peaks, and on the repeated one."""
     usual_speed: float = 1e-3
