@@ -6,16 +6,16 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.diagnosis.detection.periodicity import Periodicity
 from bayesmembrane.diagnosis.left.shape import ResidualShape
 from bayesmembrane.diagnosis.thresholds import WORDS
-from bayesmembrane.physics.rigs.base import Rig
 
 PARTS = ("lower", "middle", "upper")
 
 
 def shape_in_words(
-    shape: ResidualShape, waves: Periodicity | None, rig: Rig, shown: Mapping[str, tuple[float, str]]
+    shape: ResidualShape, waves: Periodicity | None, rig: Fixture, shown: Mapping[str, tuple[float, str]]
 ) -> str:
     """Sentences on a residual against deflection, leg, cycle and time, in the units ``shown`` of the rig."""
     factor, unit = shown["N"]
