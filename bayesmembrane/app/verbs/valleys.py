@@ -62,6 +62,7 @@ def show(found: Valleys | BesideValleys, title: str) -> None:
     """The valleys, what is said of them, and what would shorten them, on the terminal."""
     from bayesmembrane.report.sections.valleys.tables import valley_table
     from bayesmembrane.valleys.beside import Beside as BesideValleys
+    from bayesmembrane.words.next_test import spoken_test
     from bayesmembrane.words.valleys import sentences
 
     parts = [found.without, found.added] if isinstance(found, BesideValleys) else [found]
@@ -71,5 +72,5 @@ def show(found: Valleys | BesideValleys, title: str) -> None:
     for sentence in sentences(found):
         say(sentence)
     for valley in parts[-1].ranges:
-        rows = [[t.test, f"{100 * t.reduction:.0f} %"] for t in valley.next_tests[:TESTS]]
+        rows = [[spoken_test(t.test), f"{100 * t.reduction:.0f} %"] for t in valley.next_tests[:TESTS]]
         table(f"What to measure next, from data up to {1e3 * valley.end:.4g} mm", ["test", "shorter by"], rows)
