@@ -15,7 +15,7 @@ from bayesmembrane.calibration.posterior import FAILURES
 from bayesmembrane.calibration.predictions import Predictions
 from bayesmembrane.calibration.run import Run, load_run, predictions_of
 from bayesmembrane.data.fixture import Fixture
-from bayesmembrane.ground.errors import SettingsError, StorageError
+from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -208,20 +208,18 @@ _SHOWN_APART = ("hypothesis", "sampling", "data", "code", "versions", "seed", "f
 def read(run: Run | Path | str) -> Shown:
     """A run, or the folder that holds one, as a report shows it.
 
-    Of a run that was interrupted before its predictions were stored they are made here, once. Raises `StorageError` if
-    the folder holds no run; `SettingsError` for a run that is not stored.
+    Of a run that was interrupted before its predictions were stored they are made here, once; of a run that is not
+    stored itself, every time. Raises `StorageError` if the folder holds no run.
     """
     if not isinstance(run, Run):
         folder = Path(run)
         if not folder.is_dir():
             raise StorageError("there is no such run folder", str(folder), "name a folder under chains/")
         run = load_run(folder)
-    if run.path is None:
-        raise SettingsError(f'the run "{run.name}" is not stored', remedy="sample with out=")
     m, h = run.measurement, run.hypothesis
     p = m.provenance
     return Shown(
-        folder=str(run.path),
+        folder=run.name if run.path is None else str(run.path),
         hypothesis=h,
         film=Film(
             m.specimen.name,

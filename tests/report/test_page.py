@@ -216,11 +216,16 @@ def test_folders_with_nothing_to_show_are_named(tmp_path: Path, stored: Run) -> 
         write_report([tmp_path / "empty"], tmp_path / "report")
     with pytest.raises(SettingsError, match="needs something to show"):
         write_report([], tmp_path / "report")
-    with pytest.raises(SettingsError, match="not stored"):
-        write_report([replace(stored, path=None)], tmp_path / "report")
     with pytest.raises(SettingsError, match="no section of the report shows a float"):
         write_report([1.0], tmp_path / "report")
     assert not (tmp_path / "report").exists()
+
+
+def test_a_run_that_is_not_stored_has_a_page_all_the_same(tmp_path: Path, stored: Run) -> None:
+    free = replace(stored, path=None)
+    assert free.name in repr(free)
+    pages = [write_report([run], tmp_path / place).read_text() for run, place in ((free, "free"), (stored, "stored"))]
+    assert pages[0].count("<figure>") == pages[1].count("<figure>") > 0
 
 
 def test_a_damaged_run_is_named_and_not_passed_over(tmp_path: Path, stored: Run) -> None:
