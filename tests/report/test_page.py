@@ -224,8 +224,9 @@ def test_folders_with_nothing_to_show_are_named(tmp_path: Path, stored: Run) -> 
 def test_a_run_that_is_not_stored_has_a_page_all_the_same(tmp_path: Path, stored: Run) -> None:
     free = replace(stored, path=None)
     assert free.name in repr(free)
-    pages = [write_report([run], tmp_path / place).read_text() for run, place in ((free, "free"), (stored, "stored"))]
-    assert pages[0].count("<figure>") == pages[1].count("<figure>") > 0
+    page = write_report([free], tmp_path / "report").read_text()
+    assert "<figure>" in page
+    assert "Curves and residuals" in page
 
 
 def test_a_damaged_run_is_named_and_not_passed_over(tmp_path: Path, stored: Run) -> None:
