@@ -8,6 +8,7 @@ from typing import Any
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.valleys.follow import RISE, between, valleys
@@ -15,8 +16,8 @@ from bayesmembrane.valleys.result import Between, Valley, Valleys
 from bayesmembrane.valleys.surface import unaided
 
 
-@dataclass(frozen=True, eq=False)
-class Beside:
+@dataclass(frozen=True, eq=False, repr=False)
+class Beside(Showable):
     """Valleys ``without`` effects and ``added`` with them; ``pairs`` has the closest approach of both in each range.
 
     The approach is that of the floors seen along the effects: in the material's parameters alone.

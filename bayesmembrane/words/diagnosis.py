@@ -21,7 +21,7 @@ from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.shape import shape_in_words
 
 Units = Mapping[str, tuple[float, str]]
-"""By SI unit, (factor, unit) in which people read it: `Rig.shown`."""
+"""By SI unit, (factor, unit) in which people read it: `Fixture.shown`."""
 
 SCALES: Units = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "N": (1e3, "mN"), "N/s": (1e3, "mN/s")}
 """Those of a lifted disc."""

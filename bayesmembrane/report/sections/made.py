@@ -19,7 +19,7 @@ class MadeSection(Section):
     name = "made"
     title = "How it was made"
     order = 110
-    shows = Tally
+    takes = (Tally,)
 
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
         shown = in_order(of_kind(results, Shown))

@@ -1,13 +1,14 @@
 """One run on a page: a homogeneous test: no disc, no radii, and said what its forces and deflections stand for."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bayesmembrane.calibration.predictions import Wanted
-from bayesmembrane.calibration.run import predictions_of, sample
+from bayesmembrane.calibration.run import Run, predictions_of, sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.physics.forward import Forward
@@ -15,6 +16,7 @@ from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.equibiaxial import Equibiaxial
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.report.page import write_report
+from bayesmembrane.report.sections.run import RunSection
 
 STRETCH = np.linspace(1.05, 2.0, 16)
 
@@ -37,3 +39,12 @@ def test_a_strip_is_reported_without_a_lifted_film(rig, tmp_path: Path) -> None:
     assert told.startswith(f"{rig.title}, length {1e3 * rig.length:g} mm and width {1e3 * rig.width:g} mm;")
     assert f"1 N for {1e-3 / (rig.width * 1e-3):.4g} kPa" in told
     assert f"1 mm of deflection is {1e-3 / rig.length:.4g} of stretch" in told
+
+
+def test_a_run_at_a_prompt_solves_nothing(stored: Run) -> None:
+    section = RunSection()
+    assert section.text(stored).startswith("neo-Hookean, fitted up to 35 mm\nUp to 35 mm, neo-Hookean (rms residual")
+    assert section.html(stored).count("<img") >= 7
+    bare = replace(stored, path=None)
+    assert section.text(bare).startswith(f"neo-Hookean, {stored.name}\n")
+    assert "<img" not in section.html(bare)

@@ -8,8 +8,9 @@ from typing import Any
 
 from bayesmembrane.calibration import store
 from bayesmembrane.calibration.beside_paper import Compared
-from bayesmembrane.calibration.run import Run
+from bayesmembrane.calibration.run import Run, stored_predictions
 from bayesmembrane.report.blocks import Block, Figure, Heading, Part, Text
+from bayesmembrane.report.render import fragment
 from bayesmembrane.report.runs import Shown, in_order, read
 from bayesmembrane.report.sections.base import Glance, Section, of_kind
 from bayesmembrane.report.sections.run.draws import (
@@ -23,7 +24,9 @@ from bayesmembrane.report.sections.run.draws import (
 from bayesmembrane.report.sections.run.film import Plane, Shapes, convexity_map, profiles, residual_picture
 from bayesmembrane.report.sections.run.tables import coordinates_table, parameters_table
 from bayesmembrane.words.calibration import convergence, describes, extrapolation, unknown, verdict, warnings
+from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed, newtons, percent, spoken_parameter
+from bayesmembrane.words.sampling import sentences
 
 MOST_CORNER = 4000  # draws in a corner plot
 TRUSTED = 0.7  # tail of the weights up to which a prediction without a point can be told from one with it
@@ -67,8 +70,17 @@ class RunSection(Section):
         ]
 
     def text(self, result: Any) -> str:
-        shown = result if isinstance(result, Shown) else read(result)
+        """What is known without solving: of a run without predictions, what a reader must know of its draws."""
+        if isinstance(result, Run) and stored_predictions(result) is None:
+            told = sentences(result.quality) or (f"{result.draws().shape[0]} draws, no predictions stored.",)
+            return "\n".join([f"{spoken(result.hypothesis)}, {result.name}", *told])
+        shown = read(result) if isinstance(result, Run) else result
         return "\n".join([f"{shown.name}, fitted up to {shown.end}", *_sentences(shown)])
+
+    def html(self, result: Any) -> str:
+        if isinstance(result, Run) and stored_predictions(result) is None:
+            return fragment([Text(line) for line in self.text(result).splitlines()])
+        return super().html(result)
 
 
 def _beside(s: Shown, compared: Sequence[Compared]) -> Compared | None:
