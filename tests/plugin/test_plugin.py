@@ -99,7 +99,7 @@ def test_an_export_becomes_a_fitted_film(place: Path) -> None:
     """From the tester's file through the importer to a calibrated ring, solved by kernels compiled for the energy."""
     force = run(place, "force", *MATERIAL, "--parameters", "6,1,0.1", "--deflection-mm", "5,15,25,35,45,55")
     assert set(force["status"]) == {"ok"}
-    lines = (f"{1000 * d:g} {1000 * f:.6g}" for d, f in zip(force["deflection_mm"], force["force_N"], strict=True))
+    lines = (f"{1000 * d:g} {1000 * f:.12g}" for d, f in zip(force["deflection_mm"], force["force_N"], strict=True))
     (place / "export.txt").write_text("MICROTESTER 2\n" + "\n".join(lines) + "\n")
     imported = run(place, "import", "export.txt", "--out", "ring.csv")
     assert imported["importer"] == "micrometres"
