@@ -23,7 +23,8 @@ from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.report.sections.valleys import write_valleys
 from bayesmembrane.valleys.beside import valleys_beside
-from bayesmembrane.valleys.follow import Valleys, valleys
+from bayesmembrane.valleys.follow import valleys
+from bayesmembrane.valleys.result import Valleys
 from bayesmembrane.valleys.surface import Chart, Surface
 from bayesmembrane.words.valleys import sentence_beside, sentences, valley_sentences
 from tests.ground.values import stored_equals_given

@@ -13,8 +13,9 @@ from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.valleys.between import Approach
-from bayesmembrane.valleys.follow import Valleys, valleys
+from bayesmembrane.valleys.follow import valleys
 from bayesmembrane.valleys.profile import Ending
+from bayesmembrane.valleys.result import Valleys
 from bayesmembrane.words.valleys import ENDINGS, document, sentence_between, sentences, valley_sentences
 
 
