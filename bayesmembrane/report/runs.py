@@ -26,7 +26,7 @@ from bayesmembrane.words.language import millimetres, spoken_parameter
 
 
 @dataclass(frozen=True, eq=False)
-class Sampling:
+class HowSampled:
     """How a run was sampled.
 
     status : "converged", or why it stopped
@@ -68,7 +68,7 @@ class Replicas:
 
 
 @dataclass(frozen=True, eq=False)
-class Film:
+class ShownFilm:
     """The film, what held it, and its origin in words."""
 
     name: str
@@ -96,13 +96,13 @@ class Shown:
 
     folder: str
     hypothesis: Hypothesis
-    film: Film
+    film: ShownFilm
     data_hash: str
     digest: Predictions
     x: Array
     natural: Array
     prior: Array
-    sampling: Sampling
+    sampling: HowSampled
     goodness: Mapping[str, float | None]
     dominated: bool
     outcomes: Mapping[str, int]
@@ -223,7 +223,7 @@ def read(run: Run | Path | str) -> Shown:
     return Shown(
         folder=str(run.path),
         hypothesis=h,
-        film=Film(
+        film=ShownFilm(
             m.specimen.name,
             m.specimen.thickness,
             m.rig,
@@ -253,12 +253,12 @@ def _stacked(group: Any, names: tuple[str, ...]) -> Array:
     return np.stack([np.asarray(group[n].values, dtype=float).ravel() for n in names], axis=1)
 
 
-def _sampling(run: Run) -> Sampling:
+def _sampling(run: Run) -> HowSampled:
     status = run.status
     means, steps = _means(run)
     draws, at = _draws(run)
     tau = np.array([np.nan if v is None else v for v in (status["tau"][n] for n in run.hypothesis.names)], dtype=float)
-    return Sampling(
+    return HowSampled(
         status=status["status"],
         ess=_number(status["ess_bulk"], 0.0),
         wanted=status["ess_wanted"],

@@ -299,5 +299,3 @@ def between(a: Valley, b: Valley) -> Between:
     crossing = None if approach.crossing is None else tuple(float(v) for v in a.chart.natural(approach.crossing))
     return Between(a.end, b.end, approach, (one, two), crossing)
 
-
-__all__ = ["RISE", "Valleys", "between", "valleys", "valleys_of"]

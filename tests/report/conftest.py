@@ -13,7 +13,7 @@ from bayesmembrane.physics.cache import Tally
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.mechanics.api import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
-from bayesmembrane.report.runs import Film, Sampling, Shown
+from bayesmembrane.report.runs import HowSampled, Shown, ShownFilm
 
 TRUTH = (8.8, -0.6, 0.05)
 SD = 0.004
@@ -44,7 +44,7 @@ def show(material: str, center: tuple[float, ...], measurement: Measurement, dom
     k = x.shape[1]
     found = predict_draws(claim, measurement, x, Wanted(up_to=0.05, breaks=BREAKS, draws=25))
     good = status == "converged"
-    sampling = Sampling(
+    sampling = HowSampled(
         status=status,
         ess=1200.0 if good else 300.0,
         wanted=1000.0,
@@ -67,7 +67,7 @@ def show(material: str, center: tuple[float, ...], measurement: Measurement, dom
     return Shown(
         folder="chains/tiny",
         hypothesis=claim,
-        film=Film(measurement.specimen.name, 50e-6, Annulus(0.010, 0.035), "bench <2> & 3", ("curve.csv",), ()),
+        film=ShownFilm(measurement.specimen.name, 50e-6, Annulus(0.010, 0.035), "bench <2> & 3", ("curve.csv",), ()),
         data_hash=measurement.data_hash,
         digest=found,
         x=x,

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bayesmembrane.app.options import CHAINS, Beside, Curve, Material, Output, Ranges
+from bayesmembrane.app.options import (
+    CHAINS,
+    CurveOptions,
+    HypothesisOptions,
+    MaterialOption,
+    OutputOptions,
+    RangesOption,
+)
 from bayesmembrane.app.terminal import answer, say, status, table
 
 if TYPE_CHECKING:
@@ -21,11 +28,11 @@ TESTS = 5
 
 
 def verb(
-    curve: Curve,
-    material: Material,
-    beside: Beside,
-    ranges: Ranges,
-    output: Output,
+    curve: CurveOptions,
+    material: MaterialOption,
+    beside: HypothesisOptions,
+    ranges: RangesOption,
+    output: OutputOptions,
     loss_rise: Annotated[float, typer.Option(help="A valley fits within this part of the least loss.")] = 0.1,
     folder: Annotated[
         Path | None,

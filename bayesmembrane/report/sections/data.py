@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.report.blocks import Block, Table, Text, facts_table
-from bayesmembrane.report.runs import Film, Shown, by_points
+from bayesmembrane.report.runs import Shown, ShownFilm, by_points
 from bayesmembrane.report.sections.base import Section, of_kind
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.origin import origin
@@ -57,7 +57,7 @@ def _table(s: Shown, before: str) -> Table:
     return facts_table(f"data up to {s.end}", f"The measurement, fitted up to {s.end}.", facts)
 
 
-def _rig(film: Film) -> str:
+def _rig(film: ShownFilm) -> str:
     """Its lengths, and what the page's forces and deflections stand for, if they are not what was measured."""
     rig = film.rig
     lengths = listed(f"{name.replace('_', ' ')} {1e3 * v:.4g} mm" for name, v in rig.lengths.items())
