@@ -106,9 +106,9 @@ class Material(ABC):
 
     @classmethod
     def typical(cls) -> Array:
-        """(n_fields,) membrane parameters at the medians of the priors."""
-        medians = [float(c.prior.quantile(0.5)) for c in cls.coordinates]
-        return cls.from_coordinates(np.array(medians))
+        """(n_fields,) membrane parameters at the 60 % quantiles of the priors: none is zero, as medians may be."""
+        x = [float(c.prior.quantile(0.6)) for c in cls.coordinates]
+        return cls.from_coordinates(np.array(x))
 
     @classmethod
     def from_vector(cls, p: ArrayLike) -> Self:

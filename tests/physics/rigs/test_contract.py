@@ -25,7 +25,7 @@ THICKNESS = 1e-4
 every = pytest.mark.parametrize("kind", RIGS.values(), ids=RIGS)
 
 
-def tested(kind: type[Rig]) -> Measurement:
+def curve_on(kind: type[Rig]) -> Measurement:
     """A measurement with plausible numbers in every column that the rig declares."""
     rig = kind.example()
     columns = {**COLUMNS, LENGTH: rig.size() * SHARE}
@@ -73,7 +73,7 @@ def test_lengths_must_be_positive(kind: type[Rig]) -> None:
 
 @every
 def test_files_come_back(kind: type[Rig], tmp_path: Path) -> None:
-    m = tested(kind)
+    m = curve_on(kind)
     write_measurement(m, tmp_path / "c.csv", tmp_path / "c.toml")
     again = read_measurement(tmp_path / "c.csv", tmp_path / "c.toml")
     assert again.rig == m.rig
@@ -84,7 +84,7 @@ def test_files_come_back(kind: type[Rig], tmp_path: Path) -> None:
 
 @every
 def test_curves_scale_with_the_modulus_and_slopes_are_those_of_the_force(kind: type[Rig]) -> None:
-    m = tested(kind)
+    m = curve_on(kind)
     rig, one = rig_of(m), films("mooney_rivlin", 2, sensitivities=True)
     curves = rig.curves(one, m, m.deflection)
     assert np.all(curves.ok)
@@ -99,7 +99,7 @@ def test_curves_scale_with_the_modulus_and_slopes_are_those_of_the_force(kind: t
 
 @every
 def test_its_law_is_its_curves(kind: type[Rig]) -> None:
-    m = tested(kind)
+    m = curve_on(kind)
     rig, some = rig_of(m), films("neo_hookean", 2)
     trial = Trial(m, m.path, np.ones(2), np.full(2, m.full_range))
     law, (convexity, ellipticity) = rig.law(some, trial)
@@ -117,7 +117,7 @@ def test_its_law_is_its_curves(kind: type[Rig]) -> None:
 
 @every
 def test_a_law_varies_to_first_order(kind: type[Rig]) -> None:
-    m = tested(kind)
+    m = curve_on(kind)
     some = films("neo_hookean", 2, sensitivities=True)
     law, _ = rig_of(m).law(some, Trial(m, m.path, np.ones(2), np.full(2, m.full_range)))
     d = np.broadcast_to(m.deflection, (2, len(m)))
@@ -126,7 +126,7 @@ def test_a_law_varies_to_first_order(kind: type[Rig]) -> None:
 
 @every
 def test_a_hypothesis_is_predicted_on_it(kind: type[Rig]) -> None:
-    m = tested(kind)
+    m = curve_on(kind)
     h = hypothesis("yeoh")
     x = h.material.to_coordinates(h.material.typical())
     found = Forward(h, m, m.deflection)(x, sensitivities=True)
@@ -137,7 +137,7 @@ def test_a_hypothesis_is_predicted_on_it(kind: type[Rig]) -> None:
 
 @every
 def test_states_stretches_and_proposals_make_sense(kind: type[Rig]) -> None:
-    m = tested(kind)
+    m = curve_on(kind)
     rig = rig_of(m)
     p = material("neo_hookean").typical()
     at = rig.size() * np.array([0.2, 0.5])
