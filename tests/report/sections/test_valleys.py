@@ -22,6 +22,7 @@ from bayesmembrane.report.sections.valleys import write_valleys
 from bayesmembrane.report.sections.valleys.figures import valley_picture
 from bayesmembrane.report.sections.valleys.tables import TESTS, next_table, valley_table
 from bayesmembrane.valleys.follow import Valleys, valleys
+from bayesmembrane.words.valleys import sentences
 from tests.reference.slow_solver import force_curve
 
 
@@ -69,7 +70,7 @@ def test_next_measurements_are_a_short_list_ordered_by_what_they_are_worth(two: 
 def test_page_shows_the_valleys(one: Valleys, yeoh: Shown, tmp_path: Path) -> None:
     page = write_report([yeoh, one], tmp_path).read_text()
     assert 'id="valleys"' in page
-    for sentence in one.sentences:
+    for sentence in sentences(one):
         assert sentence.split(" (")[0].replace("'", "&#39;") in page
     assert 'id="valleys"' not in write_report([yeoh], tmp_path).read_text()
 
@@ -78,7 +79,7 @@ def test_valleys_stand_alone(one: Valleys, two: Valleys, tmp_path: Path) -> None
     page = write_report([one, two], tmp_path).read_text()
     twin = json.loads((tmp_path / "report.json").read_text())
     assert [row["about"] for row in twin["tables"]["glance"]][-1] == "Gent, up to 30 mm"
-    assert twin["answer"] == [f.sentences[0] for f in (one, two)]
+    assert twin["answer"] == [sentences(f)[0] for f in (one, two)]
     assert 'id="data"' not in page
 
 
