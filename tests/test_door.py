@@ -30,7 +30,7 @@ def run(*words: str, home: Path) -> subprocess.CompletedProcess[str]:
         "PYTHONPATH": str(ROOT),
     }
     return subprocess.run(
-        [sys.executable, *words], env=environment, capture_output=True, text=True, timeout=600, check=False, cwd=home
+        [sys.executable, *words], env=environment, capture_output=True, text=True, timeout=3000, check=False, cwd=home
     )
 
 

@@ -1,7 +1,7 @@
 """The options that verbs share, each said once, and groups of them that a verb takes as one argument.
 
-A verb is a function; where an argument is annotated with a group (a dataclass derived from `Group`), the command line
-has the group's fields as options, and the verb gets them as one value.
+A verb is a function; where an argument is annotated with a group (a dataclass derived from `OptionGroup`), the command
+line has the group's fields as options, and the verb gets them as one value.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ CHAINS = Path("chains")
 
 
 @dataclass(frozen=True)
-class Group:
+class OptionGroup:
     """A group of options."""
 
 
 @dataclass(frozen=True)
-class Output(Group):
+class OutputOptions(OptionGroup):
     """What every verb can be asked for beside its answer."""
 
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout; logs go to stderr.")] = False
@@ -39,14 +39,14 @@ class Output(Group):
 
 
 @dataclass(frozen=True)
-class Stored(Group):
+class StoredOption(OptionGroup):
     """Where the answer is stored whole."""
 
     folder: Annotated[Path, typer.Option("--out", help="Folder of the answers; this one gets its own inside.")] = CHAINS
 
 
 @dataclass(frozen=True)
-class StoredOnRequest(Group):
+class StoredOnRequestOption(OptionGroup):
     """Where an answer is stored that is quickly had again."""
 
     folder: Annotated[
@@ -55,7 +55,7 @@ class StoredOnRequest(Group):
 
 
 @dataclass(frozen=True)
-class Film(Group):
+class FilmOptions(OptionGroup):
     """A strain energy with its parameters."""
 
     material: Annotated[str, typer.Option("--material", help="neo_hookean, mooney_rivlin, gent, yeoh or ogden.")]
@@ -68,7 +68,7 @@ class Film(Group):
 
 
 @dataclass(frozen=True)
-class Curve(Group):
+class CurveOptions(OptionGroup):
     """A measured curve."""
 
     curve: Annotated[
@@ -87,7 +87,7 @@ class Curve(Group):
 
 
 @dataclass(frozen=True)
-class Range(Group):
+class RangeOption(OptionGroup):
     """How much of the curve is used."""
 
     max_deflection_mm: Annotated[
@@ -100,7 +100,7 @@ class Range(Group):
 
 
 @dataclass(frozen=True)
-class Ranges(Group):
+class RangesOption(OptionGroup):
     """Several ranges of one curve."""
 
     ranges_mm: Annotated[
@@ -114,21 +114,21 @@ class Ranges(Group):
 
 
 @dataclass(frozen=True)
-class Material(Group):
+class MaterialOption(OptionGroup):
     """The strain energy that is asked about."""
 
     material: Annotated[str, typer.Option("--material", help="neo_hookean, mooney_rivlin, gent, yeoh or ogden.")]
 
 
 @dataclass(frozen=True)
-class Materials(Group):
+class MaterialsOption(OptionGroup):
     """Several strain energies."""
 
     materials: Annotated[str, typer.Option("--materials", help="By commas; yeoh+prestretch adds an effect to one.")]
 
 
 @dataclass(frozen=True)
-class Beside(Group):
+class HypothesisOptions(OptionGroup):
     """What is claimed beside the strain energy."""
 
     effects: Annotated[str, typer.Option("--effects", help="Physical effects beside the material, by commas.")] = ""
@@ -146,7 +146,7 @@ class Beside(Group):
 
 
 @dataclass(frozen=True)
-class BesideAuto(Beside):
+class HypothesisOptionsAuto(HypothesisOptions):
     """The same where the noise may be found out."""
 
     noise: Annotated[
@@ -156,7 +156,7 @@ class BesideAuto(Beside):
 
 
 @dataclass(frozen=True)
-class Sampling(Group):
+class SamplingOptions(OptionGroup):
     """How well a posterior is sampled."""
 
     ess: Annotated[float, typer.Option("--ess", help="Wanted effective sample size of the worst parameter.")] = 1000.0
@@ -165,7 +165,7 @@ class Sampling(Group):
 def spread(verb: Callable[..., None]) -> Callable[..., None]:
     """``verb`` with the fields of every group among its arguments as arguments of their own, as Typer wants them."""
     hints = get_type_hints(verb, include_extras=True)
-    groups = {n: h for n, h in hints.items() if inspect.isclass(h) and issubclass(h, Group)}
+    groups = {n: h for n, h in hints.items() if inspect.isclass(h) and issubclass(h, OptionGroup)}
     flat: dict[str, inspect.Parameter] = {}
     for name, parameter in inspect.signature(verb).parameters.items():
         own = _fields(groups[name]) if name in groups else [(name, hints[name], parameter.default)]
@@ -182,7 +182,7 @@ def spread(verb: Callable[..., None]) -> Callable[..., None]:
     return typed
 
 
-def _fields(group: type[Group]) -> list[tuple[str, Any, Any]]:
+def _fields(group: type[OptionGroup]) -> list[tuple[str, Any, Any]]:
     hints = get_type_hints(group, include_extras=True)
     empty = inspect.Parameter.empty
     return [(f.name, hints[f.name], empty if f.default is MISSING else f.default) for f in fields(group)]

@@ -15,6 +15,7 @@ from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.calibration.posterior import enough_points
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.convexity import FREE, REACHED, RESTRICTING
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -40,8 +41,8 @@ class FittedParameter:
     unit: str
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(Showable):
     """The optimum of one loss.
 
     Attributes

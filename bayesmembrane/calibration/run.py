@@ -38,14 +38,15 @@ from bayesmembrane.calibration.store import (
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.cache import CachedSolver, Tally
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis, from_settings
 from bayesmembrane.physics.mechanics import api
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
+@dataclass(frozen=True, eq=False, repr=False)
+class Run(Showable):
     """A sampled posterior.
 
     Attributes

@@ -11,9 +11,11 @@ from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.calibration.posterior import Posterior, tally
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array
 
 BROAD, CLOSE, ROUNDS, EACH = 256, 256, 5, 192
+HALVINGS = 40  # of the interval of tempering powers
 VALLEYS, ITERATIONS = 8, 40
 WIDER = 1.5  # of the Laplace approximation
 DEGREES = 4.0  # of freedom of the t-distribution around a valley
@@ -118,14 +120,10 @@ def _around_valleys(objective: Objective, pool: Array, rms: float, rng: np.rando
 def _tempered(lp: Array, worth: float, count: int, rng: np.random.Generator) -> Array:
     """Indices of ``count`` of the candidates, without replacement while they last, with weights exp(b lp)."""
     lp = lp - np.max(lp)
-    low, high = 0.0, 1.0
     worth = min(worth, 0.9 * len(lp))
-    for _ in range(40):
-        b = 0.5 * (low + high)
-        w = np.exp(b * lp)
-        low, high = (b, high) if effective_draws(w) >= worth else (low, b)
+    power, _ = bisected(lambda b: effective_draws(np.exp(b * lp)) >= worth, 0.0, 1.0, HALVINGS)
     # The largest of ln w + Gumbel noise are a draw without replacement.
-    order = np.argsort(-(low * lp + rng.gumbel(size=lp.size)))
+    order = np.argsort(-(power * lp + rng.gumbel(size=lp.size)))
     return np.asarray(np.resize(order, count) if len(order) < count else order[:count])
 
 

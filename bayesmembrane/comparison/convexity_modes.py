@@ -85,10 +85,10 @@ def by_convexity(
     except SettingsError:
         starts = first[:0]
     found = _adapted(free, around(np.concatenate([first, starts]), rng), FREE.name, ROUNDS, rng)
-    rows = []
+    own, rows = (posterior.hypothesis.convexity.name, log_evidence, sd), []
     for mode in MODES:
         part = found if found.ess(mode) >= LEAST_ESS else _again(free, found, mode, rng)
-        rows.append(_row(posterior.hypothesis.convexity.name, mode, found, part, log_evidence, sd, masses[mode]))
+        rows.append(_row(own, mode, found, part, masses[mode]))
     return tuple(rows)
 
 
@@ -157,24 +157,26 @@ def _again(free: Posterior, found: _Weighted, mode: str, rng: np.random.Generato
     return _adapted(free, around(found.resampled(mode, EACH, rng), rng), mode, 2, rng)
 
 
-def _row(own: str, mode: str, found: _Weighted, part: _Weighted, log_evidence: float, sd: float, mass: Mass) -> ByMode:
-    if mode == own:
+def _row(own: tuple[str, float, float], mode: str, found: _Weighted, part: _Weighted, mass: Mass) -> ByMode:
+    """ln Z of ``mode`` from that of the ``own`` one (its name, ln Z and error); ``found`` has draws of both."""
+    own_mode, log_evidence, sd = own
+    if mode == own_mode:
         total = float(np.hypot(sd, mass.sd / mass.value))
         return ByMode(mode, log_evidence - float(np.log(mass.value)), total, mass.value, mass.sd, part.ess(mode), None)
     ess = part.ess(mode)
     if mass.sd > WIDEST_MASS * mass.value:
         return ByMode(mode, None, None, mass.value, mass.sd, ess, Missing.PRIOR)
     few = ess < LEAST_ESS or np.max(part.relative(mode)) > LARGEST_SHARE * np.sum(part.relative(mode))
-    if few or found.ess(own) < LEAST_ESS:
+    if few or found.ess(own_mode) < LEAST_ESS:
         missing = Missing.DRAWS if np.any(part.inside[mode]) else Missing.NONE
         return ByMode(mode, None, None, mass.value, mass.sd, ess, missing)
-    value = log_evidence + part.log_mean(mode) - found.log_mean(own) - float(np.log(mass.value))
+    value = log_evidence + part.log_mean(mode) - found.log_mean(own_mode) - float(np.log(mass.value))
     if part is found:
-        a, b = found.relative(mode), found.relative(own)
+        a, b = found.relative(mode), found.relative(own_mode)
         pull = a / np.mean(a) - b / np.mean(b)
         error = float(np.std(pull) / np.sqrt(len(pull)))
     else:
-        error = float(np.hypot(part.log_sd(mode), found.log_sd(own)))
+        error = float(np.hypot(part.log_sd(mode), found.log_sd(own_mode)))
     return ByMode(
         mode, value, float(np.sqrt(error**2 + sd**2 + (mass.sd / mass.value) ** 2)), mass.value, mass.sd, ess, None
     )

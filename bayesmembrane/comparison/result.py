@@ -15,6 +15,7 @@ from bayesmembrane.comparison.convexity_modes import ByMode
 from bayesmembrane.comparison.evidence.estimate import Evidence
 from bayesmembrane.comparison.leave_out.score import LeaveOneOut, LeaveRangeOut
 from bayesmembrane.comparison.prior_widths import Widened
+from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 
@@ -79,8 +80,8 @@ class Row:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Showable):
     """Hypotheses side by side: ``rows`` in the order asked for."""
 
     rows: tuple[Row, ...]

@@ -22,6 +22,7 @@ from bayesmembrane.diagnosis.explanation.case import Tell
 from bayesmembrane.diagnosis.left.discrepancy import Discrepancy, discrepancy
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned, thinning
 from bayesmembrane.diagnosis.thresholds import LOOP, TINY
+from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -68,8 +69,8 @@ class Round:
         return self.after.run.hypothesis.label() != self.before.run.hypothesis.label()
 
 
-@dataclass(frozen=True, eq=False)
-class Loop:
+@dataclass(frozen=True, eq=False, repr=False)
+class Loop(Showable):
     """All rounds, the last one being adequate or abstaining; ``left`` is kept, unnamed, where it abstains.
 
     thinned : what was taken of a measurement with too many readings; else None

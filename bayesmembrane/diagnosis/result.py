@@ -15,6 +15,7 @@ from bayesmembrane.diagnosis.left.heldout import HeldOut, Misfit
 from bayesmembrane.diagnosis.left.shape import ResidualShape
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.separation import Experiment
+from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 VERDICTS = ("adequate", "named", "ambiguous", "material", "unknown")
@@ -28,8 +29,8 @@ class Thinned:
     measured: int
 
 
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Showable):
     """The answer.
 
     Attributes

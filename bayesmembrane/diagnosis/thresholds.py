@@ -227,20 +227,10 @@ class DiscrepancyThresholds:
 
 @dataclass(frozen=True)
 class NextTestThresholds:
-    """Further measurements that are simulated where rivals are left."""
+    """What further measurements that are simulated must show; see `next_test`."""
 
-    points: int = 240
-    """Readings of a leg."""
-    faster: float = 10.0
-    """Times the speed: a decade shows rate and relaxation."""
-    peaks: tuple[float, ...] = (0.5, 0.75, 1.0, 1.0)
-    """Of the largest deflection: what remembers the past shows on rising peaks, and on the repeated one."""
-    usual_speed: float = 1e-3
-    """m/s, where the measurement has no times."""
     clear: float = 5.0
     """Standard deviations between the nearest two rivals: beyond it, that test settles it."""
-    rank: float = 1e-9
-    """Of the largest singular value, when a rival adapts."""
 
 
 @dataclass(frozen=True)

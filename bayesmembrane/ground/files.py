@@ -44,8 +44,8 @@ def write_whole(path: Path, writer: Callable[[Path], Any], what: str = "the file
 
 
 def write_text(path: Path, text: str, what: str = "the file") -> Path:
-    """`write_whole` of a text in UTF-8."""
-    return write_whole(path, lambda part: part.write_text(text, encoding="utf-8"), what)
+    """`write_whole` of a text in UTF-8, its lines ending alike on every machine."""
+    return write_whole(path, lambda part: part.write_text(text, encoding="utf-8", newline="\n"), what)
 
 
 def _sync(path: Path) -> None:

@@ -16,7 +16,8 @@ from bayesmembrane.ground.registry import components
 class Shower(Protocol):
     """What `Showable` asks of a component of the group "sections"."""
 
-    shows: type[Any]
+    shows: type[Any] | None
+    takes: tuple[type[Any], ...]
 
     def text(self, result: Any) -> str:
         """A result as plain text: a title and a few sentences."""
@@ -42,10 +43,12 @@ class Showable:
 
 
 def shower_of(kind: type[Any]) -> Shower | None:
-    """The section that shows results of this type, or of the nearest of its bases; None if there is none."""
-    found = {section.shows: section for section in components("sections").values()}
-    nearest = next((base for base in kind.__mro__ if base in found), None)
-    return None if nearest is None else found[nearest]()
+    """The section that shows results of this type, or else one that takes them; None if there is none."""
+    every = list(components("sections").values())
+    known = {taken: section for section in every for taken in section.takes}
+    known |= {section.shows: section for section in every}
+    nearest = next((base for base in kind.__mro__ if base in known), None)
+    return None if nearest is None else known[nearest]()
 
 
 def outline(value: Any) -> str:

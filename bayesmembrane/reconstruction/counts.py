@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bayesmembrane.reconstruction.fit import Mode, descend, find_mode, knobs_at, scan
-from bayesmembrane.reconstruction.model import Knobs, Model
+from bayesmembrane.reconstruction.model import Knobs, LossModel
 
 Found = dict[int, tuple[float, float]]
 """For each number of points: ln evidence, and the most probable first position in m."""
@@ -25,7 +25,7 @@ CANDIDATE = 12.0  # numbers of points within this of the best are compared on al
 NEGLIGIBLE = 1e-6  # probability not worth telling
 
 
-def search_counts(model: Model, r: int, roughness: float, nugget: float) -> Found:
+def search_counts(model: LossModel, r: int, roughness: float, nugget: float) -> Found:
     """Every number of points of range r, from its losses alone; raising it ends where nothing fits any more."""
     found: Found = {}
     hopeless = 0
@@ -38,7 +38,7 @@ def search_counts(model: Model, r: int, roughness: float, nugget: float) -> Foun
     return found
 
 
-def search_again(model: Model, r: int, roughness: float, nugget: float, found: Found) -> Found:
+def search_again(model: LossModel, r: int, roughness: float, nugget: float, found: Found) -> Found:
     """The likely numbers of an earlier search, for a model that believes fewer rows; the others fall back as they did.
 
     A wrong row raises the errors that a search has to allow for, and so makes wrong numbers look possible.
@@ -49,7 +49,7 @@ def search_again(model: Model, r: int, roughness: float, nugget: float, found: F
     return {n: new[n] if n in new else (e + shift, a) for n, (e, a) in found.items()}
 
 
-def _count(model: Model, r: int, n: int, roughness: float, nugget: float) -> tuple[float, float]:
+def _count(model: LossModel, r: int, n: int, roughness: float, nugget: float) -> tuple[float, float]:
     trial = replace(model, ranges=(r,), counts=(n,))
     modes = descend(trial, [knobs_at(roughness, nugget, s / 5, (s,)) for s in COARSE])
     return _mean_evidence(modes), _first(trial, modes)[0]
@@ -60,7 +60,7 @@ def _likely(found: Found) -> list[int]:
     return [n for n, (e, _) in found.items() if e > top - CANDIDATE]
 
 
-def compare_counts(model: Model, knobs: Knobs, searched: list[Found], grid: list[Knobs]) -> Compared:
+def compare_counts(model: LossModel, knobs: Knobs, searched: list[Found], grid: list[Knobs]) -> Compared:
     """The likely numbers of points of all ranges together.
 
     The ranges sample one curve, so what one says about the curve helps to count the points of the other.
@@ -98,6 +98,6 @@ def _mean_evidence(modes: list[Mode]) -> float:
     return float(logsumexp([m.evidence for m in modes]) - np.log(len(modes)))
 
 
-def _first(model: Model, modes: list[Mode]) -> tuple[float, ...]:
+def _first(model: LossModel, modes: list[Mode]) -> tuple[float, ...]:
     best = max(modes, key=lambda m: m.evidence)
     return tuple(model.evaluate(best.theta[None], best.knobs).first[0].tolist())

@@ -10,7 +10,7 @@ import tomli_w
 from numpy.typing import NDArray
 
 from bayesmembrane.data.published import PublishedTable
-from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.files import write_text
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.reconstruction.result import Reconstruction
 
@@ -42,18 +42,8 @@ def write_reconstruction(found: Reconstruction, table: PublishedTable, folder: P
         for r, a in zip(found.ranges, starts[:-1].tolist(), strict=True)
     }
     parts[WHOLE] = np.argsort(found.deflection, kind="stable")
-    written: list[Path] = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, order in parts.items():
-            for path, text in _texts(found, table, folder, name, order).items():
-                path.write_text(text, encoding="utf-8", newline="\n")
-                written.append(path)
-    except OSError as error:
-        raise StorageError(
-            f"the file cannot be written ({error.strerror})", str(error.filename), "choose another folder"
-        ) from None
-    return tuple(written)
+    texts = [_texts(found, table, folder, name, order) for name, order in parts.items()]
+    return tuple(write_text(path, text, "the file") for part in texts for path, text in part.items())
 
 
 def _texts(

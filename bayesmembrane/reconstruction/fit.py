@@ -10,7 +10,7 @@ from scipy.special import expit, logit, logsumexp
 
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.reconstruction.model import MODES, Knobs, Model, State, wiener_basis
+from bayesmembrane.reconstruction.model import MODES, CurveState, Knobs, LossModel, wiener_basis
 
 LOOSEN = (64.0, 16.0, 4.0, 1.0)  # errors are first taken as larger than they are: the way to the mode is then smooth
 ROUNDS = 8
@@ -50,7 +50,7 @@ def knobs_at(roughness: float, nugget: float, rounding: float, solver: tuple[flo
     return Knobs(np.array([roughness]), np.array([nugget]), np.array([solver]), np.array([rounding]))
 
 
-def find_mode(model: Model, knobs: Knobs) -> Mode:
+def find_mode(model: LossModel, knobs: Knobs) -> Mode:
     """The best of the modes that trilateration at several first positions leads to."""
     found = []
     for share in SHARES:
@@ -63,7 +63,7 @@ def find_mode(model: Model, knobs: Knobs) -> Mode:
     return _climb(model, best.theta, knobs)
 
 
-def descend(model: Model, knobs: list[Knobs]) -> list[Mode]:
+def descend(model: LossModel, knobs: list[Knobs]) -> list[Mode]:
     """The modes at settings that allow for ever smaller errors, each started from the one before."""
     found: list[list[Mode]] = []
     for share in SHARES:
@@ -75,7 +75,7 @@ def descend(model: Model, knobs: list[Knobs]) -> list[Mode]:
     return [max(at, key=lambda m: m.value) for at in zip(*found, strict=True)]
 
 
-def trilaterate(model: Model, knobs: Knobs, share: Array) -> Array:
+def trilaterate(model: LossModel, knobs: Knobs, share: Array) -> Array:
     """Unknowns (P,) near the mode, from equations that are linear in the measured forces y,
 
         L_k^2 = |y|^2 - 2 F_k . y + |F_k|^2,
@@ -122,7 +122,7 @@ def _robust_lines(a: Array, b: Array, believed: Array, priors: int, tail: float)
     return s
 
 
-def _climb(model: Model, theta: Array, knobs: Knobs, loosen: float = 1.0, least: float = LEAST_GAIN) -> Mode:
+def _climb(model: LossModel, theta: Array, knobs: Knobs, loosen: float = 1.0, least: float = LEAST_GAIN) -> Mode:
     """Damped Gauss-Newton from ``theta``; every step raises the posterior density, or it is the last."""
     here = _look(model, theta, knobs, loosen)
     damping = 1e-3
@@ -145,7 +145,7 @@ def _climb(model: Model, theta: Array, knobs: Knobs, loosen: float = 1.0, least:
     return Mode(here.theta, here.value, here.precision, here.value + spread, knobs)
 
 
-class _Place(NamedTuple):
+class _Look(NamedTuple):
     """Unknowns, log posterior (-inf where there is none), its gradient, and its negative curvature."""
 
     theta: Array
@@ -154,30 +154,30 @@ class _Place(NamedTuple):
     precision: Array
 
 
-def _look(model: Model, theta: Array, knobs: Knobs, loosen: float) -> _Place:
+def _look(model: LossModel, theta: Array, knobs: Knobs, loosen: float) -> _Look:
     with np.errstate(all="ignore"):
         state = model.evaluate(theta[None], knobs)
         values, gradients = model.log_density(theta[None], state, knobs, loosen)
     value, gradient = float(values[0]), gradients[0]
     if not (np.isfinite(value) and np.all(np.isfinite(gradient))):
-        return _Place(theta, -np.inf, gradient, np.eye(theta.size))
+        return _Look(theta, -np.inf, gradient, np.eye(theta.size))
     scale = model.error_scale(knobs, 1)[0] * loosen
     weight = model.weights(state.residual / scale)[0][0] / scale**2
     share = expit(theta[-len(model.ranges) :])
     prior = np.concatenate([np.ones(theta.size - share.size), 2 * share * (1 - share)])
     precision = (state.jacobian[0].T * weight) @ state.jacobian[0] + np.diag(prior)
-    return _Place(theta, value, gradient, precision)
+    return _Look(theta, value, gradient, precision)
 
 
 # ---- scales that are not known beforehand ----------------------------------------------------------------------------
 
 
-def scan(model: Model, grid: list[Knobs], start: Mode) -> list[Mode]:
+def scan(model: LossModel, grid: list[Knobs], start: Mode) -> list[Mode]:
     """The modes at all settings of the scales, each from ``start``."""
     return [_climb(model, _restart(start, knobs), knobs) for knobs in grid]
 
 
-def again(model: Model, mode: Mode, knobs: Knobs | None = None) -> Mode:
+def again(model: LossModel, mode: Mode, knobs: Knobs | None = None) -> Mode:
     """The mode of a model that differs a little from the one that ``mode`` belongs to, or at other scales."""
     knobs = mode.knobs if knobs is None else knobs
     return _climb(model, _restart(mode, knobs), knobs)
@@ -218,12 +218,12 @@ class Draws(NamedTuple):
     knobs: Knobs
     acceptance: float
 
-    def states(self, model: Model) -> list[State]:
-        """What the draws mean, one `State` of B vectors per step of the chains."""
+    def states(self, model: LossModel) -> list[CurveState]:
+        """What the draws mean, one `CurveState` of B vectors per step of the chains."""
         return [model.evaluate(t, self.knobs) for t in self.theta]
 
 
-def sample(model: Model, modes: list[Mode], chains: int, steps: int, seed: int) -> Draws:
+def sample(model: LossModel, modes: list[Mode], chains: int, steps: int, seed: int) -> Draws:
     """Hamiltonian draws: each chain has the scales of one mode, chosen in proportion to the evidences.
 
     The chain moves in the coordinates in which that mode's curvature is the identity. Raises `DataError` if hardly
@@ -240,31 +240,33 @@ def sample(model: Model, modes: list[Mode], chains: int, steps: int, seed: int) 
     theta = np.array([modes[i].theta for i in chosen])
     theta = theta + 0.3 * np.einsum("bpq,bq->bp", root, rng.standard_normal(theta.shape))
     kept, accepted = [], []
-    value, gradient = _safe(model, theta, knobs)
+    at = _Chains(theta, *_safe(model, theta, knobs))
     size = np.full(chains, STEP)
     for step in range(WARM_UP + steps):
-        theta, value, gradient, chance = _leap(model, theta, value, gradient, knobs, root, size, rng)
+        at, chance = _leap(model, at, knobs, root, size, rng)
         if step < WARM_UP:
             size = size * np.exp(0.15 * (chance - ACCEPT))
         else:
-            kept.append(theta)
+            kept.append(at.theta)
             accepted.append(chance)
     if np.mean(accepted) < 0.2:
         raise DataError("the reconstruction's posterior could not be sampled", remedy="check the table of losses")
     return Draws(np.array(kept), knobs, float(np.mean(accepted)))
 
 
+class _Chains(NamedTuple):
+    """Unknowns (B, P) of all chains, log posterior (B,) and gradient (B, P)."""
+
+    theta: Array
+    value: Array
+    gradient: Array
+
+
 def _leap(
-    model: Model,
-    theta: Array,
-    value: Array,
-    gradient: Array,
-    knobs: Knobs,
-    root: Array,
-    size: Array,
-    rng: np.random.Generator,
-) -> tuple[Array, Array, Array, Array]:
-    """One Hamiltonian step of all chains: theta, value, gradient, chance of acceptance (B,)."""
+    model: LossModel, at: _Chains, knobs: Knobs, root: Array, size: Array, rng: np.random.Generator
+) -> tuple[_Chains, Array]:
+    """One Hamiltonian step of all chains, and the chances of acceptance (B,)."""
+    theta, value, gradient = at
     start = rng.standard_normal(theta.shape)
     step = (size * (1 + 0.2 * rng.standard_normal(size.size)))[:, None]
     new, slope = theta, np.einsum("bp,bpq->bq", gradient, root)
@@ -278,15 +280,14 @@ def _leap(
     gain = trial - value - 0.5 * np.sum(momentum**2 - start**2, axis=1)
     chance = np.exp(np.minimum(0.0, np.where(np.isfinite(gain), gain, -np.inf)))
     take = rng.random(chance.size) < chance
-    return (
+    return _Chains(
         np.where(take[:, None], new, theta),
         np.where(take, trial, value),
         np.where(take[:, None], new_gradient, gradient),
-        chance,
-    )
+    ), chance
 
 
-def _safe(model: Model, theta: Array, knobs: Knobs) -> tuple[Array, Array]:
+def _safe(model: LossModel, theta: Array, knobs: Knobs) -> tuple[Array, Array]:
     """Value and gradient, with -inf and 0 where a chain ran away."""
     with np.errstate(all="ignore"):
         value, gradient = model.log_posterior(theta, knobs)

@@ -153,7 +153,7 @@ def wiener_basis(top: float) -> CubicSpline:
     return CubicSpline(x, np.column_stack([np.full(x.size, LINE[0]), LINE[1] * s, modes]))
 
 
-class State(NamedTuple):
+class CurveState(NamedTuple):
     """What B vectors of unknowns mean.
 
     Attributes
@@ -175,8 +175,17 @@ class State(NamedTuple):
     force_jacobian: Array
 
 
+class _Curve(NamedTuple):
+    """x, force (B, N), derivatives of the forces (B, N, P), and how x moves with the first position (B, N)."""
+
+    x: Array
+    force: Array
+    dforce: Array
+    moving: Array
+
+
 @dataclass(frozen=True)
-class Model:
+class LossModel:
     """The posterior at given numbers of points.
 
     Attributes
@@ -202,7 +211,7 @@ class Model:
     widest: float = 1.0
     tail: float = TAIL
 
-    def without(self, row: int) -> Model:
+    def without(self, row: int) -> LossModel:
         """The model that does not believe a row."""
         use = self.use.copy()
         use[row] = False
@@ -258,7 +267,7 @@ class Model:
         du = np.einsum("bnj,bj->bn", basis(x, 1) * scale, coefficients)
         return force, force * (slope / reference + du), force[:, :, None] * shape
 
-    def evaluate(self, theta: Array, knobs: Knobs) -> State:
+    def evaluate(self, theta: Array, knobs: Knobs) -> CurveState:
         """Positions, forces, residuals and derivatives for unknowns (B, P)."""
         nb, n, ranges = 2 + MODES, self.points, len(self.ranges)
         x, first, dfirst, weight = self.positions(theta[:, -ranges:])
@@ -271,14 +280,14 @@ class Model:
         moving = weight * np.repeat(dfirst, self.counts, axis=1)
         for i, block in enumerate(self.blocks()):
             dforce[:, block, self.size - ranges + i] = (slope * moving)[:, block]
-        parts = [self._range(i, theta, knobs, x, force, dforce, moving) for i in range(ranges)]
+        curve = _Curve(x, force, dforce, moving)
+        parts = [self._range(i, theta, knobs, curve) for i in range(ranges)]
         residual, jacobian = (np.concatenate(v, axis=1) for v in zip(*parts, strict=True))
-        return State(x, force, smooth, slope, first, residual, jacobian, dforce)
+        return CurveState(x, force, smooth, slope, first, residual, jacobian, dforce)
 
-    def _range(
-        self, i: int, theta: Array, knobs: Knobs, x: Array, force: Array, dforce: Array, moving: Array
-    ) -> tuple[Array, Array]:
+    def _range(self, i: int, theta: Array, knobs: Knobs, curve: _Curve) -> tuple[Array, Array]:
         """Residuals (B, K) of range i and their derivatives (B, K, P)."""
+        x, force, dforce, moving = curve
         block = self.blocks()[i]
         simulated, slope = self.simulations.forces(x[:, block])
         scale = np.broadcast_to(knobs.solver, (theta.shape[0], len(self.ranges)))[:, i]
@@ -305,7 +314,7 @@ class Model:
         """ln p(losses, theta) (B,) and its gradient (B, P); normalised in the losses."""
         return self.log_density(theta, self.evaluate(theta, knobs), knobs, loosen)
 
-    def log_density(self, theta: Array, state: State, knobs: Knobs, loosen: float) -> tuple[Array, Array]:
+    def log_density(self, theta: Array, state: CurveState, knobs: Knobs, loosen: float) -> tuple[Array, Array]:
         """As `log_posterior`, from what the unknowns mean; ``loosen`` multiplies the errors."""
         scale = self.error_scale(knobs, theta.shape[0]) * loosen
         z = state.residual / scale

@@ -3,14 +3,15 @@
 A paper that prints the Euclidean distance between a measured force curve and K simulated ones, but not the curve, has
 printed the curve all the same: K distances to K known points locate it, as a position follows from ranges. The unknown
 number and first position of the training deflections, errors of the published simulations and misprints are part of
-the question. `reconstruction_model` has the posterior, `reconstruction_fit` its mode, evidence and draws,
-`reconstruction_counts` the numbers of points, `reconstruction_rows` the rows that contradict the others.
+the question. `model` has the posterior, `fit` its mode, evidence and draws, `counts` the numbers of points, `rows` the
+rows that contradict the others.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
@@ -28,7 +29,7 @@ from bayesmembrane.reconstruction.counts import (
     tell_counts,
 )
 from bayesmembrane.reconstruction.fit import Draws, Mode, again, find_mode, knob_grid, knobs_at, sample, scan
-from bayesmembrane.reconstruction.model import Knobs, Model, Simulate, tabulate
+from bayesmembrane.reconstruction.model import Knobs, LossModel, Simulate, tabulate
 from bayesmembrane.reconstruction.result import Influence, LossCheck, RangeResult, Reconstruction
 from bayesmembrane.reconstruction.rows import RowCheck, check_row, set_aside, suspect
 
@@ -65,7 +66,7 @@ def reconstruct(table: PublishedTable | None = None, simulate: Simulate | None =
     simulate = simulate if simulate is not None else simulate_on(table)
     simulations = tabulate(table, simulate)
     ranges = range(len(table.ranges))
-    model = Model(simulations, table.losses, simulations.usable, tuple(ranges), (), table.step)
+    model = LossModel(simulations, table.losses, simulations.usable, tuple(ranges), (), table.step)
     searched = [search_counts(model, r, ROUGHNESS[1], NUGGET) for r in ranges]
     middle = knobs_at(ROUGHNESS[1], NUGGET, ROUNDING[1], (SOLVER[1],) * len(ranges))
     model = replace(model, counts=tuple(max(f, key=lambda n: f[n][0]) for f in searched))
@@ -76,16 +77,22 @@ def reconstruct(table: PublishedTable | None = None, simulate: Simulate | None =
     model = replace(model, counts=best_counts(compared))
     grid = knob_grid(ROUGHNESS, (NUGGET,), ROUNDING, SOLVER, len(ranges))
     modes = scan(model, grid, find_mode(model, middle))
-    return _answer(table, simulate, model, modes, searched, compared, seed)
+    return _answer(table, simulate, model, modes, _Counted(searched, compared), seed)
+
+
+class _Counted(NamedTuple):
+    """What is known of the numbers of points: from each range alone, and from all together."""
+
+    searched: list[Found]
+    compared: Compared
 
 
 def _answer(
     table: PublishedTable,
     simulate: Simulate,
-    model: Model,
+    model: LossModel,
     modes: list[Mode],
-    searched: list[Found],
-    compared: Compared,
+    counted: _Counted,
     seed: int,
 ) -> Reconstruction:
     mode = max(modes, key=lambda m: m.evidence)
@@ -96,7 +103,7 @@ def _answer(
     checks = [check_row(model, mode, k) for k in range(len(table.rows))]
     wrong = np.flatnonzero(~model.use).tolist()
     return Reconstruction(
-        _ranges(table, model, mode, np.sqrt(np.diag(covariance)), firsts, searched, compared),
+        _ranges(table, model, mode, np.sqrt(np.diag(covariance)), firsts, counted),
         covariance,
         _losses(table, model, mode, checks),
         tuple(suspect(table, model, mode, checks[k], simulate) for k in wrong),
@@ -108,24 +115,23 @@ def _answer(
 
 def _ranges(
     table: PublishedTable,
-    model: Model,
+    model: LossModel,
     mode: Mode,
     sd: Array,
     firsts: Array,
-    searched: list[Found],
-    compared: Compared,
+    counted: _Counted,
 ) -> tuple[RangeResult, ...]:
     state = model.evaluate(mode.theta[None], mode.knobs)
     found = []
     for r, block in enumerate(model.blocks()):
-        probability, positions = tell_counts(r, searched[r], compared)
+        probability, positions = tell_counts(r, counted.searched[r], counted.compared)
         first = float(np.mean(firsts[:, r])), float(np.std(firsts[:, r]))
         curve = state.x[0, block], state.force[0, block], sd[block]
         found.append(RangeResult(table.ranges[r], probability, positions, *first, *curve))
     return tuple(found)
 
 
-def _losses(table: PublishedTable, model: Model, mode: Mode, checks: list[RowCheck]) -> tuple[LossCheck, ...]:
+def _losses(table: PublishedTable, model: LossModel, mode: Mode, checks: list[RowCheck]) -> tuple[LossCheck, ...]:
     state = model.evaluate(mode.theta[None], mode.knobs)
     simulated, force = model.simulations.forces(state.x)[0][0], state.force[0]
     found = []
@@ -138,7 +144,7 @@ def _losses(table: PublishedTable, model: Model, mode: Mode, checks: list[RowChe
     return tuple(found)
 
 
-def _at_mode(model: Model, mode: Mode, draws: Draws) -> tuple[Array, Array]:
+def _at_mode(model: LossModel, mode: Mode, draws: Draws) -> tuple[Array, Array]:
     """Forces (M, N) of all draws at the positions of the mode, and their first positions (M, R) in m.
 
     A draw whose positions differ is moved along its own smooth curve: what is asked is the force at one deflection.
@@ -154,12 +160,12 @@ def _at_mode(model: Model, mode: Mode, draws: Draws) -> tuple[Array, Array]:
 # ---- what other assumptions would give -------------------------------------------------------------------------------
 
 
-def _influence(model: Model, mode: Mode) -> tuple[Influence, ...]:
+def _influence(model: LossModel, mode: Mode) -> tuple[Influence, ...]:
     """The forces at the same deflections when one assumption is changed."""
     k = mode.knobs
     x = model.evaluate(mode.theta[None], k).x
     roughness, nugget = np.asarray(k.roughness), np.asarray(k.nugget)
-    changes: list[tuple[str, Model, Knobs, bool]] = [
+    changes: list[tuple[str, LossModel, Knobs, bool]] = [
         ("curve twice as smooth", model, k._replace(roughness=roughness / 2), True),
         ("curve twice as rough", model, k._replace(roughness=roughness * 2), True),
         ("curve four times as rough", model, k._replace(roughness=roughness * 4), True),
@@ -178,7 +184,7 @@ def _influence(model: Model, mode: Mode) -> tuple[Influence, ...]:
     return (*found, _uncoupled(model, mode, x))
 
 
-def _uncoupled(model: Model, mode: Mode, x: Array) -> Influence:
+def _uncoupled(model: LossModel, mode: Mode, x: Array) -> Influence:
     """Each range with a smooth curve of its own."""
     parts = []
     for r, block in zip(model.ranges, model.blocks(), strict=True):
@@ -188,7 +194,7 @@ def _uncoupled(model: Model, mode: Mode, x: Array) -> Influence:
     return Influence("each range with a smooth curve of its own", np.concatenate(parts), None)
 
 
-def _moved(model: Model, mode: Mode, x: Array) -> Array:
+def _moved(model: LossModel, mode: Mode, x: Array) -> Array:
     """(N,) forces of a mode at deflections x (1, N), moved along its smooth curve."""
     state = model.evaluate(mode.theta[None], mode.knobs)
     force: Array = (state.force + model.smooth(mode.theta[None], mode.knobs, x)[0] - state.smooth)[0]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.showable import Showable
 from bayesmembrane.reconstruction.rows import Correction, Suspect
 
 
@@ -92,8 +93,8 @@ class Influence:
     log_evidence: float | None
 
 
-@dataclass(frozen=True)
-class Reconstruction:
+@dataclass(frozen=True, repr=False)
+class Reconstruction(Showable):
     """The measured curve, how sure it is, and which printed rows contradict the others.
 
     Attributes

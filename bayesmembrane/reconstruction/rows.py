@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from bayesmembrane.data.published import PrintedSet, PublishedTable
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.reconstruction.fit import Mode, again, find_mode
-from bayesmembrane.reconstruction.model import Model, Simulate
+from bayesmembrane.reconstruction.model import LossModel, Simulate
 
 WRONG = 0.05  # prior probability that a row is wrong
 DECADES = 4.0  # a wrong loss is off by any order of magnitude, from the solver's error up: this many decades
@@ -100,7 +100,7 @@ class Suspect:
         return bool(np.all(np.isfinite([p.predicted for p in self.losses])))
 
 
-def check_row(model: Model, mode: Mode, index: int) -> RowCheck:
+def check_row(model: LossModel, mode: Mode, index: int) -> RowCheck:
     """Predict a row from the others: the mode without it, its losses there, and how far they may be off.
 
     The errors of a material's simulations over a range are a Student t vector; given the other rows' errors, that of
@@ -126,7 +126,7 @@ def check_row(model: Model, mode: Mode, index: int) -> RowCheck:
     return RowCheck(index, excess, sd, _probability_wrong(excess, sd, freedom, own))
 
 
-def _group(model: Model, index: int, place: int) -> int:
+def _group(model: LossModel, index: int, place: int) -> int:
     """Which Student t vector a row's loss over a range belongs to."""
     materials = int(model.simulations.material.max()) + 1
     return place * materials + int(model.simulations.material[index])
@@ -144,7 +144,7 @@ def _probability_wrong(excess: Array, sd: Array, freedom: Array, scale: Array) -
     return float(1 / (1 + np.exp(-np.clip(log_odds, -700, 700))))
 
 
-def set_aside(model: Model, mode: Mode) -> tuple[Model, Mode]:
+def set_aside(model: LossModel, mode: Mode) -> tuple[LossModel, Mode]:
     """Take out the row that is most surely wrong, again and again, until none is."""
     while np.count_nonzero(model.use) > 4:
         checks = [check_row(model, mode, int(k)) for k in np.flatnonzero(model.use)]
@@ -159,7 +159,7 @@ def set_aside(model: Model, mode: Mode) -> tuple[Model, Mode]:
 # ---- corrections -----------------------------------------------------------------------------------------------------
 
 
-def suspect(table: PublishedTable, model: Model, mode: Mode, check: RowCheck, simulate: Simulate) -> Suspect:
+def suspect(table: PublishedTable, model: LossModel, mode: Mode, check: RowCheck, simulate: Simulate) -> Suspect:
     """What the row would have to say, by its smallest corrections: one parameter or loss, then several losses."""
     row = table.rows[check.index]
     sets: list[tuple[Correction, ...]] = [(c,) for c in _parameter_corrections(row, model, mode, check, simulate)]
@@ -191,7 +191,7 @@ def _loss_corrections(table: PublishedTable, row: PrintedSet, check: RowCheck) -
 
 
 def _parameter_corrections(
-    row: PrintedSet, model: Model, mode: Mode, check: RowCheck, simulate: Simulate
+    row: PrintedSet, model: LossModel, mode: Mode, check: RowCheck, simulate: Simulate
 ) -> list[Correction]:
     """Single parameters whose change makes all losses agree."""
     state = model.evaluate(mode.theta[None], mode.knobs)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
-from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.valleys.follow import RISE, between, valleys
@@ -16,8 +16,8 @@ from bayesmembrane.valleys.result import Between, Valley, Valleys
 from bayesmembrane.valleys.surface import unaided
 
 
-@dataclass(frozen=True, eq=False)
-class Beside:
+@dataclass(frozen=True, eq=False, repr=False)
+class Beside(Showable):
     """Valleys ``without`` effects and ``added`` with them; ``pairs`` has the closest approach of both in each range.
 
     The approach is that of the floors seen along the effects: in the material's parameters alone.
@@ -48,10 +48,9 @@ def valleys_beside(
     *,
     rise: float = RISE,
     seed: int = 0,
-    draws: Mapping[float, Array] | None = None,
     solve: Solve = unaided,
 ) -> Beside:
-    """`valleys` of ``hypothesis``, and of its material without the effects; ``draws`` are those of the former.
+    """`valleys` of ``hypothesis``, and of its material without the effects.
 
     Raises `SettingsError` if there are no effects, and what `valleys` raises.
     """
@@ -59,6 +58,6 @@ def valleys_beside(
         raise SettingsError(f"{hypothesis.label()} has no effects to be left out", remedy="name some, or ask `valleys`")
     plain = replace(hypothesis, effects=())
     without = valleys(measurement, plain, ranges, rise=rise, seed=seed, solve=solve)
-    added = valleys(measurement, hypothesis, ranges, rise=rise, seed=seed, draws=draws, solve=solve)
+    added = valleys(measurement, hypothesis, ranges, rise=rise, seed=seed, solve=solve)
     both = zip(without.ranges, added.ranges, strict=True)
     return Beside(without, added, tuple(between(a, b) for a, b in both))

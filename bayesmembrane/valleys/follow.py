@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -55,16 +55,14 @@ def valleys(
     *,
     rise: float = RISE,
     seed: int = 0,
-    draws: Mapping[float, Array] | None = None,
     solve: Solve = unaided,
 ) -> Valleys:
     """The valleys of ``hypothesis`` on ``measurement`` cut at each of ``ranges`` (m; the whole one without any).
 
-    See `valleys_of`; ``draws`` is keyed by the ranges.
+    See `valleys_of`.
     """
     parts = [measurement.up_to(end) for end in ranges] or [measurement]
-    given = [None if draws is None else draws.get(end) for end in ranges] or [None]
-    return valleys_of(parts, hypothesis, rise=rise, seed=seed, draws=given, solve=solve)
+    return valleys_of(parts, hypothesis, rise=rise, seed=seed, solve=solve)
 
 
 def valleys_of(
@@ -301,5 +299,3 @@ def between(a: Valley, b: Valley) -> Between:
     crossing = None if approach.crossing is None else tuple(float(v) for v in a.chart.natural(approach.crossing))
     return Between(a.end, b.end, approach, (one, two), crossing)
 
-
-__all__ = ["RISE", "Valleys", "between", "valleys", "valleys_of"]

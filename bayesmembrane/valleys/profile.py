@@ -316,8 +316,8 @@ def pair_maps(surface: Surface, best: Array, found: list[LossProfile], points: i
     better = surface.loss(other) < surface.loss(start)
     z, size = surface.minimise(np.where(better[:, None], other, start), held, ITERATIONS_OF_A_MAP)
     place = np.arange(len(z)).reshape(len(pairs), points, points)
-    for axis, shift in ((1, 1), (1, -1), (2, 1), (2, -1)):
-        z, size = _from_neighbours(surface, z, size, place, axis, shift, held)
+    for step in ((1, 1), (1, -1), (2, 1), (2, -1)):
+        z, size = _from_neighbours(surface, z, size, place, step, held)
     return tuple(PairMap(p, a, b, size[at]) for p, (a, b), at in zip(pairs, axes, place, strict=True))
 
 
@@ -342,9 +342,13 @@ WORSE = 5e-2  # relative: a cell this much above its neighbour is tried again fr
 
 
 def _from_neighbours(
-    surface: Surface, z: Array, size: Array, place: NDArray[Any], axis: int, shift: int, held: NDArray[np.bool_]
+    surface: Surface, z: Array, size: Array, place: NDArray[Any], step: tuple[int, int], held: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Cells above their neighbour's loss, tried again from the neighbour's film; ``place`` (P, A, B) numbers them."""
+    """Cells above their neighbour's loss, tried again from the neighbour's film.
+
+    ``place`` (P, A, B) numbers the cells; ``step`` is the axis, and how far along it the neighbour lies.
+    """
+    axis, shift = step
     inner = np.ones(place.shape, dtype=bool)
     inner[(slice(None),) * axis + (0 if shift > 0 else -1,)] = False
     neighbour = np.roll(place, shift, axis=axis).ravel()

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.convexity import MODES, RESTRICTING
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.valleys.between import Approach, arc_length
@@ -268,8 +269,8 @@ class Between:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Valleys:
+@dataclass(frozen=True, eq=False, repr=False)
+class Valleys(Showable):
     """The valleys of one hypothesis on several ranges of one film; ``between`` each with each later one."""
 
     hypothesis: Hypothesis

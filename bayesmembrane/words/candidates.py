@@ -8,6 +8,7 @@ from bayesmembrane.diagnosis.thresholds import NEXT_TEST
 from bayesmembrane.words.diagnosis import experiment_sentence, set_aside, size_in_words
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed, spoken_parameter
+from bayesmembrane.words.next_test import spoken_test
 
 
 def candidate_title(candidate: Candidate, null: Candidate) -> str:
@@ -41,7 +42,7 @@ def rivals(d: Diagnosis) -> list[str]:
         told.append(f"{candidate_title(j.candidate, d.null)}{f' ({size})' if size else ''}: {words}.")
     clear = [e for e in d.experiments if e.separation >= NEXT_TEST.clear]
     dim = [e for e in d.experiments if e.separation < NEXT_TEST.clear]
-    rest = [f"{e.what} ({e.separation:.1f} standard deviations)" for e in dim]
+    rest = [f"{spoken_test(e.test)} ({e.separation:.1f} standard deviations)" for e in dim]
     told += [f"To tell them apart: {experiment_sentence(e)}." for e in clear]
     if not clear:
         told.append("None of the further tests that were simulated would tell them apart.")

@@ -17,10 +17,11 @@ from bayesmembrane.diagnosis.thresholds import EXPLANATION, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words.hypothesis import spoken, title
 from bayesmembrane.words.language import listed
+from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.shape import shape_in_words
 
 Units = Mapping[str, tuple[float, str]]
-"""By SI unit, (factor, unit) in which people read it: `Rig.shown`."""
+"""By SI unit, (factor, unit) in which people read it: `Fixture.shown`."""
 
 SCALES: Units = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "N": (1e3, "mN"), "N/s": (1e3, "mN/s")}
 """Those of a lifted disc."""
@@ -69,7 +70,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "absorbed": absorbed_sentences(found),
         "next_measurements": [
             {
-                "what": e.what,
+                "what": spoken_test(e.test),
                 "separation": None if np.isinf(e.separation) else e.separation,
                 "sentence": experiment_sentence(e),
             }
@@ -112,8 +113,8 @@ def set_aside(held: HeldOut | None) -> str:
 def experiment_sentence(experiment: Experiment) -> str:
     """What a further measurement would show."""
     if np.isinf(experiment.separation):
-        return f"{experiment.what}: shows one of them directly"
-    return f"{experiment.what}: {experiment.separation:.1f} standard deviations apart"
+        return f"{spoken_test(experiment.test)}: shows one of them directly"
+    return f"{spoken_test(experiment.test)}: {experiment.separation:.1f} standard deviations apart"
 
 
 def size_in_words(value: float, unit: str, shown: Units = SCALES) -> str:

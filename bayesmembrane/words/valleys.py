@@ -11,11 +11,11 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.convexity import RESTRICTING
 from bayesmembrane.valleys.beside import Beside
-from bayesmembrane.valleys.next_tests import ASSUMPTION
 from bayesmembrane.valleys.profile import End, Ending
 from bayesmembrane.valleys.result import Between, Valley, Valleys
 from bayesmembrane.words.hypothesis import spoken, title
 from bayesmembrane.words.language import listed
+from bayesmembrane.words.next_test import ASSUMPTION, spoken_test
 
 FEW = 2  # open ends that have a sentence each
 CLOSE = 2.0  # posterior standard deviations within which two valleys count as compatible
@@ -72,6 +72,7 @@ def _valley(v: Valley) -> dict[str, Any]:
         **values,
         "limit": limit_title(v),
         "profiles": {n: {**part, "reason": [ENDINGS[e.ending] for e in p.ends]} for (n, part), p in profiles},
+        "next_measurements": [{"test": spoken_test(t.test), **t.summary()} for t in v.next_tests],
         "next_measurements_assume": ASSUMPTION,
         "sentences": list(valley_sentences(v)),
     }
@@ -222,8 +223,8 @@ def _next(v: Valley) -> list[str]:
         return []
     first = v.next_tests[0]
     return [
-        f"{_range(v)}, what would shorten the valley most is {first.test}: its longest axis is expected to shrink by "
-        f"{100 * first.reduction:.3g} %."
+        f"{_range(v)}, what would shorten the valley most is {spoken_test(first.test)}: its longest axis is expected "
+        f"to shrink by {100 * first.reduction:.3g} %."
     ]
 
 

@@ -15,14 +15,14 @@ from typer.testing import CliRunner
 
 from bayesmembrane.app import verbs
 from bayesmembrane.app.cli import assembled
-from bayesmembrane.app.options import Group, Range, Ranges, spread
+from bayesmembrane.app.options import OptionGroup, RangeOption, RangesOption, spread
 from bayesmembrane.ground.errors import SettingsError
 
 NAMES = [m.name for m in pkgutil.iter_modules(verbs.__path__)]
 
 
 @dataclass(frozen=True)
-class Pair(Group):
+class Pair(OptionGroup):
     first: Annotated[int, typer.Option("--first", help="One.")]
     second: Annotated[float, typer.Option("--second", help="Two.")] = 2.5
 
@@ -58,8 +58,8 @@ def test_the_program_has_a_command_for_every_file() -> None:
 
 
 def test_ranges_are_metres_and_faults_name_the_option() -> None:
-    assert Ranges("35.1,91.5").ends == pytest.approx([0.0351, 0.0915])
-    assert Ranges().ends == []
-    assert Range().max_deflection_mm is None
+    assert RangesOption("35.1,91.5").ends == pytest.approx([0.0351, 0.0915])
+    assert RangesOption().ends == []
+    assert RangeOption().max_deflection_mm is None
     with pytest.raises(SettingsError, match="--ranges-mm"):
-        _ = Ranges("35.1;91.5").ends
+        _ = RangesOption("35.1;91.5").ends

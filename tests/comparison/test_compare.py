@@ -24,8 +24,7 @@ from bayesmembrane.ground.stored import read, store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.rigs.annulus import Annulus
-from bayesmembrane.words import comparison as comparison_words
-from bayesmembrane.words.comparison import no_ranking, preferred
+from bayesmembrane.words.comparison import document, no_ranking, preferred
 from tests.ground.values import stored_equals_given
 
 
@@ -60,9 +59,9 @@ def test_the_right_material_wins_and_every_field_is_there(compared):
     assert preferred(found).startswith("The evidence prefers Gent to neo-Hookean by ")
     assert {label for label, _ in told} == set(rows)
     assert any("nested sampling" in text for _, text in told)
-    document = comparison_words.document(found)
-    json.dumps(document, allow_nan=False)
-    row = document["table"][1]
+    answer = document(found)
+    json.dumps(answer, allow_nan=False)
+    row = answer["table"][1]
     assert set(row["log_evidence"]) == set(row["log_evidence_sd"]) == {NESTED, BRIDGE}
     for name in ("elpd_loo", "loo_se", "prior_mass", "posterior_probability"):
         assert isinstance(row[name], float)
@@ -126,7 +125,7 @@ def test_a_hypothesis_that_cannot_be_fitted_does_not_spoil_the_others(monkeypatc
     assert all(rows[n].posterior_probability is None and not rows[n].fitted for n in ("gent", "ogden"))
     assert found.agreed
     assert preferred(found) == "There are not two hypotheses to choose between."
-    json.dumps(comparison_words.document(found), allow_nan=False)
+    json.dumps(document(found), allow_nan=False)
 
 
 def test_two_processes_say_what_one_says(compared):

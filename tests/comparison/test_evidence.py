@@ -6,9 +6,9 @@ import pytest
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.sampling.proposals.mixture import fit_mixture
 from bayesmembrane.comparison.evidence.bridge import bridge
-from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, Disagreement, evidence, together
+from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, Disagreement, together
 from bayesmembrane.comparison.evidence.nested import nested
-from bayesmembrane.comparison.evidence.population import led
+from bayesmembrane.comparison.evidence.population import lead
 from bayesmembrane.comparison.evidence.target import EvidenceEstimate, Problem
 from bayesmembrane.ground.errors import SettingsError
 from tests.statistics.evidence_targets import Banana, Box, Cut, Linear, Modes, NormalGamma
@@ -43,7 +43,7 @@ def test_nested_is_right_within_three_standard_errors(target):
 
 def test_both_estimators_agree_and_carry_the_mass_of_a_cut_prior():
     target = Cut(2)
-    found = evidence(target, 104, mass=Mass(target.mass, 0.01))
+    found = together({NESTED: nested(target, 104), BRIDGE: bridge(target, seed=104)}, Mass(target.mass, 0.01))
     exact = target.exact - np.log(target.mass)
     assert found.disagreement is None
     for name in (NESTED, BRIDGE):
@@ -202,7 +202,7 @@ def test_a_population_is_led_to_the_wanted_distribution():
     def terms(x):
         return -0.5 * np.sum(x * x, axis=1), -0.5 * np.sum((x - 3) ** 2, axis=1) / 0.25
 
-    found = led(terms, rng.standard_normal((2000, 2)), rng, 4)
+    found = lead(terms, rng.standard_normal((2000, 2)), rng, 4)
     x = found.x.reshape(-1, 2)
     assert np.mean(x, axis=0) == pytest.approx([2.4, 2.4], abs=0.05)
     assert np.var(x, axis=0) == pytest.approx([0.2, 0.2], abs=0.03)

@@ -71,7 +71,7 @@ def test_the_answer_is_the_callers_to_change():
     assert registry.materials()
 
 
-@pytest.mark.parametrize("group", ["materials", "effects", "noise", "rigs", "importers"])
+@pytest.mark.parametrize("group", ["materials", "effects", "noise", "rigs", "importers", "sections"])
 def test_every_group_can_be_asked(group):
     for name, found in registry.components(group).items():
         assert found.name == name

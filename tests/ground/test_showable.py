@@ -25,8 +25,13 @@ class Finer(Found):
     pass
 
 
+@dataclass(frozen=True, repr=False)
+class Taken(Showable):
+    loss: float = 0.25
+
+
 class FoundSection:
-    name, shows = "found", Found
+    name, shows, takes = "found", Found, (Taken,)
 
     def text(self, result: Any) -> str:
         return f"Found, loss {result.loss} N"
@@ -38,6 +43,11 @@ class FoundSection:
 @pytest.fixture
 def section(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(showable, "components", lambda group: {"found": FoundSection})
+
+
+@pytest.mark.usefixtures("section")
+def test_a_section_also_speaks_of_what_it_takes() -> None:
+    assert repr(Taken()) == "Found, loss 0.25 N"
 
 
 @pytest.mark.usefixtures("section")

@@ -18,7 +18,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.stored import read, store
 from bayesmembrane.reconstruction.files import write_reconstruction
 from bayesmembrane.reconstruction.fit import find_mode, knobs_at, sample
-from bayesmembrane.reconstruction.model import Model, tabulate
+from bayesmembrane.reconstruction.model import LossModel, tabulate
 from bayesmembrane.reconstruction.reconstruct import Reconstruction, reconstruct, simulate_on
 from bayesmembrane.reconstruction.rows import _distance, _shortest, check_row
 from bayesmembrane.words.reconstruction import document
@@ -39,9 +39,9 @@ def found(table: PublishedTable) -> Reconstruction:
 
 
 @pytest.fixture(scope="module")
-def model(table: PublishedTable) -> Model:
+def model(table: PublishedTable) -> LossModel:
     simulations = tabulate(table, simulate_on(table))
-    return Model(simulations, table.losses, simulations.usable, (0, 1), (10, 9), table.step)
+    return LossModel(simulations, table.losses, simulations.usable, (0, 1), (10, 9), table.step)
 
 
 # ---- the paper's table -----------------------------------------------------------------------------------------------
@@ -189,7 +189,7 @@ def test_round_trip_with_two_planted_misprints(table: PublishedTable) -> None:
 # ---- parts -----------------------------------------------------------------------------------------------------------
 
 
-def test_gradient_is_that_of_the_log_posterior(model: Model) -> None:
+def test_gradient_is_that_of_the_log_posterior(model: LossModel) -> None:
     theta = 0.1 * np.random.default_rng(0).standard_normal((1, model.size))
     gradient = model.log_posterior(theta, MIDDLE)[1][0]
     step = 1e-6 * np.eye(model.size)
@@ -202,7 +202,7 @@ def knobs_of(batch: int) -> object:
     return type(MIDDLE)(*(np.repeat(np.asarray(v), batch, axis=0) for v in MIDDLE))
 
 
-def test_mode_is_a_maximum_and_draws_are_deterministic(model: Model) -> None:
+def test_mode_is_a_maximum_and_draws_are_deterministic(model: LossModel) -> None:
     model = model.without(3)
     mode = find_mode(model, MIDDLE)
     around = mode.theta + 1e-2 * np.random.default_rng(1).standard_normal((20, mode.theta.size))
@@ -212,7 +212,7 @@ def test_mode_is_a_maximum_and_draws_are_deterministic(model: Model) -> None:
     assert not np.array_equal(one, sample(model, [mode], chains=4, steps=3, seed=8).theta)
 
 
-def test_rows_of_one_curve_are_one_family(model: Model) -> None:
+def test_rows_of_one_curve_are_one_family(model: LossModel) -> None:
     assert model.simulations.family.tolist() == [0, 0, 0] + [-1] * 12
 
 
@@ -223,7 +223,7 @@ def test_row_without_a_curve_is_wrong_and_left_out(table: PublishedTable) -> Non
 
     simulations = tabulate(table, simulate)
     assert np.flatnonzero(~simulations.usable).tolist() == [8]
-    model = Model(simulations, table.losses, simulations.usable, (0, 1), (10, 9), table.step).without(3)
+    model = LossModel(simulations, table.losses, simulations.usable, (0, 1), (10, 9), table.step).without(3)
     check = check_row(model, find_mode(model, MIDDLE), 8)
     assert check.probability == 1.0
     assert np.all(np.isnan(check.excess))

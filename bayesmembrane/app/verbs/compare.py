@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bayesmembrane.app.options import Beside, Curve, Materials, Output, Range, Ranges, Sampling, Stored
+from bayesmembrane.app.options import (
+    CurveOptions,
+    HypothesisOptions,
+    MaterialsOption,
+    OutputOptions,
+    RangeOption,
+    RangesOption,
+    SamplingOptions,
+    StoredOption,
+)
 from bayesmembrane.app.terminal import answer, lines, resumable, say, table
 from bayesmembrane.ground.errors import SettingsError
 
@@ -21,14 +30,14 @@ COLUMNS = {
 
 
 def verb(
-    curve: Curve,
-    materials: Materials,
-    beside: Beside,
-    used: Range,
-    several: Ranges,
-    sampling: Sampling,
-    stored: Stored,
-    output: Output,
+    curve: CurveOptions,
+    materials: MaterialsOption,
+    beside: HypothesisOptions,
+    used: RangeOption,
+    several: RangesOption,
+    sampling: SamplingOptions,
+    stored: StoredOption,
+    output: OutputOptions,
 ) -> None:
     """Which materials the data support, by two estimators of the evidence, with prediction beside it."""
     from bayesmembrane.app import analyses

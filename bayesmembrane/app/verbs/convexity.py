@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from bayesmembrane.app.options import Film, Output, StoredOnRequest
+from bayesmembrane.app.options import FilmOptions, OutputOptions, StoredOnRequestOption
 from bayesmembrane.app.terminal import answer, numbers, say
 from bayesmembrane.ground.errors import SettingsError
 
@@ -14,9 +14,9 @@ place = 2
 
 
 def verb(
-    film: Film,
-    stored: StoredOnRequest,
-    output: Output,
+    film: FilmOptions,
+    stored: StoredOnRequestOption,
+    output: OutputOptions,
     box: Annotated[str, typer.Option(help="Stretches between which W(l1, l2) must be convex.")] = "1,8",
 ) -> None:
     """Whether an energy is convex in the stretches on a box, by what margin, and where it is worst."""
@@ -50,5 +50,5 @@ def verb(
     )
     settings = {"parameters": made.vector.tolist(), "box": edges}
     what = Asked("convexity", "", made.name, float("nan"), digest(settings))
-    kept_as = kept("convexity", document, document, what, stored.folder)
+    kept_as = kept("convexity", {**document, **settings}, document, what, stored.folder)
     answer(kept_as.document, output.as_json, lambda: say(sentence))

@@ -7,15 +7,15 @@ from typing import Annotated
 
 import typer
 
-from bayesmembrane.app.options import CHAINS, Output, Sampling
+from bayesmembrane.app.options import CHAINS, OutputOptions, SamplingOptions
 from bayesmembrane.app.terminal import answer, bars, note, say
 
 place = 12
 
 
 def verb(
-    sampling: Sampling,
-    output: Output,
+    sampling: SamplingOptions,
+    output: OutputOptions,
     page_folder: Annotated[Path, typer.Option("--out", help="Folder of the page.")] = Path("reports/demo"),
     chains: Annotated[Path, typer.Option(help="Folder of the answers and runs.")] = CHAINS / "demo",
 ) -> None:

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bayesmembrane.app.options import Beside, Curve, Material, Output, Range, Stored
+from bayesmembrane.app.options import (
+    CurveOptions,
+    HypothesisOptions,
+    MaterialOption,
+    OutputOptions,
+    RangeOption,
+    StoredOption,
+)
 from bayesmembrane.app.terminal import answer, note, say, status, table
 
 if TYPE_CHECKING:
@@ -15,7 +22,14 @@ place = 9
 CANDIDATES = 8
 
 
-def verb(curve: Curve, material: Material, beside: Beside, used: Range, stored: Stored, output: Output) -> None:
+def verb(
+    curve: CurveOptions,
+    material: MaterialOption,
+    beside: HypothesisOptions,
+    used: RangeOption,
+    stored: StoredOption,
+    output: OutputOptions,
+) -> None:
     """Whether the model misses something, which effect or energy explains it, or that this cannot be told."""
     from bayesmembrane.app import analyses
 

@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bayesmembrane.app.options import Beside, Curve, Material, Output, Range, Stored
+from bayesmembrane.app.options import (
+    CurveOptions,
+    HypothesisOptions,
+    MaterialOption,
+    OutputOptions,
+    RangeOption,
+    StoredOption,
+)
 from bayesmembrane.app.terminal import answer, say, status, table
 
 if TYPE_CHECKING:
@@ -16,12 +23,12 @@ place = 5
 
 
 def verb(
-    curve: Curve,
-    material: Material,
-    beside: Beside,
-    used: Range,
-    stored: Stored,
-    output: Output,
+    curve: CurveOptions,
+    material: MaterialOption,
+    beside: HypothesisOptions,
+    used: RangeOption,
+    stored: StoredOption,
+    output: OutputOptions,
     loss: Annotated[str, typer.Option(help="euclidean (N) or weighted (by the measurement's noise).")] = "euclidean",
 ) -> None:
     """The least-squares parameters with their standard deviations."""

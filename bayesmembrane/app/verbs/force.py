@@ -6,17 +6,17 @@ from typing import Annotated, Any
 
 import typer
 
-from bayesmembrane.app.options import Film, Output, StoredOnRequest
+from bayesmembrane.app.options import FilmOptions, OutputOptions, StoredOnRequestOption
 from bayesmembrane.app.terminal import answer, numbers, table
 
 place = 1
 
 
 def verb(
-    film: Film,
+    film: FilmOptions,
     deflection_mm: Annotated[str, typer.Option("--deflection-mm", help="Deflections, mm: 1,10,35.1")],
-    stored: StoredOnRequest,
-    output: Output,
+    stored: StoredOnRequestOption,
+    output: OutputOptions,
     prestretch: Annotated[float, typer.Option(help="Equibiaxial stretch of the film before it was clamped.")] = 1.0,
     inner_radius_mm: Annotated[float, typer.Option(help="Radius of the disc, mm.")] = 10.0,
     outer_radius_mm: Annotated[float, typer.Option(help="Radius of the ring, mm.")] = 35.0,
@@ -52,7 +52,7 @@ def verb(
     }
     settings |= {"parameters": made.vector.tolist(), "deflection_mm": where}
     what = Asked("force", "", kind.name, 1e-3 * max(where), digest(settings))
-    found = kept("force", document, document, what, stored.folder)
+    found = kept("force", {**document, **settings}, document, what, stored.folder)
     rows = zip(where, curves.force[0], curves.max_stretch[0], states, notes, strict=True)
     cells = [[f"{d:g}", f"{f:.6g}", f"{m:.4g}", f"{s.sentence} {n}".strip()] for d, f, m, s, n in rows]
     header = ["deflection, mm", "force, N", "largest stretch", "status"]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bayesmembrane.app.options import Output
+from bayesmembrane.app.options import OutputOptions
 from bayesmembrane.app.terminal import answer, note, say
 
 place = 3
@@ -15,7 +15,7 @@ place = 3
 
 def verb(
     export: Annotated[Path, typer.Argument(help="The file that the machine wrote.", metavar="EXPORT")],
-    output: Output,
+    output: OutputOptions,
     curve: Annotated[Path, typer.Option("--out", help="Where the curve goes; a TOML is written beside it.")] = Path(
         "curve.csv"
     ),

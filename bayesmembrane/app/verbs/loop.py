@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bayesmembrane.app.options import BesideAuto, Curve, Material, Output, Range, Sampling, Stored
+from bayesmembrane.app.options import (
+    CurveOptions,
+    HypothesisOptionsAuto,
+    MaterialOption,
+    OutputOptions,
+    RangeOption,
+    SamplingOptions,
+    StoredOption,
+)
 from bayesmembrane.app.terminal import answer, lines, resumable, say
 from bayesmembrane.app.verbs.diagnose import say_thinning
 from bayesmembrane.app.verbs.diagnose import show as show_diagnosis
@@ -19,13 +27,13 @@ place = 10
 
 
 def verb(
-    curve: Curve,
-    material: Material,
-    beside: BesideAuto,
-    used: Range,
-    sampling: Sampling,
-    stored: Stored,
-    output: Output,
+    curve: CurveOptions,
+    material: MaterialOption,
+    beside: HypothesisOptionsAuto,
+    used: RangeOption,
+    sampling: SamplingOptions,
+    stored: StoredOption,
+    output: OutputOptions,
     report_folder: Annotated[Path, typer.Option("--report", help="Folder of the page.")] = Path("reports/loop"),
 ) -> None:
     """Calibrate, diagnose, add what is missing, calibrate again, until adequate or abstaining; and report."""

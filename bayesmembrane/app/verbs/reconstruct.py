@@ -7,14 +7,14 @@ from typing import Annotated, Any
 
 import typer
 
-from bayesmembrane.app.options import CHAINS, Output
+from bayesmembrane.app.options import CHAINS, OutputOptions
 from bayesmembrane.app.terminal import answer, say, status, table
 
 place = 4
 
 
 def verb(
-    output: Output,
+    output: OutputOptions,
     folder: Annotated[
         Path | None,
         typer.Option(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bayesmembrane.app.options import Output
+from bayesmembrane.app.options import OutputOptions
 from bayesmembrane.app.terminal import answer, say
 
 place = 11
@@ -17,7 +17,7 @@ def verb(
     folders: Annotated[
         list[Path], typer.Argument(help="Folders of answers and runs, or that hold such.", metavar="DIR...")
     ],
-    output: Output,
+    output: OutputOptions,
     page_folder: Annotated[Path, typer.Option("--out", help="Folder of the page.")] = Path("reports/report"),
     title: Annotated[str | None, typer.Option(help="Title of the page.")] = None,
 ) -> None:

@@ -6,20 +6,28 @@ from typing import Any
 
 import typer
 
-from bayesmembrane.app.options import Beside, Curve, Material, Output, Range, Sampling, Stored
+from bayesmembrane.app.options import (
+    CurveOptions,
+    HypothesisOptions,
+    MaterialOption,
+    OutputOptions,
+    RangeOption,
+    SamplingOptions,
+    StoredOption,
+)
 from bayesmembrane.app.terminal import INTERRUPTED, answer, bars, command, note, say, table
 
 place = 6
 
 
 def verb(
-    curve: Curve,
-    material: Material,
-    beside: Beside,
-    used: Range,
-    sampling: Sampling,
-    stored: Stored,
-    output: Output,
+    curve: CurveOptions,
+    material: MaterialOption,
+    beside: HypothesisOptions,
+    used: RangeOption,
+    sampling: SamplingOptions,
+    stored: StoredOption,
+    output: OutputOptions,
 ) -> None:
     """The posterior, stored as a run; the same command continues a run that was interrupted."""
     from bayesmembrane.app import analyses

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bayesmembrane.app.options import CHAINS, Beside, Curve, Material, Output, Ranges
+from bayesmembrane.app.options import (
+    CHAINS,
+    CurveOptions,
+    HypothesisOptions,
+    MaterialOption,
+    OutputOptions,
+    RangesOption,
+)
 from bayesmembrane.app.terminal import answer, say, status, table
 
 if TYPE_CHECKING:
@@ -21,11 +28,11 @@ TESTS = 5
 
 
 def verb(
-    curve: Curve,
-    material: Material,
-    beside: Beside,
-    ranges: Ranges,
-    output: Output,
+    curve: CurveOptions,
+    material: MaterialOption,
+    beside: HypothesisOptions,
+    ranges: RangesOption,
+    output: OutputOptions,
     loss_rise: Annotated[float, typer.Option(help="A valley fits within this part of the least loss.")] = 0.1,
     folder: Annotated[
         Path | None,
@@ -55,6 +62,7 @@ def show(found: Valleys | BesideValleys, title: str) -> None:
     """The valleys, what is said of them, and what would shorten them, on the terminal."""
     from bayesmembrane.report.sections.valleys.tables import valley_table
     from bayesmembrane.valleys.beside import Beside as BesideValleys
+    from bayesmembrane.words.next_test import spoken_test
     from bayesmembrane.words.valleys import sentences
 
     parts = [found.without, found.added] if isinstance(found, BesideValleys) else [found]
@@ -64,5 +72,5 @@ def show(found: Valleys | BesideValleys, title: str) -> None:
     for sentence in sentences(found):
         say(sentence)
     for valley in parts[-1].ranges:
-        rows = [[t.test, f"{100 * t.reduction:.0f} %"] for t in valley.next_tests[:TESTS]]
+        rows = [[spoken_test(t.test), f"{100 * t.reduction:.0f} %"] for t in valley.next_tests[:TESTS]]
         table(f"What to measure next, from data up to {1e3 * valley.end:.4g} mm", ["test", "shorter by"], rows)

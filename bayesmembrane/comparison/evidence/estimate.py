@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
 from bayesmembrane.calibration.prior import Mass
-from bayesmembrane.comparison.evidence.bridge import bridge
-from bayesmembrane.comparison.evidence.nested import nested
-from bayesmembrane.comparison.evidence.target import EvidenceEstimate, Target
-from bayesmembrane.ground.parameters import Array
+from bayesmembrane.comparison.evidence.target import EvidenceEstimate
 
 NESTED, BRIDGE = "nested", "bridge"
 SIGMAS, WIDEST = 2.0, 0.3
-
-Tell = Callable[[str], None]
 
 
 class Disagreement(Enum):
@@ -70,34 +65,6 @@ class Evidence:
         sd = np.maximum([self.log_evidence_sd[e] for e in self.log_evidence], 1e-6)
         w = sd**-2 / np.sum(sd**-2)
         return float(w @ z), float(np.min(sd))
-
-
-def evidence(
-    target: Target,
-    seed: int = 0,
-    *,
-    mass: Mass | None = None,
-    draws: Array | None = None,
-    effective: float | None = None,
-    log_posterior: Array | None = None,
-    tell: Tell | None = None,
-) -> Evidence:
-    """ln Z = ln of the integral of likelihood x prior, by nested sampling and by bridge sampling.
-
-    Parameters
-    ----------
-    target : anything with the four members of `Target`
-    mass : the part of the normalised prior that its cut leaves: Z is divided by it, for a prior that is cut integrates
-        to its mass and not to one
-    draws, effective, log_posterior : what `bridge` stands on; without draws it makes its own
-
-    Raises what `nested` and `bridge` raise.
-    """
-    found = {NESTED: nested(target, seed, tell=tell)}
-    if tell is not None:
-        tell("bridge sampling")
-    found[BRIDGE] = bridge(target, draws, seed=seed, effective=effective, log_posterior=log_posterior)
-    return together(found, mass)
 
 
 def together(found: Mapping[str, EvidenceEstimate], mass: Mass | None = None) -> Evidence:

@@ -9,8 +9,10 @@ import numpy as np
 
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.comparison.evidence.target import Problem
+from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array
 
+HALVINGS = 60  # of the interval of rises
 KEPT = 0.5  # effective part of the population after each rise of the power
 ACCEPTED = 4  # moves a walker, and one more for each dimension, between two powers
 MOST_MOVES = 150
@@ -40,12 +42,12 @@ class Population:
 def from_prior(problem: Problem, rng: np.random.Generator, walkers: int, snapshots: int) -> Population:
     """Populations of p(x | y) ~ p0 L by way of p0 L^b; ``log_ratio`` is then an estimate of ln Z."""
     start = problem.prior_draws(rng, walkers)
-    found = led(problem.terms, start.x[:walkers], rng, snapshots)
+    found = lead(problem.terms, start.x[:walkers], rng, snapshots)
     sd = float(np.hypot(found.sd, start.log_part_sd))
     return replace(found, log_ratio=found.log_ratio + float(np.log(start.part)), sd=sd)
 
 
-def led(terms: Base, start: Array, rng: np.random.Generator, snapshots: int) -> Population:
+def lead(terms: Base, start: Array, rng: np.random.Generator, snapshots: int) -> Population:
     """Lead draws ``start`` (W, k) of exp(base) to draws of exp(base + added), in steps that keep half of them alive.
 
     At each power the population is weighted, resampled and moved by differential evolution (P. Del Moral, A. Doucet,
@@ -83,11 +85,8 @@ def _rise(added: Array, left: float) -> float:
 
     if part(left) >= KEPT:
         return left
-    low, high = 0.0, left
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if part(middle) >= KEPT else (low, middle)
-    return max(low, 1e-12)
+    rise, _ = bisected(lambda r: part(r) >= KEPT, 0.0, left, HALVINGS)
+    return max(rise, 1e-12)
 
 
 def _systematic(weight: Array, rng: np.random.Generator) -> Array:

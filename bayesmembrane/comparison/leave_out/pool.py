@@ -8,6 +8,7 @@ from scipy.special import logsumexp
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around, fit_mixture
+from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array
 
 LEARN_FROM, BRIDGED = 2000, 30
@@ -15,6 +16,7 @@ SPREAD, HEAVY = 1.3, 5.0  # how much wider than the draws a density is, and its 
 ENOUGH, FOLLOWED = 100.0, 10  # effective draws of the other points' posterior, and densities made to find them
 EACH, PER_DIMENSION = 400, 300  # draws of such a density
 UNSEEN = 10.0  # over the effective draws is the least error
+HALVINGS = 30  # of the interval of powers
 LED_BY = 10  # effective draws for each dimension that such a density is fitted to
 
 
@@ -45,7 +47,7 @@ class Pool:
         for _ in range(FOLLOWED):
             if self._of(i)[2] >= ENOUGH:
                 break
-            self._add(around(self._led(i), self.rng), EACH + PER_DIMENSION * self.posterior.size)
+            self._add(around(self._drawn_towards(i), self.rng), EACH + PER_DIMENSION * self.posterior.size)
         return self._of(i)
 
     def _of(self, i: int) -> tuple[float, float, float]:
@@ -56,16 +58,13 @@ class Pool:
         error = max(float(np.std(ratio) / np.sqrt(len(ratio))), UNSEEN / effective_draws(wb))
         return float(logsumexp(a) - logsumexp(b)), error, effective_draws(wb)
 
-    def _led(self, i: int) -> Array:
+    def _drawn_towards(self, i: int) -> Array:
         """Some of the draws, each once, by their weights for p(x | y_-i) to a power that leaves enough of them."""
         b = self.log_p - self.terms[:, i] - self.log_q
         b -= np.max(b)
-        low, high = 0.0, 1.0
-        for _ in range(30):
-            middle = 0.5 * (low + high)
-            enough = effective_draws(np.exp(middle * b)) >= LED_BY * self.posterior.size
-            low, high = (middle, high) if enough else (low, middle)
-        w = np.exp(high * b)
+        enough = LED_BY * self.posterior.size
+        _, power = bisected(lambda p: effective_draws(np.exp(p * b)) >= enough, 0.0, 1.0, HALVINGS)
+        w = np.exp(power * b)
         return self.x[np.unique(self.rng.choice(len(w), int(4 * effective_draws(w)), p=w / np.sum(w)))]
 
     def _add(self, g: Mixture, count: int) -> None:

@@ -17,6 +17,7 @@ from bayesmembrane.diagnosis.loop import Loop, Round, Stage
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.ground.stored import store
+from bayesmembrane.next_test.further import FurtherTest, Kind
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.report.blocks import Figure, Points, Table
@@ -32,6 +33,7 @@ from bayesmembrane.words import loop as loop_words
 from bayesmembrane.words.candidates import candidate_title
 from bayesmembrane.words.diagnosis import set_aside, size_in_words
 from bayesmembrane.words.moved import Change, changes, modulus_sentence
+from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.rounds import answer, bound_sentences, moved, rival_sentences, validation_sentences
 from tests.generator.datasets import THICKNESS, generate
 from tests.generator.protocols import Protocol
@@ -74,7 +76,7 @@ def unknown(named: Loop) -> Loop:
 def ambiguous(named: Loop) -> Loop:
     """The same curve, had a second candidate explained it."""
     r = named.rounds[0]
-    nexts = (Experiment("a blank run", math.inf), Experiment("unloading", 0.7))
+    nexts = (Experiment(FurtherTest(Kind.BLANK), math.inf), Experiment(FurtherTest(Kind.UNLOADING), 0.7))
     members = tuple(j for j in r.diagnosis.ranking if j.candidate.names)[:2]
     d = replace(r.diagnosis, verdict="ambiguous", members=members, experiments=nexts)
     return Loop((Round(d, r.before, r.before),), None)
@@ -263,8 +265,8 @@ def test_rivals_are_listed_with_what_would_part_them(ambiguous: Loop) -> None:
     (section,) = LoopSection().parts([ambiguous])
     lines = [line for b in section.blocks if isinstance(b, Points) for line in b.lines]
     assert any(line.endswith("the most probable.") for line in lines)
-    assert "To tell them apart: a blank run: shows one of them directly." in lines
-    assert "What would not settle it: unloading (0.7 standard deviations)." in lines
+    assert f"To tell them apart: {spoken_test(FurtherTest(Kind.BLANK))}: shows one of them directly." in lines
+    assert "What would not settle it: unloading after the same loading (0.7 standard deviations)." in lines
     assert any(
         row["model"].endswith("(not added)")
         for b in section.blocks

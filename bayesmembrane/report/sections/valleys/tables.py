@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from bayesmembrane.physics.convexity import RESTRICTING
 from bayesmembrane.report.blocks import Column, Table, Value
-from bayesmembrane.valleys.next_tests import ASSUMPTION
 from bayesmembrane.valleys.result import Valley, Valleys
 from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.next_test import ASSUMPTION, spoken_test
 from bayesmembrane.words.valleys import limit_title
 
 TESTS = 5
@@ -58,7 +58,7 @@ def _row(v: Valley) -> tuple[Value, ...]:
         (f"{opened}: {limit_title(v) or 'no end'}" if opened else "no"),
         ", ".join(f"{100 * v.share(m.name):.3g} %" for m in RESTRICTING),
         inside,
-        "-" if first is None else f"{first.test}: {100 * first.reduction:.0f} %",
+        "-" if first is None else f"{spoken_test(first.test)}: {100 * first.reduction:.0f} %",
     )
 
 
@@ -70,7 +70,7 @@ def next_table(v: Valley) -> Table:
         Column("before", "axis now (sd)", ".2g"),
         Column("after", "axis then (sd)", ".2g"),
     )
-    rows = tuple((t.test, t.reduction, t.axis_before, t.axis_after) for t in v.next_tests[:TESTS])
+    rows = tuple((spoken_test(t.test), t.reduction, t.axis_before, t.axis_after) for t in v.next_tests[:TESTS])
     name = f"next measurements {v.hypothesis.material.name} {1e3 * v.end:.4g} mm"
     caption = f"{spoken(v.hypothesis)}, fitted up to {1e3 * v.end:.4g} mm: what to measure next. {ASSUMPTION}"
     return Table(name, caption, columns, rows)

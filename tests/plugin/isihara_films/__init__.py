@@ -1,0 +1,1 @@
+"""One component of every kind, as another package would add them to bayesmembrane."""
