@@ -298,4 +298,3 @@ def between(a: Valley, b: Valley) -> Between:
     one, two = (tuple(float(v) for v in a.chart.natural(p)) for p in (approach.first, approach.second))
     crossing = None if approach.crossing is None else tuple(float(v) for v in a.chart.natural(approach.crossing))
     return Between(a.end, b.end, approach, (one, two), crossing)
-

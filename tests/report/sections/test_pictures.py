@@ -146,7 +146,7 @@ def test_a_picture_is_encoded(name: str) -> None:
     assert 2_000 < len(made.data) < 500_000
 
 
-@pytest.mark.parametrize("name", ["first look", "corner", "reconstruction"])
+@pytest.mark.parametrize("name", ["first look", "corner"])
 def test_the_same_numbers_give_the_same_bytes(name: str) -> None:
     first = PICTURES[name]()
     for _ in range(3):
