@@ -78,7 +78,7 @@ def encoded(figure: Figure, kind: str) -> Picture:
         extra: dict[str, Any] = {"pil_kwargs": {"optimize": True}} if kind == "png" else {}
         figure.savefig(out, format=kind, dpi=DPI, metadata=metadata, **extra)
     data = out.getvalue()
-    return Picture(_PATH.sub(_rounded, data) if kind == "svg" else data, kind)
+    return Picture(_clips_numbered(_PLACE.sub(_rounded, data)) if kind == "svg" else data, kind)
 
 
 def legend_columns(names: Sequence[str], most: int) -> int:
@@ -87,13 +87,21 @@ def legend_columns(names: Sequence[str], most: int) -> int:
     return max(1, min(most, LINE // (widest + 8)))
 
 
-_PATH = re.compile(rb' d="[^"]*"')
-_LONG = re.compile(rb"(\.\d\d)\d+")
+_PLACE = re.compile(rb' (?:d|x|y|width|height)="[^"]*"')
+_LONG = re.compile(rb"-?\d+\.\d{3,}")
+_ZERO = re.compile(rb"-(0(?:\.0+)?)(?=[\s\"])")  # the sign of nothing is round-off
+_CLIP = re.compile(rb'(?<=[#"])p[0-9a-f]{10}(?=[)"])')
 
 
-def _rounded(path: re.Match[bytes]) -> bytes:
+def _clips_numbered(data: bytes) -> bytes:
+    """matplotlib names a clip path by where it lies in memory: its number in the picture is the same every time."""
+    names: dict[bytes, bytes] = {}
+    return _CLIP.sub(lambda name: names.setdefault(name[0], b"p%d" % len(names)), data)
+
+
+def _rounded(place: re.Match[bytes]) -> bytes:
     """Coordinates with two decimals: a hundredth of a point is not seen, and halves the file."""
-    return _LONG.sub(rb"\1", path[0])
+    return _ZERO.sub(rb"\1", _LONG.sub(lambda number: b"%.2f" % float(number[0]), place[0]))
 
 
 # ---- measured points and bands ---------------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from bayesmembrane.report.page import TWIN, write_report
 from bayesmembrane.report.sections.evidence import sentences
 from bayesmembrane.report.sections.evidence.figures import comparison_picture
 from bayesmembrane.report.sections.evidence.tables import evidence_table, modes_table, ranking_table, widths_table
+from tests.report.pages import without_pictures
 
 
 def row(material: str, z: float, elpd: float, off: float = 0.0) -> Row:
@@ -105,6 +106,5 @@ def test_two_hypotheses_of_one_name_are_told_apart() -> None:
 
 def test_a_stored_comparison_gives_the_same_page(tmp_path: Path) -> None:
     store(tmp_path / "answer", "comparison", compared(), {})
-    assert write_report([tmp_path / "answer"], tmp_path / "a").read_text() == (
-        write_report([compared()], tmp_path / "b").read_text()
-    )
+    stored, held = (write_report([found], tmp_path / "page").read_text() for found in (tmp_path / "answer", compared()))
+    assert without_pictures(stored) == without_pictures(held)

@@ -148,4 +148,11 @@ def test_a_picture_is_encoded(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["first look", "corner"])
 def test_the_same_numbers_give_the_same_bytes(name: str) -> None:
-    assert PICTURES[name]().data == PICTURES[name]().data
+    first = PICTURES[name]()
+    for _ in range(3):
+        assert PICTURES[name]().data == first.data
+
+
+def test_places_among_readings_are_drawn_twice_the_same() -> None:
+    same = replicas(12)
+    assert calibration_picture(same, "yeoh").data == calibration_picture(same, "yeoh").data
