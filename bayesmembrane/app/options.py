@@ -58,7 +58,9 @@ class StoredOnRequestOption(OptionGroup):
 class FilmOptions(OptionGroup):
     """A strain energy with its parameters."""
 
-    material: Annotated[str, typer.Option("--material", help="neo_hookean, mooney_rivlin, gent, yeoh or ogden.")]
+    material: Annotated[
+        str, typer.Option("--material", help="Strain energy by name: yeoh, gent, ...; a wrong name lists all.")
+    ]
     parameters: Annotated[
         str,
         typer.Option(
@@ -117,7 +119,9 @@ class RangesOption(OptionGroup):
 class MaterialOption(OptionGroup):
     """The strain energy that is asked about."""
 
-    material: Annotated[str, typer.Option("--material", help="neo_hookean, mooney_rivlin, gent, yeoh or ogden.")]
+    material: Annotated[
+        str, typer.Option("--material", help="Strain energy by name: yeoh, gent, ...; a wrong name lists all.")
+    ]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import pytest
 from bayesmembrane.app import demo
 from bayesmembrane.app.analyses import Work
 from bayesmembrane.app.folders import lying
-from bayesmembrane.ground.registry import material
+from bayesmembrane.ground.registry import material, materials
 from bayesmembrane.report.page import TWIN
 
 
@@ -21,7 +21,7 @@ def test_the_verbs_can_be_sent_to_other_processes() -> None:
         assert pickle.loads(pickle.dumps(stage)).keys() == stage.keys()
     first, then = demo.stages()
     assert "reconstruct" in first
-    assert {name for name, _ in demo.ORDER} == {label.partition(",")[0] for label in first} - {"reconstruct"}
+    assert set(materials()) == {label.partition(",")[0] for label in first} - {"reconstruct"}
     assert len(then) == len(demo.LOOPS) + len(demo.VALLEYS)
 
 
