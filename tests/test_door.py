@@ -6,7 +6,6 @@ import ast
 import inspect
 import os
 import re
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -32,15 +31,6 @@ def run(*words: str, home: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, *words], env=environment, capture_output=True, text=True, timeout=3000, check=False, cwd=home
     )
-
-
-def seconds(*words: str, home: Path) -> float:
-    """Processor time of a fresh Python, without what a busy machine adds."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = run(*words, home=home)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    assert done.returncode == 0, done.stderr
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 @pytest.mark.parametrize("name", VERBS)
@@ -73,17 +63,13 @@ def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
 
 
 def test_the_import_is_cheap_and_silent(tmp_path: Path) -> None:
-    """At most 0.3 s more than a bare Python, and not a third party that it would wait for."""
-    assert seconds("-c", "import bayesmembrane", home=tmp_path) - seconds("-c", "pass", home=tmp_path) < 0.3
+    """Not a third party is loaded that a user would wait for, and no warning passes."""
     done = run("-W", "error", "-c", "import bayesmembrane, sys; print(*sys.modules)", home=tmp_path)
     assert done.stderr == ""
     assert not {"numpy", "scipy", "numba", "arviz", "matplotlib", "typer", "rich"} & set(done.stdout.split())
 
 
-def test_the_help_is_quick(tmp_path: Path) -> None:
-    """At most 0.5 s more than a bare Python."""
-    asked = seconds("-m", "bayesmembrane", "--help", home=tmp_path)
-    assert asked - seconds("-c", "pass", home=tmp_path) < 0.5
+def test_the_help_loads_nothing_that_computes(tmp_path: Path) -> None:
     program = "import sys; import bayesmembrane.app.cli as c; c.assembled(); print(*sys.modules)"
     loaded = set(run("-c", program, home=tmp_path).stdout.split())
     assert not {"numpy", "scipy", "numba", "arviz", "matplotlib", "rich.table"} & loaded
