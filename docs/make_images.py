@@ -1,4 +1,4 @@
-"""Pictures of the README and of docs/valleys.md, from the runs of `make demo`: python docs/make_images.py [CHAINS]."""
+"""Pictures of the README and of docs/valleys.md, from the runs of `make demo`: python docs/make_images.py [FOLDER]: chains/demo unless another is named."""
 
 from __future__ import annotations
 
@@ -36,4 +36,4 @@ def _write(name: str, data: bytes) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("chains"))
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("chains/demo"))
