@@ -1,4 +1,7 @@
-"""Pictures of the README and of docs/valleys.md, from the runs of `make demo`: python docs/make_images.py [FOLDER]: chains/demo unless another is named."""
+"""Pictures of the README and of docs/valleys.md, from the runs of the demonstration.
+
+python docs/make_images.py [FOLDER]      chains/demo unless another is named
+"""
 
 from __future__ import annotations
 
