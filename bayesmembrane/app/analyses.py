@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from bayesmembrane.calibration.fingerprint import fingerprint
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.calibration.fit import fit as run_fit
 from bayesmembrane.calibration.predictions import Wanted
-from bayesmembrane.calibration.run import Run, predictions_of
+from bayesmembrane.calibration.run import Run, RunSettings, predictions_of
 from bayesmembrane.calibration.run import sample as run_sample
 from bayesmembrane.calibration.sampling.walk import Progress
 from bayesmembrane.comparison.compare import Range, compare_ranges
@@ -108,8 +107,8 @@ def sample(
         work.tell(claim.label(), progress)
 
     solve = work.solve
-    options: dict[str, Any] = {"seed": work.seed, "out": work.out, "name": name, "ess": work.ess}
-    run = run_sample(measurement, claim, solve=solve, predictions=False, progress=tell, **options)
+    how = RunSettings(work.seed, work.out, name, work.ess, predictions=False)
+    run = run_sample(measurement, claim, how, progress=tell, solve=solve)
     rest = _rest(measurement, whole)
     if run.path is not None and not run.interrupted:
         predictions_of(run, Wanted(rest=rest, breaks=tuple(breaks)) if breaks or rest is not None else None, solve)

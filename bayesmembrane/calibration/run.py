@@ -118,35 +118,55 @@ class Run(Showable):
         return {"run": str(self.path) if self.path else self.name, **self.status}
 
 
+@dataclass(frozen=True, eq=False)
+class RunSettings:
+    """How a run is made, and where it lies.
+
+    seed : of all that is drawn
+    out : folder of all runs; None stores nothing
+    name : of this run's folder in it; None makes it of specimen, hypothesis, range and a fingerprint of everything that
+        the answer depends on
+    ess : wanted effective sample size of the worst coordinate
+    settings : how to walk, instead of the usual way to ``ess``
+    predictions : make them at once; else `predictions_of` does when they are asked for
+    rest : points that were left out, to be predicted as well
+    """
+
+    seed: int = 0
+    out: str | Path | None = None
+    name: str | None = None
+    ess: float = 1000.0
+    settings: Settings | None = None
+    predictions: bool = True
+    rest: Measurement | None = None
+
+    @property
+    def sampling(self) -> Settings:
+        """How to walk."""
+        return self.settings or Settings(ess=self.ess)
+
+
 def sample(
     measurement: Measurement,
     hypothesis: Hypothesis,
+    how: RunSettings | None = None,
     *,
-    seed: int = 0,
-    out: str | Path | None = None,
-    name: str | None = None,
-    ess: float = 1000.0,
-    settings: Settings | None = None,
     progress: Callback | None = None,
     solve: Solve = api.solve,
-    predictions: bool = True,
-    rest: Measurement | None = None,
 ) -> Run:
-    """Sample p(parameters | measurement) until every coordinate is worth ``ess`` independent draws, and store it.
+    """Sample p(parameters | measurement) until every coordinate is worth enough independent draws, and store it.
 
-    ``out`` is the folder of all runs (None: nothing is stored), ``name`` that of this one in it (None: made from
-    specimen, hypothesis, range and a fingerprint of everything that the answer depends on). A finished run with this
-    fingerprint is read back, an interrupted one continued. Ctrl-C stores what is there, with the status "interrupted".
-    A run that is stored and finished gets its ``predictions``, those of the points ``rest`` that were left out among
-    them; without, `predictions_of` makes them when they are asked for.
+    A finished run with the same fingerprint is read back, an interrupted one continued. Ctrl-C stores what is there,
+    with the status "interrupted". A run that is stored and finished gets its predictions.
 
     Raises `SettingsError` for hypotheses that the data cannot reach, `StorageError` if the folder cannot be written
     or belongs to something else.
     """
-    settings = settings or Settings(ess=ess)
+    how = how or RunSettings()
+    settings, seed = how.sampling, how.seed
     asked = describe(measurement, hypothesis, settings, seed)
-    name = name or run_name(measurement, hypothesis, asked)
-    folder = None if out is None else claim(Path(out) / name, asked)
+    name = how.name or run_name(measurement, hypothesis, asked)
+    folder = None if how.out is None else claim(Path(how.out) / name, asked)
     if folder is not None and is_finished(folder):
         run = load_run(folder)
     else:
@@ -159,8 +179,8 @@ def sample(
         run = Run(name, folder, asked, status, data)
         if folder is not None:
             write_run(folder, asked, data, status, sampled.chains if run.interrupted else None)
-    if predictions and folder is not None and not run.interrupted:
-        predictions_of(run, None if rest is None else Wanted(rest=rest), solve)
+    if how.predictions and folder is not None and not run.interrupted:
+        predictions_of(run, None if how.rest is None else Wanted(rest=how.rest), solve)
     return run
 
 

@@ -6,14 +6,14 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from bayesmembrane.calibration.fingerprint import code_of
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.prior import DRAWS, Mass
-from bayesmembrane.calibration.run import Run, load_run, sample
+from bayesmembrane.calibration.run import Run, RunSettings, load_run, sample
 from bayesmembrane.calibration.sampling.walk import Progress, Settings
 from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.calibration.store import describe, run_name
@@ -185,8 +185,8 @@ def _run(job: Job, tell: Tell) -> Run:
         folder = run_folder(Path(how.out), run_name(job.measurement, job.hypothesis, asked), asked)
         if serves(folder, asked):
             return load_run(folder)
-    options: dict[str, Any] = {"seed": how.seed, "out": how.out, "settings": how.settings, "progress": progress}
-    run = sample(job.measurement, job.hypothesis, predictions=False, **options)
+    wanted = RunSettings(how.seed, how.out, settings=how.settings, predictions=False)
+    run = sample(job.measurement, job.hypothesis, wanted, progress=progress)
     if run.interrupted:
         raise KeyboardInterrupt
     return run

@@ -10,7 +10,7 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.prior import Mass
-from bayesmembrane.calibration.run import Run, sample
+from bayesmembrane.calibration.run import Run, RunSettings, sample
 from bayesmembrane.calibration.sampling.walk import Callback
 from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.target import PosteriorTarget
@@ -154,7 +154,9 @@ class _Closing:
         self.tell(f"sampling {claim.label()}")
         progress = self.watch(claim.label()) if self.watch is not None else None
         s = self.settings
-        run = sample(self.measurement, claim, seed=s.seed, out=s.out, ess=s.ess, progress=progress, solve=s.solve)
+        run = sample(
+            self.measurement, claim, RunSettings(seed=s.seed, out=s.out, ess=s.ess), progress=progress, solve=s.solve
+        )
         if run.interrupted:
             raise KeyboardInterrupt
         return _stage(run, s.solve, s.seed)

@@ -7,7 +7,7 @@ import pytest
 
 from bayesmembrane.calibration import fingerprint as module
 from bayesmembrane.calibration.fingerprint import SAMPLING, code_of, fingerprint
-from bayesmembrane.calibration.run import sample
+from bayesmembrane.calibration.run import RunSettings, sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.calibration.store import describe
 from bayesmembrane.ground.errors import StorageError
@@ -50,10 +50,10 @@ def test_a_prior_counts_as_a_value(film, monkeypatch: pytest.MonkeyPatch) -> Non
 def test_a_major_version_makes_a_stored_run_another(film, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
     curve, claim = film("neo_hookean", (7.5,), noise=0.02), hypothesis("neo_hookean")
     settings = Settings(ess=1.0, chunk=30, most_steps=30, walkers=16)
-    first = sample(curve, claim, settings=settings, out=tmp_path, name="mine", predictions=False)
-    again = sample(curve, claim, settings=settings, out=tmp_path, name="mine", predictions=False)
+    first = sample(curve, claim, RunSettings(settings=settings, out=tmp_path, name="mine", predictions=False))
+    again = sample(curve, claim, RunSettings(settings=settings, out=tmp_path, name="mine", predictions=False))
     assert again.settings == first.settings
     monkeypatch.setattr(module, "majors", lambda: {"emcee": "4"})
     assert describe(curve, claim, settings, 0)["fingerprint"] != first.settings["fingerprint"]
     with pytest.raises(StorageError, match="holds another run"):
-        sample(curve, claim, settings=settings, out=tmp_path, name="mine")
+        sample(curve, claim, RunSettings(settings=settings, out=tmp_path, name="mine"))

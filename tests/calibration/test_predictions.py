@@ -8,7 +8,7 @@ import pytest
 from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.calibration.prediction_store import FILE
 from bayesmembrane.calibration.predictions import Predictions, Wanted, predict_draws
-from bayesmembrane.calibration.run import Run, load_run, predictions_of, sample, stored_predictions
+from bayesmembrane.calibration.run import Run, RunSettings, load_run, predictions_of, sample, stored_predictions
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import StorageError
@@ -57,7 +57,7 @@ def test_bands_hold_the_truth_and_widen_beyond_the_fit() -> None:
     force = shot(at) + 0.02 * np.random.default_rng(8).standard_normal(at.size)
     part = Measurement(at, force, Annulus(0.010, 0.035), Specimen("film", 50e-6)).up_to(0.06)
     claim = hypothesis("gent")
-    found = predict_draws(claim, part, sample(part, claim, seed=5).draws())
+    found = predict_draws(claim, part, sample(part, claim, RunSettings(seed=5)).draws())
     low, middle, high = found.curve
     truth, inner = shot(found.deflection), ~found.beyond
     sd = (high - low) / (2 * 1.645)
@@ -121,7 +121,7 @@ SHORT = Settings(ess=1.0, chunk=30, most_steps=30, walkers=16)
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     out = tmp_path_factory.mktemp("chains")
-    return sample(measured(), hypothesis("neo_hookean"), out=out, settings=SHORT, predictions=False)
+    return sample(measured(), hypothesis("neo_hookean"), RunSettings(out=out, settings=SHORT, predictions=False))
 
 
 def assert_same(a: Predictions, b: Predictions) -> None:
@@ -144,7 +144,7 @@ def test_stored_predictions_equal_those_that_were_computed(run: Run) -> None:
 def test_a_finished_run_has_its_predictions_whoever_made_it(run: Run, tmp_path: Path) -> None:
     at = np.array([0.034, 0.040])
     rest = Measurement(at, force_curve("gent", (7.5, 40.0), at)[0], Annulus(0.010, 0.035), Specimen("film", 50e-6))
-    done = sample(measured(), hypothesis("neo_hookean"), out=tmp_path, settings=SHORT, rest=rest)
+    done = sample(measured(), hypothesis("neo_hookean"), RunSettings(out=tmp_path, settings=SHORT, rest=rest))
     found = stored_predictions(done)
     assert found is not None
     assert found.rest_at.tolist() == at.tolist()

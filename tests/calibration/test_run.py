@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import norm
 
 from bayesmembrane.calibration import run as run_module
-from bayesmembrane.calibration.run import Run, load_run, run_folders, sample
+from bayesmembrane.calibration.run import Run, RunSettings, load_run, run_folders, sample
 from bayesmembrane.calibration.sampling.walk import Progress, Settings
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.registry import material
@@ -28,7 +28,7 @@ def test_a_linear_posterior_is_exact(film) -> None:  # type: ignore[no-untyped-d
     curve = film("neo_hookean", (7.5,), noise=noise, seed=21, stated=True)
     unit = solve(request(material("neo_hookean"), [1.0], curve.deflection, 0.01, 0.035)).force[0]
     mean, sd = unit @ curve.force / (unit @ unit), noise / np.sqrt(unit @ unit)
-    run = sample(curve, hypothesis("neo_hookean", extra_noise=False), seed=1)
+    run = sample(curve, hypothesis("neo_hookean", extra_noise=False), RunSettings(seed=1))
     answer = run.summary()["posterior"]["c1"]
     assert run.status["status"] == "converged"
     assert abs(answer["mean"] - mean) < 5 * sd / np.sqrt(run.status["ess_bulk"])
@@ -42,7 +42,7 @@ def test_a_linear_posterior_is_exact(film) -> None:  # type: ignore[no-untyped-d
 @pytest.mark.parametrize(("name", "parameters"), [("yeoh", (8.0, -0.2, 0.03)), ("gent", (5.3, 30.0))])
 def test_the_truth_is_recovered_with_a_noise_of_its_own(film, name: str, parameters: tuple[float, ...]) -> None:  # type: ignore[no-untyped-def]
     curve = film(name, parameters, noise=0.01, seed=33, points=20)
-    run = sample(curve, hypothesis(name), seed=2)
+    run = sample(curve, hypothesis(name), RunSettings(seed=2))
     for field, truth in zip(material(name).field_names(), parameters, strict=True):
         answer = run.status["posterior"][field]
         assert abs(answer["mean"] - truth) < 3.5 * answer["sd"]
@@ -68,7 +68,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Run:
         d, force, Annulus(0.01, 0.035), Specimen("Film No. 1", 5e-5), covariance=1e-6 * (a @ a.T) + 2.5e-5 * np.eye(10)
     )
     out = tmp_path_factory.mktemp("chains")
-    return sample(curve.up_to(35e-3), hypothesis("gent"), seed=7, out=out)
+    return sample(curve.up_to(35e-3), hypothesis("gent"), RunSettings(seed=7, out=out))
 
 
 def test_a_run_is_read_back_as_it_was(stored: Run) -> None:
@@ -146,10 +146,10 @@ def test_the_whole_walk_is_stored_in_means(stored: Run) -> None:
 def test_what_the_cache_did_is_stored(film, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     curve, short = film("neo_hookean", (7.5,), noise=0.02, seed=1), Settings(ess=1.0, chunk=30, most_steps=30)
     cached = CachedSolver()
-    options = {"settings": short, "solve": cached, "predictions": False}
-    first = sample(curve, hypothesis("neo_hookean"), out=tmp_path, **options)  # type: ignore[arg-type]
-    again = sample(curve, hypothesis("neo_hookean"), seed=1, **options)  # type: ignore[arg-type]
-    plain = sample(curve, hypothesis("neo_hookean"), settings=short)
+    how = RunSettings(settings=short, predictions=False)
+    first = sample(curve, hypothesis("neo_hookean"), replace(how, out=tmp_path), solve=cached)
+    again = sample(curve, hypothesis("neo_hookean"), replace(how, seed=1), solve=cached)
+    plain = sample(curve, hypothesis("neo_hookean"), RunSettings(settings=short))
     assert "cache" not in plain.status
     assert first.status["cache"]["misses"] > 0
     assert again.status["cache"]["misses"] == 0  # a film that is known already, whatever its modulus
@@ -166,7 +166,7 @@ def test_a_finished_run_is_not_sampled_again(stored: Run, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(run_module, "run_ensembles", forbidden)
     assert stored.path is not None
-    again = sample(stored.measurement, hypothesis("gent"), seed=7, out=stored.path.parent)
+    again = sample(stored.measurement, hypothesis("gent"), RunSettings(seed=7, out=stored.path.parent))
     assert again.status == load_run(stored.path).status
 
 
@@ -174,14 +174,14 @@ def test_a_foreign_folder_is_left_alone(stored: Run, tmp_path: Path) -> None:
     m = stored.measurement
     assert stored.path is not None
     with pytest.raises(StorageError, match="holds another run"):
-        sample(m, hypothesis("gent"), seed=8, out=stored.path.parent, name=stored.name)
+        sample(m, hypothesis("gent"), RunSettings(seed=8, out=stored.path.parent, name=stored.name))
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("precious")
     with pytest.raises(StorageError, match="holds files that are no run"):
-        sample(m, hypothesis("gent"), out=tmp_path, name="mine")
+        sample(m, hypothesis("gent"), RunSettings(out=tmp_path, name="mine"))
     (tmp_path / "file").write_text("")
     with pytest.raises(StorageError, match="cannot be stored there"):
-        sample(m, hypothesis("gent"), out=tmp_path / "file")
+        sample(m, hypothesis("gent"), RunSettings(out=tmp_path / "file"))
     assert (tmp_path / "mine" / "thesis.tex").read_text() == "precious"
 
 
@@ -204,23 +204,23 @@ def test_an_interrupted_run_is_stored_and_continued(film, tmp_path: Path) -> Non
     def stop(progress: Progress) -> None:
         raise KeyboardInterrupt
 
-    options = {"seed": 3, "settings": settings, "out": tmp_path}
-    partial = sample(curve, hypothesis("neo_hookean"), progress=stop, **options)  # type: ignore[arg-type]
+    how = RunSettings(3, tmp_path, settings=settings)
+    partial = sample(curve, hypothesis("neo_hookean"), how, progress=stop)
     assert partial.interrupted
     assert partial.path is not None
     assert load_run(partial.path).interrupted
     assert "Not converged (the run was interrupted)" in sentences(partial.quality)[0]
-    done = sample(curve, hypothesis("neo_hookean"), **options)  # type: ignore[arg-type]
+    done = sample(curve, hypothesis("neo_hookean"), how)
     assert done.path == partial.path
     assert done.status["status"] == "converged"
     assert not (partial.path / "chains.npz").exists()
-    whole = sample(curve, hypothesis("neo_hookean"), seed=3, settings=settings)
+    whole = sample(curve, hypothesis("neo_hookean"), RunSettings(seed=3, settings=settings))
     assert np.array_equal(whole.draws(), done.draws())
 
 
 def test_a_run_that_stops_early_says_so(film) -> None:  # type: ignore[no-untyped-def]
     curve = film("neo_hookean", (7.5,), noise=0.02, seed=1)
-    run = sample(curve, hypothesis("neo_hookean"), settings=Settings(ess=1e6, chunk=60, most_steps=60))
+    run = sample(curve, hypothesis("neo_hookean"), RunSettings(settings=Settings(ess=1e6, chunk=60, most_steps=60)))
     assert run.status["status"] == "step limit"
     assert "the limit of 60 steps" in sentences(run.quality)[0]
 
@@ -228,7 +228,7 @@ def test_a_run_that_stops_early_says_so(film) -> None:  # type: ignore[no-untype
 def test_noise_that_dominates_is_told(film) -> None:  # type: ignore[no-untyped-def]
     """A neo-Hookean film cannot follow a Yeoh curve: the misfit must not pass for noise."""
     curve = film("yeoh", (8.0, -0.2, 0.03), noise=0.002, seed=6, stated=True)
-    run = sample(curve, hypothesis("neo_hookean"), seed=1)
+    run = sample(curve, hypothesis("neo_hookean"), RunSettings(seed=1))
     assert run.status["extra_noise_dominates"]
     assert any("the model misses something" in s for s in sentences(run.quality))
     assert run.status["goodness"]["reduced_chi2"] > 100

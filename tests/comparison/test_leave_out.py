@@ -7,7 +7,7 @@ import pytest
 from scipy.special import logsumexp
 
 from bayesmembrane.calibration.posterior import Posterior
-from bayesmembrane.calibration.run import sample
+from bayesmembrane.calibration.run import RunSettings, sample
 from bayesmembrane.comparison.leave_out import score as pc
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
@@ -44,7 +44,7 @@ def posterior(noise: str = "correlated") -> Posterior:
 
 @cache
 def run(noise: str = "correlated"):
-    return sample(measured(noise), hypothesis("neo_hookean"), seed=SEED, ess=1500)
+    return sample(measured(noise), hypothesis("neo_hookean"), RunSettings(seed=SEED, ess=1500))
 
 
 @cache
@@ -109,7 +109,7 @@ def test_the_rest_of_the_range_agrees_with_the_grid(noise):
     part = whole.up_to(0.030)
     claim = hypothesis("neo_hookean")
     p = Posterior(claim, part)
-    draws = sample(part, claim, seed=SEED, ess=1500).draws()
+    draws = sample(part, claim, RunSettings(seed=SEED, ess=1500)).draws()
     found = pc.leave_range_out(p, draws, whole)
     centre, sd = draws.mean(axis=0), draws.std(axis=0)
     axes = [np.linspace(c - 8 * s, c + 8 * s, 161) for c, s in zip(centre, sd, strict=True)]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bayesmembrane.calibration.run import sample
+from bayesmembrane.calibration.run import RunSettings, sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.diagnose import diagnose
@@ -59,7 +59,9 @@ def test_stored_equals_given_for_a_diagnosis(found: Diagnosis, tmp_path: Path) -
 def test_stored_equals_given_for_a_loop(measurement: Measurement, found: Diagnosis, tmp_path: Path) -> None:
     short = Settings(ess=1.0, chunk=40, most_steps=40, walkers=16)
     stages = [
-        Stage(sample(measurement, h, settings=short, out=tmp_path / "chains"), 500.0, 0.03, 450.0, 4.0, 0.91)
+        Stage(
+            sample(measurement, h, RunSettings(settings=short, out=tmp_path / "chains")), 500.0, 0.03, 450.0, 4.0, 0.91
+        )
         for h in (hypothesis("neo_hookean"), hypothesis("neo_hookean", ["force_offset"]))
     ]
     left = discrepancy(measurement, found.null.residual, found.noise)

@@ -6,7 +6,7 @@ import pytest
 from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.calibration.goodness import goodness
 from bayesmembrane.calibration.predictions import Wanted, predict_draws
-from bayesmembrane.calibration.run import Run, predictions_of, sample
+from bayesmembrane.calibration.run import Run, RunSettings, predictions_of, sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen
 from bayesmembrane.physics.cache import Tally
@@ -99,6 +99,6 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """A neo-Hookean run of a few steps, with its predictions."""
     settings = Settings(ess=1.0, chunk=40, most_steps=40, walkers=16)
     out = tmp_path_factory.mktemp("chains")
-    run = sample(measured(), hypothesis("neo_hookean"), out=out, settings=settings, predictions=False)
+    run = sample(measured(), hypothesis("neo_hookean"), RunSettings(out=out, settings=settings, predictions=False))
     predictions_of(run, Wanted(breaks=BREAKS, draws=20))
     return run

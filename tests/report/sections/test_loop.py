@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesmembrane.calibration.run import sample
+from bayesmembrane.calibration.run import RunSettings, sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.diagnose import diagnose
@@ -44,7 +44,7 @@ SHORT = Protocol("short", (0.015, 0.030, 0.030), (1e-3,) * 3, 120)
 
 def stage(measurement: Measurement, claim: Hypothesis, log_evidence: float) -> Stage:
     """A posterior of a few steps; its scores are not what is tested."""
-    run = sample(measurement, claim, settings=Settings(ess=1.0, chunk=40, most_steps=40, walkers=16))
+    run = sample(measurement, claim, RunSettings(settings=Settings(ess=1.0, chunk=40, most_steps=40, walkers=16)))
     return Stage(run, log_evidence, 0.03, 0.9 * log_evidence, 4.0, 0.91)
 
 

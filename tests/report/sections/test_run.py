@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bayesmembrane.calibration.predictions import Wanted
-from bayesmembrane.calibration.run import Run, predictions_of, sample
+from bayesmembrane.calibration.run import Run, RunSettings, predictions_of, sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.physics.forward import Forward
@@ -30,7 +30,7 @@ def test_a_strip_is_reported_without_a_lifted_film(rig, tmp_path: Path) -> None:
     noise = 0.01 * float(force.max()) * np.random.default_rng(1).normal(size=d.size)
     m = Measurement(d, force + noise, rig, Specimen("tape", 1e-3))
     settings = Settings(ess=1.0, chunk=40, most_steps=40, walkers=16)
-    run = sample(m, claim, out=tmp_path / "chains", settings=settings, predictions=False)
+    run = sample(m, claim, RunSettings(out=tmp_path / "chains", settings=settings, predictions=False))
     predictions_of(run, Wanted(draws=20))
     page = write_report([run], tmp_path / "report").read_text(encoding="utf-8")
     twin = json.loads((tmp_path / "report" / "report.json").read_text(encoding="utf-8"))
