@@ -44,7 +44,7 @@ class ReconstructionSection(Section):
             Glance(
                 "reconstruction",
                 f"the curve over {listed(r.name for r in found.ranges)}",
-                f"{found.force.size} points, {len(found.suspects)} printed rows contradict the rest",
+                f"{found.force.size} points; printed rows that contradict the rest: {len(found.suspects)}",
             )
             for found in of_kind(results, Reconstruction)
         ]
