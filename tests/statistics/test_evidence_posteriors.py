@@ -82,7 +82,7 @@ def test_prior_widths_agree_with_priors_of_that_width(name):
     """The reweighted change is that of the two cubatures, with the mass of either prior.
 
     Twice the width uses the tail of the draws: whether it can be answered is up to them. What is answered is right
-    within eight stated errors, which no seed and no machine should miss: tests/inference/test_evidence_sensitivity.py.
+    within eight stated errors, which no seed and no machine should miss: tests/comparison/test_prior_widths.py.
     """
     p = posterior(name)
     x, _, worth = sampled(name)
