@@ -25,6 +25,7 @@ from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.diagnosis.diagnose import diagnose as run_diagnose
+from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.loop import Loop, LoopSettings
 from bayesmembrane.diagnosis.loop import loop as run_loop
 from bayesmembrane.diagnosis.result import Diagnosis
@@ -156,16 +157,19 @@ def valleys_with_draws(
     return kept("valleys", found, document(found), what, work.out)
 
 
-def diagnose(measurement: Measurement, claim: Hypothesis, work: Work) -> Answer[Diagnosis]:
-    """Whether the hypothesis misses something, and what."""
-    found = run_diagnose(measurement, claim, seed=work.seed, tell=lambda text: work.tell(claim.label(), text))
-    what = asked("diagnose", run_diagnose, [measurement], [claim], {"seed": work.seed})
+def diagnose(measurement: Measurement, claim: Hypothesis | Question, work: Work) -> Answer[Diagnosis]:
+    """Whether the hypothesis misses something, and what; a `Question` may leave the energy open."""
+    question = claim if isinstance(claim, Question) else Question(claim)
+    label = question.hypothesis.label()
+    found = run_diagnose(measurement, question, seed=work.seed, tell=lambda text: work.tell(label, text))
+    settings = {"seed": work.seed, "declared": question.declared, "quick": question.quick}
+    what = asked("diagnose", run_diagnose, [measurement], [question.hypothesis], settings)
     return kept("diagnosis", found, document(found), what, work.out)
 
 
 def loop(
     measurement: Measurement,
-    claim: Hypothesis,
+    claim: Hypothesis | Question,
     work: Work,
     *,
     adapt_noise: bool = True,
@@ -173,9 +177,11 @@ def loop(
 ) -> Answer[Loop]:
     """Diagnose, add what is missing, calibrate again; its runs lie in ``runs``, or where the answers do."""
     how = LoopSettings(work.seed, runs or work.out, work.ess, adapt_noise)
-    found = run_loop(measurement, claim, how, tell=lambda text: work.tell(claim.label(), text))
-    settings = {"seed": work.seed, "ess": work.ess, "adapt_noise": adapt_noise}
-    what = asked("loop", run_loop, [measurement], [claim], settings)
+    question = claim if isinstance(claim, Question) else Question(claim)
+    label = question.hypothesis.label()
+    found = run_loop(measurement, question, how, tell=lambda text: work.tell(label, text))
+    settings = {"seed": work.seed, "ess": work.ess, "adapt_noise": adapt_noise, "declared": question.declared}
+    what = asked("loop", run_loop, [measurement], [question.hypothesis], settings)
     return kept("loop", found, document(found), what, work.out)
 
 

@@ -125,6 +125,37 @@ class MaterialOption(OptionGroup):
 
 
 @dataclass(frozen=True)
+class PreferredMaterialOption(OptionGroup):
+    """The strain energy that is preferred beforehand, where all of them are judged."""
+
+    material: Annotated[
+        str,
+        typer.Option(
+            "--material", help="Strain energy preferred beforehand; without it all are as probable, and all are judged."
+        ),
+    ] = ""
+
+    @property
+    def declared(self) -> bool:
+        """True if one was named."""
+        return bool(self.material)
+
+    @property
+    def name(self) -> str:
+        """The one that was named, or else the first in the library: any will do to ask the question."""
+        from bayesmembrane.ground.registry import materials
+
+        return self.material or min(materials())
+
+
+@dataclass(frozen=True)
+class QuickOption(OptionGroup):
+    """How far sets of effects are followed."""
+
+    quick: Annotated[bool, typer.Option("--quick", help="Single effects only.")] = False
+
+
+@dataclass(frozen=True)
 class MaterialsOption(OptionGroup):
     """Several strain energies."""
 

@@ -25,6 +25,7 @@ def descend(
     iterations: int,
     held: NDArray[np.bool_] | None = None,
     behind: float = np.inf,
+    slow_below: float = SLOW,
 ) -> tuple[Array, Array]:
     """min |r(x)|^2 with x between ``bounds`` (k,) from each row of start (M, k), by Marquardt's damped steps
 
@@ -32,7 +33,7 @@ def descend(
 
     with coordinates at a bound left out while the step would leave it, and those in ``held`` (M, k) left out always.
     A row whose |r|^2 is more than ``behind`` times the least is given up when it crawls: films at the edge of what can
-    be solved cost most. Returns x (M, k) and |r| (M,), inf where a start has no residuals or no slopes: neither a
+    be solved cost most; and when |r|^2 falls by less than its part ``slow_below`` a few times in a row. Returns x (M, k) and |r| (M,), inf where a start has no residuals or no slopes: neither a
     start nor a step goes where one of them is not a number.
 
     D. W. Marquardt, J. SIAM 11 (1963) 431; a row that finds no better point with any damping is done.
@@ -55,7 +56,7 @@ def descend(
         better = new_size < size[rows]
         take = rows[better]
         gain = (size[take] - new_size[better]) / np.maximum(size[take], 1e-300)
-        slow[take] = np.where(gain < SLOW, slow[take] + 1, 0)
+        slow[take] = np.where(gain < slow_below, slow[take] + 1, 0)
         crawl[rows] += 1
         crawl[take[gain > CRAWL]] = 0
         x[take], r[take], jacobian[take], size[take] = (

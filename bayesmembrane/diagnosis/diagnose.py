@@ -6,16 +6,19 @@ from dataclasses import replace
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.thinning import thinned
-from bayesmembrane.diagnosis.candidates.candidate import absorbed
-from bayesmembrane.diagnosis.candidates.sudden import SuddenChange, sudden_change
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed
+from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
-from bayesmembrane.diagnosis.explanation.case import OpenCase, Tell, opened
-from bayesmembrane.diagnosis.explanation.refits import left_by_form
-from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, explained
+from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, Tell, opened
+from bayesmembrane.diagnosis.explanation.growth import grown
+from bayesmembrane.diagnosis.explanation.total import summed
+from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, decided
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
+from bayesmembrane.diagnosis.left.remaining import remaining
 from bayesmembrane.diagnosis.left.shape import residual_shape
 from bayesmembrane.diagnosis.result import Diagnosis, thinning
 from bayesmembrane.diagnosis.separation import Experiment, experiments
+from bayesmembrane.diagnosis.thresholds import VERDICT
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -23,41 +26,49 @@ from bayesmembrane.physics.mechanics import api
 
 def diagnose(
     measurement: Measurement,
-    hypothesis: Hypothesis,
+    hypothesis: Hypothesis | Question,
     *,
     seed: int = 0,
     solve: Solve = api.solve,
     tell: Tell | None = None,
 ) -> Diagnosis:
-    """Whether ``hypothesis`` leaves structure in the residual, and which effect, pair or other energy explains it.
+    """Whether ``hypothesis`` leaves structure in the residual, and how probable each explanation of it is.
 
+    A `Question` says whether the energy was declared at all, and whether pairs of effects are to be looked at.
     A measurement of more readings than `thinning.MOST` is thinned, and so is what the answer holds by reading. Raises
     `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
     """
+    question = hypothesis if isinstance(hypothesis, Question) else Question(hypothesis)
     part = thinned(measurement)
-    found = _diagnosed(opened(part, hypothesis, seed, solve, tell or (lambda _: None)))
+    found = _diagnosed(opened(part, question, seed, solve, tell or (lambda _: None)))
     return replace(found, thinned=thinning(measurement, part))
 
 
 def _diagnosed(case: OpenCase) -> Diagnosis:
     if case.detection.adequate:
-        return _concluded(case, adequate(case))
-    form = left_by_form(case)
-    if form is not None:
-        return _concluded(case, adequate(case, form))
-    return _concluded(*explained(case))
+        return _concluded(case, case.search, adequate(case))
+    found = grown(case)
+    return _concluded(case, found.search, decided(case, summed(found)))
 
 
-def _concluded(case: OpenCase, found: Verdict) -> Diagnosis:
+def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
     """The answer, with what was not needed to find it: power, errors on other points, what to measure next."""
+    case.tell("checking on points that were set aside")
+    validation = _validated(case, search, found)
+    found = _predicting(found, validation)
     known = found.verdict in ("named", "ambiguous", "material")
-    null, best = case.null, found.members[0].candidate if known else case.null
-    sd = case.search.noise.each
-    effects = [n for j in found.members for n in j.candidate.names] if known else []
+    null = _null(case, found)
+    best = found.members[0].candidate if known else null
+    sd = search.noise.each
+    given = set(null.names)
+    effects = [n for j in found.members for n in sorted(set(j.candidate.names) - given)] if known else []
     return Diagnosis(
         verdict=found.verdict,
         effects=tuple(dict.fromkeys(effects)),
         material=best.hypothesis.material.name if found.verdict == "material" else "",
+        declared=case.question.declared,
+        probabilities=found.probabilities,
+        remaining=remaining(search, best if known else _nearest(found, null), null),
         rig=case.measurement.rig,
         thickness=case.measurement.specimen.thickness,
         detection=case.detection,
@@ -65,39 +76,49 @@ def _concluded(case: OpenCase, found: Verdict) -> Diagnosis:
         best=best,
         ranking=found.ranking,
         members=found.members,
-        better=found.better,
-        form=found.form,
-        sudden=_sudden(case, found),
+        foreign=found.foreign,
         confounded=confounded(case.signatures),
-        noise=case.search.noise,
+        noise=search.noise,
         power=smallest_sizes(case.signatures, case.detection.score.critical),
         absorbed=tuple(e.name for e in absorbed(case.measurement, null.hypothesis)),
         before=misfit_of(null.residual, sd, null.x.size),
         after=misfit_of(best.residual, sd, best.x.size),
         shape=residual_shape(case.measurement, null.residual),
-        validation=_validated(case, found, known),
-        experiments=_experiments(case, found),
+        validation=validation,
+        experiments=_experiments(search, found),
     )
 
 
-def _validated(case: OpenCase, found: Verdict, known: bool) -> HeldOut | None:
-    case.tell("checking on points that were set aside")
-    if not known:
-        return validate(case.search, case.null, case.null, [])
-    return validate(case.search, case.null, found.members[0].candidate, [j.candidate for j in found.ranking[:3]])
+def _null(case: OpenCase, found: Verdict) -> Candidate:
+    """The model as given, as the last noise weighs it."""
+    same = [j.candidate for j in found.ranking if j.candidate.label == case.null.label]
+    return same[0] if same else case.null
 
 
-def _experiments(case: OpenCase, found: Verdict) -> tuple[Experiment, ...]:
+def _nearest(found: Verdict, null: Candidate) -> Candidate:
+    """The most probable hypothesis, where none is given as the answer."""
+    return found.ranking[0].candidate if found.verdict == "unknown" and found.ranking else null
+
+
+def _predicting(found: Verdict, validation: HeldOut | None) -> Verdict:
+    """A model that does not predict the points that were set aside explains nothing, and is not named."""
+    if found.verdict not in ("named", "material") or validation is None:
+        return found
+    if validation.covered_after >= VERDICT.least_coverage:
+        return found
+    return replace(found, verdict="unknown")
+
+
+def _validated(case: OpenCase, search: Search, found: Verdict) -> HeldOut | None:
+    null = _null(case, found)
+    if found.verdict not in ("named", "ambiguous", "material"):
+        return validate(search, null, null, [])
+    return validate(search, null, found.members[0].candidate, [j.candidate for j in found.ranking[:3]])
+
+
+def _experiments(search: Search, found: Verdict) -> tuple[Experiment, ...]:
     """What to measure next, where rivals are left."""
     if found.verdict != "ambiguous" or len(found.members) < 2:
         return ()
     rivals = [j.candidate for j in found.members]
-    return tuple(experiments(case.measurement, rivals, case.search.noise.sd, case.search.solve))
-
-
-def _sudden(case: OpenCase, found: Verdict) -> SuddenChange | None:
-    """The sudden change that the verdict knows of, or that comes nearest where nothing explains the curve."""
-    if found.sudden is not None or found.verdict != "unknown":
-        return found.sudden
-    nearest = sudden_change(case.search, case.null)
-    return nearest if nearest is not None and nearest.gain > found.ranking[0].gain else None
+    return tuple(experiments(search.measurement, rivals, search.noise.sd, search.quick))

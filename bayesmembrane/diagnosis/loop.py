@@ -18,7 +18,7 @@ from bayesmembrane.comparison.leave_out.score import leave_one_out
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.thinning import thinned
 from bayesmembrane.diagnosis.diagnose import diagnose
-from bayesmembrane.diagnosis.explanation.case import Tell
+from bayesmembrane.diagnosis.explanation.case import Question, Tell
 from bayesmembrane.diagnosis.left.discrepancy import Discrepancy, discrepancy
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned, thinning
 from bayesmembrane.diagnosis.thresholds import LOOP, TINY
@@ -104,7 +104,7 @@ class LoopSettings:
 
 def loop(
     measurement: Measurement,
-    hypothesis: Hypothesis,
+    hypothesis: Hypothesis | Question,
     settings: LoopSettings | None = None,
     *,
     tell: Tell | None = None,
@@ -112,15 +112,17 @@ def loop(
 ) -> Loop:
     """Diagnose, sample, add what is named, and again.
 
-    A named effect or a better energy makes the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop,
+    A `Question` may leave the energy open: the most probable one is sampled first. Named effects or a better energy
+    make the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop,
     and so does a hypothesis that was there before. Of an ambiguous answer the first few are sampled. More readings
     than `thinning.MOST` are thinned, for all of it. Raises what `sample` and `diagnose` raise.
     """
     part = thinned(measurement)
+    question = hypothesis if isinstance(hypothesis, Question) else Question(hypothesis)
     closing = _Closing(part, settings or LoopSettings(), tell or (lambda _: None), watch)
-    found = closing.diagnosed(hypothesis)
-    noise = _noise_for(found, hypothesis) if closing.settings.adapt_noise else hypothesis.noise
-    stage = closing.sampled(replace(hypothesis, noise=noise))
+    found = closing.diagnosed(question)
+    noise = _noise_for(found, question.hypothesis) if closing.settings.adapt_noise else question.hypothesis.noise
+    stage = closing.sampled(replace(found.null.hypothesis, noise=noise))
     seen, rounds = {stage.run.hypothesis.label()}, list[Round]()
     while True:
         following = replace(found.hypothesis, noise=noise)
@@ -132,7 +134,7 @@ def loop(
         if not goes_on or len(rounds) >= closing.settings.most_rounds:
             break
         seen.add(following.label())
-        stage, found = after, closing.diagnosed(following)
+        stage, found = after, closing.diagnosed(replace(question, hypothesis=following, declared=True))
     return Loop(tuple(rounds), closing.left(rounds[-1].diagnosis), thinning(measurement, part))
 
 
@@ -145,8 +147,8 @@ class _Closing:
     tell: Tell
     watch: Watch | None
 
-    def diagnosed(self, claim: Hypothesis) -> Diagnosis:
-        """What ``claim`` misses."""
+    def diagnosed(self, claim: Question) -> Diagnosis:
+        """What its hypothesis misses."""
         return diagnose(self.measurement, claim, seed=self.settings.seed, solve=self.settings.solve, tell=self.tell)
 
     def sampled(self, claim: Hypothesis) -> Stage:

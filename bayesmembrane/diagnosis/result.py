@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
-from bayesmembrane.diagnosis.candidates.sudden import SuddenChange
 from bayesmembrane.diagnosis.detection.detect import Detection
-from bayesmembrane.diagnosis.explanation.case import Judged
+from bayesmembrane.diagnosis.explanation.foreign import Foreign
+from bayesmembrane.diagnosis.explanation.total import Judged, Probabilities
 from bayesmembrane.diagnosis.left.heldout import HeldOut, Misfit
+from bayesmembrane.diagnosis.left.remaining import Remaining
 from bayesmembrane.diagnosis.left.shape import ResidualShape
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.separation import Experiment
@@ -36,17 +37,17 @@ class Diagnosis(Showable):
     Attributes
     ----------
     verdict : one of `VERDICTS`
-    effects : names; of a pair both, of an ambiguous answer all in the set
+    effects : names of those beyond the given ones; of a set all, of an ambiguous answer all of its sets
     material : the better energy if that is the verdict, else ""
+    declared : False if no energy was declared
+    probabilities : of sets of effects, of energies, of what is foreign, each summed over the others
+    remaining : what the answer leaves; where there is none, what the most probable hypothesis does
     rig, thickness : of the measurement; m
     detection : tests of the model as given
     null, best : the model as given, and the most probable one
-    ranking : every candidate that was refitted, the most probable first
-    members : the candidates that the verdict rests on
-    better : the same effects or others with another energy, where that is decisively more probable
-    form : part of the plain material's misfit that an adequate model leaves, where the tests do see it
-    sudden : a change at one moment that explains the curve as well as the members do, or comes nearest where nothing
-        explains it
+    ranking : every hypothesis that was fitted, the most probable first
+    members : the hypotheses that the verdict rests on
+    foreign : what is more probable than that nothing foreign is there, or None
     confounded : (effect, effect, degrees) that this protocol cannot separate
     noise : the measurement's own
     power : by effect, the smallest |size| that this measurement would have shown, SI
@@ -61,6 +62,9 @@ class Diagnosis(Showable):
     verdict: str
     effects: tuple[str, ...]
     material: str
+    declared: bool
+    probabilities: Probabilities
+    remaining: Remaining
     rig: Fixture
     thickness: float
     detection: Detection
@@ -68,9 +72,7 @@ class Diagnosis(Showable):
     best: Candidate
     ranking: tuple[Judged, ...]
     members: tuple[Judged, ...]
-    better: Judged | None
-    form: float | None
-    sudden: SuddenChange | None
+    foreign: Foreign | None
     confounded: tuple[tuple[str, str, float], ...]
     noise: OwnNoise
     power: Mapping[str, float]

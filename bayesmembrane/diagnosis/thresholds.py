@@ -100,12 +100,16 @@ class SearchThresholds:
     """Of the usual size of an effect: the first start."""
     middling_share: float = 0.6
     """Of the usual size of an effect: the second start, from the best fit of the plain model only."""
+    last_iterations: int = 8
+    """Steps from the best end, once its own form error is known."""
+    slow_below: float = 3e-5
+    """Of the sum of squares: searches whose steps gain less are near enough, for the linear model knows the rest."""
+    least_form: float = 1e-2
+    """Of the noise: what the form error does below it is nothing."""
     given_up: float = 4.0
     """Times the least sum of squares: a search as far behind is not waited for."""
     at_bound: float = 1e-3
     """Of the width of the bounds: an estimate as near lies at its bound."""
-    least_weight: float = 0.05
-    """Part of the points that count on their own, at least, however correlated what is left."""
     spare_points: int = 3
     """Points beyond the parameters, at least: fewer tell no misfit from noise."""
     better_null: float = 1.0
@@ -113,76 +117,111 @@ class SearchThresholds:
 
 
 @dataclass(frozen=True)
-class SuddenThresholds:
-    """A change at one moment."""
+class Sizes:
+    """What effects are expected to be, in parts of what the test reached."""
 
-    places: int = 160
-    """Moments that are tried; a curve that has fewer readings is not asked."""
-    margin: float = 0.04
-    """Of the readings at either end where no step is looked for: a start or an end is none."""
-    widths: tuple[float, ...] = (1e-6, 0.006, 0.018)
-    """Of the whole test: how long the change takes, from at once to a few seconds."""
-    visible: float = 1e-3
-    """Of a step, that the model's own slopes leave over; less is round-off."""
-    rank: float = 1e-9
-    """Of the largest singular value, when the model adapts to the step."""
+    travel: float = 0.01
+    """Of the largest deflection: lengths, as slack, a set, the frame's yielding at the largest force."""
+    force: float = 0.01
+    """Of the largest force: forces, as friction, an offset, a drift until the end."""
+    largest: float = 30.0
+    """Times the expected size: nothing larger is looked for."""
 
 
 @dataclass(frozen=True)
-class ExplanationThresholds:
-    """When a candidate explains the curve, when it is a rival, and when it gets the name.
+class FormThresholds:
+    """How noise and form error are integrated out; their priors stand in `physics.form_error`."""
 
-    Factors are ln of Bayes factors. An effect's law is the textbook's, a machine's is not: that is why most of them
-    are larger than evidence alone would ask for.
-    """
+    scale_sd: float = 0.25
+    """Of ln of the noise over its reference, where it is inferred: the reference may have followed a little, or not."""
+    stated_scale_sd: float = 0.05
+    """The same where it is stated and believed."""
+    reach: float = 5.0
+    """Standard deviations of the prior to either side within which the most probable size is looked for."""
+    iterations: int = 60
+    """Of that search."""
+    tolerance: float = 1e-9
+    """Relative change of ln p at which it ends."""
+    step: float = 1e-2
+    """In ln of a size: of the differences that make the curvature."""
+    least_curvature: float = 0.25
+    """Of that of the prior: a flatter place is one where Laplace's approximation does not hold."""
+    far_bound: float = 6.0
+    """Standard deviations: a bound beyond cuts nothing off."""
+    joint_bounds: int = 6
+    """Bounds that are taken together; further ones count one by one."""
+    deep_tail: float = -25.0
+    """ln of a probability: a tail as deep is computed on its own, where integration would find nothing."""
 
-    level: float = 0.01
-    """Probability of what a candidate leaves: above it, that is noise."""
-    probable: float = 3.0
-    """Over the plain model: what an explanation needs, since the tests may have raised a false alarm."""
-    unexplained: float = 0.2
-    """Part of the misfit that a candidate may leave and still explain the curve, if that is small beside the noise."""
-    unexplained_large: float = 0.05
-    """The same where the rest is large beside the noise: of a large misfit a fifth is a lot. And the part that chance
-    may add to: of a small misfit, noise alone leaves a larger one."""
-    small_chi2: float = 1.5
-    """Reduced chi-square up to which the rest is small beside the noise."""
-    wave_level: float = 1e-3
-    """Probability of the strongest wave in what is left, below which it is there: no smooth effect takes waves away."""
-    wave_share: float = 0.2
-    """Of the squares that a candidate takes away: a wave that has more is what is missing."""
-    decisive: float = 4.0
-    """Beyond which a rival is out: odds of fifty to one."""
-    alike_degrees: float = 30.0
-    """Between the traces of two candidates: below it they look alike."""
-    alike_decisive: float = 5.0
-    """Beyond which a rival that looks alike is out."""
-    very_alike_degrees: float = 15.0
-    """Between the traces of two candidates: below it they can hardly be told apart."""
-    very_alike_decisive: float = 6.0
-    """Beyond which such a rival is out."""
-    form_share: float = 0.25
-    """Of the factor that the best leaves beyond noise: a rival nearer than that stays, for the best's form is farther
-    off than what sets them apart."""
-    energy_decisive: float = 8.0
-    """By which an effect that follows the deflection alone must beat every other energy: the instrument is blamed only
-    far beyond them."""
-    energy_share: float = 0.05
-    """The same, as a part of the effect's own factor."""
-    foreign: float = 1.0
-    """By which a sudden change must beat the best effect to be its rival: it is rarer than an effect."""
-    foreign_share: float = 0.02
-    """Of the best effect's factor by which it must beat it, and by no less than `decisive`, to put it out."""
-    pair_singles: int = 4
-    """Best single effects that are tried with every other one: the first of a pair is often not the best alone."""
-    pair_gain: float = 15.0
-    """Over the best single effect that a pair needs: one effect with another form gains less (studies)."""
-    pair_share: float = 0.045
-    """Of the misfit that the second effect of a pair must take away (studies)."""
+
+@dataclass(frozen=True)
+class GrowthThresholds:
+    """How far the sets of effects are followed: effort, not belief."""
+
+    beam: int = 4
+    """Sets that a further effect is added to: the first of a pair is often not the best alone."""
+    beam_reach: float = 60.0
+    """ln of the Bayes factor behind the best set of its size, beyond which a set is not followed."""
+    refits: int = 6
+    """Effects that are fitted beside each of these sets, by what their traces promise."""
+    refit_reach: float = 40.0
+    """ln of the Bayes factor that a trace may promise less than the best one, and still be fitted."""
     with_other_energies: int = 3
-    """Explanations that are tried with the other energies."""
-    single_valued: float = 0.02
-    """Part of the squares of an effect's slope that deflection alone leaves over, below which it follows that alone."""
+    """Sets of each size that are tried with every energy."""
+    further_starts: int = 1
+    """Draws of the material's prior that searches for a first effect start from, besides the plain fit."""
+    polished: int = 6
+    """Hypotheses of each size that are searched on with their own form error."""
+    energy_reach: float = 15.0
+    """ln of the Bayes factor behind the best energy, beyond which one is not tried with further sets of a size."""
+    worth: float = 1e-3
+    """Of the probability of all smaller sets: below it, larger sets are not looked at."""
+
+
+@dataclass(frozen=True)
+class ForeignThresholds:
+    """What no effect of the library describes, and how it is looked for."""
+
+    least_points: int = 60
+    """Readings that are needed to tell it."""
+    size: float = 0.03
+    """Of the largest force: the expected size of a step or a wave."""
+    places: int = 160
+    """Moments of a step that are tried, at most."""
+    margin: float = 0.04
+    """Of the readings at either end where no step is looked for: a start or an end is none."""
+    widths: tuple[float, ...] = (1e-6, 0.006, 0.018)
+    """Of the whole test: how long a step takes, from at once to a few seconds."""
+    waves: int = 400
+    """Waves that are tried over time, and as many over deflection."""
+    least_waves: float = 4.0
+    """Over the range: fewer are a bend."""
+    plays: tuple[float, ...] = (0.002, 0.006, 0.02)
+    """Of the largest deflection: over which a play of the drive is taken up after a reversal."""
+    play: float = 0.01
+    """Of the largest deflection: the expected play."""
+    plateau: int = 5
+    """Readings that share the largest force: as many are no chance."""
+    ln_unnamed: tuple[float, float] = (-4.6, 1.0)
+    """Mean and sd of ln of what is smooth and has no name, in parts of the force: 1 % within a factor of three."""
+    bases: int = 3
+    """Of the most probable sets, and the plain model, beside which it is looked for."""
+
+
+@dataclass(frozen=True)
+class VerdictThresholds:
+    """How probable an answer must be."""
+
+    sure: float = 0.95
+    """From which an answer is given; sets of an ambiguous one hold as much together."""
+    least_share: float = 0.01
+    """A set that has less is no member of an ambiguous answer, unless it is needed for `sure`."""
+    most_members: int = 6
+    """Of an ambiguous answer; if more are needed, nothing can be told."""
+    carried: float = 0.05
+    """Relative error of an energy from which on none of those known is said to hold."""
+    least_coverage: float = 0.45
+    """Of held-out points inside the 90 % band: a model that covers fewer predicts nothing, and is not named."""
 
 
 @dataclass(frozen=True)
@@ -251,8 +290,22 @@ class WordsThresholds:
 
     visible_effects: int = 3
     """Smallest sizes that are told of an adequate model."""
-    partial: float = 0.5
-    """Part of the misfit that the nearest candidate leaves, at most, to be mentioned where nothing explains it."""
+    probable: float = 0.01
+    """Probability from which an explanation is told first."""
+    nearly: float = 1e-3
+    """A probability as near to 0 or 1 is told as that."""
+    digits_from: float = 0.1
+    """Probability from which a third digit is told."""
+    all_of_it: float = 0.995
+    """Share of the misfit: nothing was taken away."""
+    little_chi2: float = 1.2
+    """Reduced chi-square up to which what is left is noise, if it is little of what was there too."""
+    little_share: float = 0.1
+    """Share of the misfit up to which that holds."""
+    carried: float = 0.5
+    """Of what is left beyond noise: then the form error is said to carry it."""
+    law_error: float = 0.03
+    """Relative error of a law from which on it is told."""
     uneven: float = 1.5
     """Times the root mean square of the rest: then a part of the residual stands out."""
     periodic: float = 0.01
@@ -275,8 +328,11 @@ NOISE = NoiseThresholds()
 REFERENCE = ReferenceThresholds()
 DETECTION = DetectionThresholds()
 SEARCH = SearchThresholds()
-SUDDEN = SuddenThresholds()
-EXPLANATION = ExplanationThresholds()
+SIZES = Sizes()
+FORM = FormThresholds()
+GROWTH = GrowthThresholds()
+FOREIGN = ForeignThresholds()
+VERDICT = VerdictThresholds()
 HELD_OUT = HeldOutThresholds()
 DISCREPANCY = DiscrepancyThresholds()
 NEXT_TEST = NextTestThresholds()

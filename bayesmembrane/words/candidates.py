@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.explanation.total import set_name
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST
-from bayesmembrane.words.diagnosis import experiment_sentence, set_aside, size_in_words
+from bayesmembrane.words.diagnosis import experiment_sentence, percent, set_aside, size_in_words
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.next_test import spoken_test
@@ -33,13 +34,12 @@ def sizes(candidate: Candidate, null: Candidate) -> list[str]:
 
 def rivals(d: Diagnosis) -> list[str]:
     """The ambiguous set, and what to measure to tell its members apart."""
-    best = max(j.log_evidence for j in d.members)
     told = []
+    given = d.null.names
     for j in d.members:
-        behind = best - j.log_evidence
-        words = "the most probable" if behind == 0 else f"{behind:.1f} behind in ln of the evidence"
+        p = d.probabilities.effects.get(set_name(j.candidate, given), 0.0)
         size = ", ".join(sizes(j.candidate, d.null))
-        told.append(f"{candidate_title(j.candidate, d.null)}{f' ({size})' if size else ''}: {words}.")
+        told.append(f"{candidate_title(j.candidate, d.null)}{f' ({size})' if size else ''}: {percent(p)}.")
     clear = [e for e in d.experiments if e.separation >= NEXT_TEST.clear]
     dim = [e for e in d.experiments if e.separation < NEXT_TEST.clear]
     rest = [f"{spoken_test(e.test)} ({e.separation:.1f} standard deviations)" for e in dim]

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
-from bayesmembrane.diagnosis.candidates.sudden import SuddenChange
+from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, UNNAMED, WAVE, Foreign
+from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged
 from bayesmembrane.diagnosis.left.heldout import HeldOut
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
-from bayesmembrane.diagnosis.thresholds import EXPLANATION, WORDS
+from bayesmembrane.diagnosis.thresholds import WORDS
 from bayesmembrane.ground.registry import components
-from bayesmembrane.words.hypothesis import spoken, title
-from bayesmembrane.words.language import listed
+from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.shape import shape_in_words
 
@@ -32,6 +32,18 @@ def document(found: Diagnosis) -> dict[str, Any]:
     fit, waves, noise, held = found.detection.lack_of_fit, found.detection.periodicity, found.noise, found.validation
     thinned = {"thinning": thinning_sentence(found.thinned)} if found.thinned is not None else {}
     return thinned | {
+        "probabilities": {
+            "effects": dict(found.probabilities.effects),
+            "energies": dict(found.probabilities.energies),
+            "foreign": dict(found.probabilities.foreign),
+        },
+        "remaining": {
+            "share": found.remaining.share,
+            "reduced_chi2": found.remaining.reduced_chi2,
+            "words": remaining_sentence(found),
+            "energy_error": found.remaining.energy_error,
+            "law_errors": dict(found.remaining.law_errors),
+        },
         "verdict": found.verdict,
         "effects": list(found.effects),
         "material": found.material,
@@ -46,10 +58,12 @@ def document(found: Diagnosis) -> dict[str, Any]:
             {
                 "effect": "+".join(j.candidate.names) or j.candidate.hypothesis.material.name,
                 "material": j.candidate.hypothesis.material.name,
-                "log_bayes_factor": j.log_evidence - found.null.log_evidence,
+                "probability": j.probability,
+                "log_bayes_factor": j.gain,
                 "parameters": j.candidate.parameters,
                 "unexplained": j.unexplained,
-                "explains": j.explains,
+                "energy_error": j.candidate.energy_error,
+                "law_errors": j.candidate.law_errors,
                 "at_bound": list(j.candidate.at_bound),
             }
             for j in found.ranking
@@ -80,10 +94,52 @@ def document(found: Diagnosis) -> dict[str, Any]:
 
 
 def sentence(found: Diagnosis) -> str:
-    """What to read first: the verdict, how sure, how large, and what to do; in the units of the rig."""
-    text = _form(found, found.form) if found.form is not None else _ANSWERS[found.verdict](found)
+    """What to read first: how probable, the verdict, how large, what remains, what to do; in the units of the rig."""
     thinned = "" if found.thinned is None else f" {thinning_sentence(found.thinned)}"
-    return text.strip() + _better_energy(found) + _noise(found) + thinned
+    parts = [probability_sentence(found), _ANSWERS[found.verdict](found).strip()]
+    if found.verdict != "adequate":
+        parts.append(remaining_sentence(found))
+    return " ".join(p for p in parts if p) + _noise(found) + thinned
+
+
+def probability_sentence(found: Diagnosis) -> str:
+    """The most probable sets of effects, and what is foreign where it counts."""
+    p = found.probabilities
+    told = [f"{set_title(name)} {percent(q)}" for name, q in p.effects.items() if q >= WORDS.probable][:3]
+    foreign = 1.0 - p.foreign.get(NOTHING, 1.0)
+    if foreign >= WORDS.probable:
+        told.append(f"something foreign {percent(foreign)}")
+    return f"Probability: {', '.join(told)}."
+
+
+def set_title(name: str) -> str:
+    """A set of effects by its name among the probabilities, as people say it."""
+    return "no effect" if name == NOTHING else " and ".join(effect_title(n) for n in name.split("+"))
+
+
+def percent(p: float) -> str:
+    """A probability that is neither 0 nor 1."""
+    if p > 1 - WORDS.nearly:
+        return f"> {100 * (1 - WORDS.nearly):g} %"
+    if p < WORDS.nearly:
+        return f"< {100 * WORDS.nearly:g} %"
+    return f"{100 * p:.2g} %" if p < WORDS.digits_from else f"{100 * p:.3g} %"
+
+
+def remaining_sentence(found: Diagnosis) -> str:
+    """How much the answer leaves, of what kind, and what of it a small error of the forms carries."""
+    left = found.remaining
+    factor, unit = _units(found)["N"]
+    text = f"Remaining: reduced chi-square {left.reduced_chi2:.2f}"
+    if left.share < WORDS.all_of_it:
+        text += f", {100 * left.share:.2g} % of the misfit beyond noise"
+    if left.reduced_chi2 < WORDS.little_chi2 and left.share < WORDS.little_share:
+        return f"{text}: noise."
+    laws = [f"of {100 * e:.2g} % in {effect_title(n)}" for n, e in left.law_errors.items() if e > WORDS.law_error]
+    forms = [f"an error of {100 * left.energy_error:.2g} % in the energy", *(f"one {w}" for w in laws)]
+    if left.carried >= WORDS.carried:
+        return f"{text}; {' and '.join(forms)} would carry it ({factor * left.rms:.2g} {unit})."
+    return f"{text}; not even {' and '.join(forms)} would carry all of it."
 
 
 def thinning_sentence(thinned: Thinned) -> str:
@@ -124,14 +180,37 @@ def size_in_words(value: float, unit: str, shown: Units = SCALES) -> str:
     return f"{factor * value:.{digits}g} {name}".strip()
 
 
-def sudden_sentence(change: SuddenChange, shown: Units) -> str:
-    """When, how large, and what makes such a step."""
+def foreign_sentence(f: Foreign, shown: Units) -> str:
+    """What is foreign: when or where, how large, and what makes such a thing."""
     factor, unit = shown["N"]
-    when = f"reading {change.place + 1}" if change.moment is None else f"{change.moment:.4g} s"
-    size = f"{100 * abs(change.size):.2g} %" if change.relative else f"{factor * abs(change.size):.3g} {unit}"
+    taken = f"takes {100 * f.share:.0f} % of the squares away"
+    if f.kind == SUDDEN:
+        when = f"reading {f.place + 1}" if f.moment is None else f"{f.moment:.4g} s"
+        size = f"{100 * abs(f.size):.2g} %" if f.relative else f"{factor * abs(f.size):.3g} {unit}"
+        return (
+            f"A sudden {'rise' if f.size > 0 else 'drop'} of the force by {size} at {when} {taken}: look for a change "
+            "of temperature, a knock or a tear then."
+        )
+    if f.kind == WAVE:
+        length, name = shown["m"] if f.against == "deflection" else (1.0, "s")
+        return (
+            f"A wave of {factor * f.size:.3g} {unit} that repeats every {length * f.period:.3g} {name} {taken}, as a "
+            "drive, a gear or a vibration would make it."
+        )
+    if f.kind == PLAY:
+        length, name = shown["m"]
+        return (
+            f"A play of {length * f.size:.3g} {name} in the drive {taken}: after each reversal the film is behind the "
+            "counter."
+        )
+    if f.kind == CLIPPED:
+        return (
+            f"The load cell is at its limit of {f.size:.4g} N from reading {f.place + 1} on: leave these readings out."
+        )
+    assert f.kind == UNNAMED
     return (
-        f"A sudden {'rise' if change.size > 0 else 'drop'} of the force by {size} at {when} takes "
-        f"{100 * change.share:.0f} % of the squares away: look for a change of temperature, a knock or a tear then."
+        f"Something smooth along the test, of about {100 * f.size:.2g} % of the force, {taken}; no effect in the "
+        "library has this course."
     )
 
 
@@ -140,6 +219,12 @@ def sudden_sentence(change: SuddenChange, shown: Units) -> str:
 
 def _adequate(found: Diagnosis) -> str:
     factor, unit = _units(found)["N"]
+    if not found.detection.adequate:
+        return (
+            f"{_model(found.null)} leaves more than noise (p {_p(found)}), but no effect is needed: "
+            f"{remaining_sentence(found)[0].lower()}{remaining_sentence(found)[1:]} Nothing beyond that is seen to be "
+            "missing."
+        )
     return (
         f"{_model(found.null)} describes the curve to within its noise (p = {found.detection.p_value:.2g}; "
         f"{factor * found.before.rmse_N:.3g} {unit} root mean square). Nothing is seen to be missing. "
@@ -151,47 +236,51 @@ def _named(found: Diagnosis) -> str:
     (member, *_) = (j.candidate for j in found.members)
     have = {e.name for e in found.null.hypothesis.effects}
     signatures = " ".join(e.signature for e in member.hypothesis.effects if e.name not in have)
-    return (
-        f"{_misses(found)}{_added(member, found)}. {_error(found)}{_bounds(member)} {signatures} {_sudden(found)}"
-    ).rstrip()
+    return f"{_misses(found)}{_added(member, found)}. {_error(found)}{_bounds(member)} {signatures}".rstrip()
 
 
 def _material(found: Diagnosis) -> str:
     best = found.members[0].candidate
     better = best.hypothesis.material.title
     return (
-        f"{_misses(found)}the energy {better} explains it without any added effect, better than or as well as an "
-        f"effect of the instrument would. {_error(found)}{_bounds(best)} Use {better}, or show by another test that "
-        f"the family is right before an instrument is blamed."
+        f"{_misses(found)}the energy {better} explains it without any added effect. {_error(found)}{_bounds(best)} "
+        f"Use {better}, or show by another test that the family is right before an instrument is blamed."
     )
 
 
 def _ambiguous(found: Diagnosis) -> str:
-    names = "; or ".join(_added(j.candidate, found) for j in found.members)
-    foreign = "" if found.sudden is None else "; or something from outside the film at one moment"
+    names = "; or ".join(_member(j, found) for j in found.members)
     nexts = found.experiments
     advice = f" To tell them apart: {experiment_sentence(nexts[0])}." if nexts else ""
-    return (
-        f"{_misses(found)}this measurement cannot tell which of these it is: {names}{foreign}. {_error(found)}"
-        f"{advice} {_sudden(found)}"
-    ).rstrip()
+    return f"{_misses(found)}this measurement cannot tell which of these it is: {names}. {_error(found)}{advice}"
+
+
+def _member(j: Judged, found: Diagnosis) -> str:
+    have = set(found.null.names)
+    if set(j.candidate.names) == have:
+        return f"no effect, but the energy {j.candidate.hypothesis.material.title}"
+    return _added(j.candidate, found)
 
 
 def _unknown(found: Diagnosis) -> str:
     waves, units = found.detection.periodicity, _units(found)
-    shape = f"{shape_in_words(found.shape, waves, found.rig, units)} {_sudden(found)}".rstrip()
-    if not found.members:
+    if found.foreign is not None:
+        base = found.foreign.base.names
+        beside = f" beside {' and '.join(effect_title(n) for n in base)}" if base else ""
         return (
-            f"{_misses(found)}no known effect, no pair of effects and no other energy explains it."
-            f"{_nearest(found)} {shape}"
+            f"{_misses(found)}no effect of the library describes it{beside}. {foreign_sentence(found.foreign, units)}"
         )
-    effects = found.members[0].candidate.hypothesis.effects
-    names = " with ".join(e.title for e in effects)
-    alone = "on this path its free law follows" if len(effects) == 1 else "together they follow"
-    return (
-        f"{_misses(found)}{names} would imitate it, but {alone} the deflection alone, as a strain energy that "
-        f"is not known here would do just as well. No name is given. {shape}"
-    )
+    shape = shape_in_words(found.shape, waves, found.rig, units)
+    if found.members:
+        held, covered = set_aside(found.validation), found.validation
+        part = "" if covered is None else f"{100 * covered.covered_after:.0f} %"
+        return (
+            f"{_misses(found)}{_added(found.members[0].candidate, found)} would be the most probable, but its 90 % "
+            f"band holds only {part} of the points that were set aside ({held}): no name is given. {shape}"
+        )
+    if found.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
+        return f"{_misses(found)}no effect is needed, and none of the energies has this form. {shape}"
+    return f"{_misses(found)}no few explanations stand out: too many are about as probable. {shape}"
 
 
 _ANSWERS = {
@@ -201,16 +290,6 @@ _ANSWERS = {
     "ambiguous": _ambiguous,
     "unknown": _unknown,
 }
-
-
-def _form(found: Diagnosis, left: float) -> str:
-    """Of a model that is adequate but for the form of its effects."""
-    h = found.null.hypothesis
-    return (
-        f"{spoken(h)} leaves {100 * left:.1f} % of the misfit that {h.material.title} alone has "
-        f"(p {_p(found)}): no more than a machine leaves that differs a little from the textbook's form. "
-        "Nothing beyond that is seen to be missing."
-    )
 
 
 # ---- parts -----------------------------------------------------------------------------------------------------------
@@ -264,21 +343,6 @@ def _bounds(candidate: Candidate) -> str:
     return f" An estimate lies at its bound ({', '.join(candidate.at_bound)}): take it as a limit, not as a value."
 
 
-def _sudden(found: Diagnosis) -> str:
-    return "" if found.sudden is None else sudden_sentence(found.sudden, _units(found))
-
-
-def _nearest(found: Diagnosis) -> str:
-    """How far the best of the effects gets, where that is worth saying."""
-    best = next((j for j in found.ranking if j.candidate.names != found.null.names), None)
-    if best is None or best.log_evidence <= found.null.log_evidence + EXPLANATION.decisive:
-        return ""
-    if best.unexplained > WORDS.partial:
-        return ""
-    taken = 100 * (1 - best.unexplained)
-    return f" The nearest, {_added(best.candidate, found)}, takes {taken:.0f} % of it and leaves the rest."
-
-
 def _power(found: Diagnosis) -> str:
     """The smallest sizes that would have shown, for the effects that are easiest to see relative to what is usual."""
     known, units = components("effects"), _units(found)
@@ -286,17 +350,6 @@ def _power(found: Diagnosis) -> str:
     sizes = [(known[n], size) for _, n, size in relative[: WORDS.visible_effects]]
     words = [f"{e.title} of {size_in_words(size, e().size.unit, units)}" for e, size in sizes]
     return f"It would have shown {', '.join(words)} or more." if words else ""
-
-
-def _better_energy(found: Diagnosis) -> str:
-    """On another energy with which the same effect, or another one, is decisively more probable."""
-    if found.better is None:
-        return ""
-    h = found.better.candidate.hypothesis
-    return (
-        f" The energy matters here: with {title(h.material)} and {listed(map(title, h.effects))} "
-        f"the curve is more probable still, by {found.better.gain - found.members[0].gain:.3g} in ln K."
-    )
 
 
 def _noise(found: Diagnosis) -> str:

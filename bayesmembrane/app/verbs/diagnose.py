@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 from bayesmembrane.app.options import (
     CurveOptions,
     HypothesisOptions,
-    MaterialOption,
     OutputOptions,
+    PreferredMaterialOption,
+    QuickOption,
     RangeOption,
     StoredOption,
 )
@@ -24,21 +25,24 @@ CANDIDATES = 8
 
 def verb(
     curve: CurveOptions,
-    material: MaterialOption,
+    material: PreferredMaterialOption,
     beside: HypothesisOptions,
     used: RangeOption,
+    how: QuickOption,
     stored: StoredOption,
     output: OutputOptions,
 ) -> None:
-    """Whether the model misses something, which effect or energy explains it, or that this cannot be told."""
+    """How probable it is that nothing, an effect, another energy or something foreign is behind the curve."""
     from bayesmembrane.app import analyses
+    from bayesmembrane.diagnosis.explanation.case import Question
 
-    claim = beside.with_material(material.material)
+    claim = beside.with_material(material.name)
+    question = Question(claim, material.declared, how.quick)
     measurement = used.of(curve.read())
     say_thinning(measurement)
-    with status(f"Diagnosing {claim.label()}") as tell:
+    with status(f"Diagnosing {claim.label() if material.declared else 'the curve'}") as tell:
         work = analyses.Work(output.seed, stored.folder, tell=lambda _, text: tell(text))
-        found = analyses.diagnose(measurement, claim, work)
+        found = analyses.diagnose(measurement, question, work)
     answer(found.document, output.as_json, lambda: show(found.document, measurement))
 
 
@@ -60,13 +64,14 @@ def show(document: dict[str, Any], measurement: Measurement) -> None:
     rows = [
         [
             f"{r['effect']} with {r['material']}" if several and r["effect"] != r["material"] else r["effect"],
+            f"{r['probability']:.3f}",
             f"{r['log_bayes_factor']:.1f}",
             f"{100 * r['unexplained']:.0f} %",
             ", ".join(f"{k.split('.')[-1]} {v:.4g}" for k, v in r["parameters"].items()),
         ]
         for r in document["ranking"][:CANDIDATES]
     ]
-    table("Candidates", ["effect or energy", "ln Bayes factor", "unexplained", "parameters, SI"], rows)
+    table("Candidates", ["effect or energy", "probability", "ln Bayes factor", "unexplained", "parameters, SI"], rows)
     errors = [
         [when, f"{factor * e['rmse_N']:.3g}", f"{factor * e['max_N']:.3g}", f"{e['reduced_chi2']:.2f}"]
         for when, e in document["error"].items()

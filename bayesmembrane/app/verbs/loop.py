@@ -10,8 +10,8 @@ import typer
 from bayesmembrane.app.options import (
     CurveOptions,
     HypothesisOptionsAuto,
-    MaterialOption,
     OutputOptions,
+    PreferredMaterialOption,
     RangeOption,
     SamplingOptions,
     StoredOption,
@@ -28,7 +28,7 @@ place = 10
 
 def verb(
     curve: CurveOptions,
-    material: MaterialOption,
+    material: PreferredMaterialOption,
     beside: HypothesisOptionsAuto,
     used: RangeOption,
     sampling: SamplingOptions,
@@ -38,15 +38,17 @@ def verb(
 ) -> None:
     """Calibrate, diagnose, add what is missing, calibrate again, until adequate or abstaining; and report."""
     from bayesmembrane.app import analyses
+    from bayesmembrane.diagnosis.explanation.case import Question
     from bayesmembrane.report.page import write_report
 
     adapt = beside.noise == "auto"
-    claim = beside.with_material(material.material, noise="white" if adapt else "")
+    claim = beside.with_material(material.name, noise="white" if adapt else "")
     measurement = used.of(curve.read())
     say_thinning(measurement)
     with resumable(stored.folder), lines() as tell:
         work = analyses.Work(output.seed, stored.folder, sampling.ess, tell)
-        found = analyses.loop(measurement, claim, work, adapt_noise=adapt)
+        question = Question(claim, material.declared)
+        found = analyses.loop(measurement, question, work, adapt_noise=adapt)
     page = write_report([*analyses.loop_runs(found.result), found.result], report_folder)
     document = {**found.document, "report": str(page)}
     answer(document, output.as_json, lambda: show(document, measurement))

@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
@@ -16,14 +17,18 @@ from bayesmembrane.physics.hypothesis import Hypothesis
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One hypothesis at its most probable parameters, under the measurement's own noise.
+    """One hypothesis at its most probable parameters, under the measurement's own noise and its form error.
 
     hypothesis : material and effects
     x : (k,) coordinates
     residual : (N,) N, measured less fitted
     slopes : (N, k) dF/dx there
-    log_evidence : Laplace approximation of ln Z, up to a constant that all candidates share
+    log_evidence : ln Z, up to a constant that all candidates share
     at_bound : names of coordinates at a bound
+    traces : (E, N) N, what each effect changes of the force; zeros for one that has no law that could be off
+    theta : (h,) ln of noise over its reference, ln of the relative error of the energy and of every law
+    theta_sd : (h,) their standard deviations
+    form : (N,) N, of the residual what the form error carries; the rest is noise
     """
 
     hypothesis: Hypothesis
@@ -32,6 +37,10 @@ class Candidate:
     slopes: Array
     log_evidence: float
     at_bound: tuple[str, ...]
+    traces: Array
+    theta: Array
+    theta_sd: Array
+    form: Array
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -42,6 +51,27 @@ class Candidate:
     def label(self) -> str:
         """Material, effects and noise by name: of the candidates of one measurement, each has its own."""
         return self.hypothesis.label()
+
+    @property
+    def energy_error(self) -> float:
+        """eta_a, the relative error of the energy's form."""
+        return float(np.exp(self.theta[1]))
+
+    @property
+    def law_errors(self) -> dict[str, float]:
+        """{effect: eta_e, the relative error of its law}, of those that could be off."""
+        own = [e.name for e in self.hypothesis.effects if not e.exact]
+        return {name: float(np.exp(t)) for name, t in zip(own, self.theta[2:], strict=False)}
+
+    def at(self, keep: NDArray[np.bool_]) -> Candidate:
+        """The same, of the readings ``keep`` (N,) alone."""
+        return replace(
+            self,
+            residual=self.residual[keep],
+            slopes=self.slopes[keep],
+            traces=self.traces[:, keep],
+            form=self.form[keep],
+        )
 
     def slopes_of(self, names: Collection[str]) -> Array:
         """(N, m) the slopes of the coordinates of these effects."""

@@ -1,10 +1,10 @@
-"""Fits hypotheses to one measurement, with their evidence."""
+"""Fits of hypotheses by least squares from several starts, freed of noise and of form error, and their evidence."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cached_property
 
 import numpy as np
 
@@ -12,11 +12,14 @@ from bayesmembrane.calibration.descent import descend
 from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, log_inside, weighed
+from bayesmembrane.diagnosis.candidates.standard import Standard, standard
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
-from bayesmembrane.diagnosis.thresholds import SEARCH
-from bayesmembrane.ground.parameters import Array, HalfNormal, Parameter
-from bayesmembrane.physics.effects.base import Effect, EffectParameter
-from bayesmembrane.physics.forward import Solve
+from bayesmembrane.diagnosis.thresholds import FORM, SEARCH, TINY
+from bayesmembrane.ground.parameters import Array, Normal, Parameter
+from bayesmembrane.physics.effects.base import Effect
+from bayesmembrane.physics.form_error import ENERGY, LAW, FormFactors, form_factors, traces
+from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.request import Request
@@ -24,17 +27,44 @@ from bayesmembrane.physics.mechanics.solution import Curves
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
-    """Fits hypotheses to one measurement under one noise.
+class Freeing:
+    """W v with W (S + U U^T) W^T = 1: values freed of noise S and of a form error with the columns U.
 
-    weight : part of the points that count on their own where correlation is left over, `effective_weight`
+    With U = Q s V^T freed of noise, W = 1 - Q (1 - 1 / sqrt(1 + s^2)) Q^T after that.
+    """
+
+    noise: OwnNoise
+    axes: Array
+    shrink: Array
+
+    def __call__(self, values: Array) -> Array:
+        white = self.noise.white(values)
+        along = self.axes.T @ white.reshape(len(white), -1)
+        return white - (self.axes @ (self.shrink[:, None] * along)).reshape(white.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Fits hypotheses to one measurement under one noise, and weighs them.
+
+    noise : of the readings; every hypothesis may scale it a little
+    known_factors : of the form error's processes, where this is a part of a measurement; else None
     """
 
     measurement: Measurement
     noise: OwnNoise
     seed: int = 0
     solve: Solve = api.solve
-    weight: float = 1.0
+    known_factors: FormFactors | None = None
+
+    @cached_property
+    def factors(self) -> FormFactors:
+        """The processes of the form error."""
+        return self.known_factors or form_factors(self.measurement)
+
+    def quick(self, asked: Request) -> Curves:
+        """The solver without its last resort: films that only shooting resolves cost a hundred times as much."""
+        return self.solve(replace(asked, solver="ritz_alone"))
 
     def material_starts(self, hypothesis: Hypothesis) -> list[Array]:
         """Starts (k,) from draws of the material's prior brought to their best modulus, without any effect.
@@ -42,78 +72,152 @@ class Search:
         The plain model bends the material until it imitates what is missing: searches must not only start there.
         """
         plain = replace(hypothesis, effects=())
-        objective = Objective(plain, self.measurement, "euclidean", self.solve)
+        objective = Objective(plain, self.measurement, "euclidean", self.quick)
         pool, _ = objective.pool(np.random.default_rng(self.seed))
         nothing = np.concatenate([np.empty(0), *(e.null for e in hypothesis.effects)])
         return [np.concatenate([x, nothing]) for x in separated(pool, objective.spread, SEARCH.material_starts)]
 
-    def fit(self, hypothesis: Hypothesis, starts: Sequence[Array]) -> Candidate | None:
+    def fit(self, hypothesis: Hypothesis, starts: Sequence[Array], parent: Candidate | None = None) -> Candidate | None:
         """The best of the searches from ``starts`` (k,); None if no film of this hypothesis reaches the data.
 
-        Films that only shooting resolves cost a hundred times as much: they are left to the end of the best search.
+        The form error is that of ``parent``, or the usual one of an energy; `polished` takes that of the fit itself.
         """
-
-        def quick(asked: Request) -> Curves:
-            return self.solve(replace(asked, solver="ritz_alone"))
-
-        exact = Objective(hypothesis, self.measurement, "euclidean", self.solve)
-        x, size = self._descended(Objective(hypothesis, self.measurement, "euclidean", quick), np.array(starts))
-        if np.any(np.isfinite(size)):
-            x = x[[int(np.argmin(size))]]
-        x, size = self._descended(exact, x)
+        objective = Objective(hypothesis, self.measurement, "euclidean", self.quick)
+        axes = standard(hypothesis, self.measurement)
+        u, size = self._descended(objective, axes, self._freeing(parent), axes.to_u(np.array(starts)))
         if not np.any(np.isfinite(size)):
             return None
-        return self._candidate(exact, x[int(np.argmin(size))], float(np.min(size)))
+        return self._candidate(objective, axes, u[int(np.argmin(size))])
 
-    def _descended(self, objective: Objective, starts: Array) -> tuple[Array, Array]:
-        """Where searches from starts (B, k) end, and the roots of their sums of squares (B,), the prior's included."""
-        centre, spread = prior_moments(objective.hypothesis)
-        root = np.sqrt(self.weight)
+    def polished(self, found: Candidate) -> Candidate:
+        """The same hypothesis, searched on from where it is with the form error that it shows."""
+        objective = Objective(found.hypothesis, self.measurement, "euclidean", self.quick)
+        axes = standard(found.hypothesis, self.measurement)
+        u, size = self._descended(
+            objective, axes, self._freeing(found), axes.to_u(found.x)[None, :], SEARCH.last_iterations
+        )
+        if not np.isfinite(size[0]):
+            return found
+        return max(found, self._candidate(objective, axes, u[0]), key=lambda c: c.log_evidence)
 
-        def residuals(x: Array) -> tuple[Array, Array]:
-            r, j = self._white(objective, x)
-            pull = np.broadcast_to(np.diag(1 / spread), (len(x), *(2 * [spread.size])))
-            return (
-                np.concatenate([root * r, (x - centre) / spread], axis=1),
-                np.concatenate([root * j, pull], axis=1),
-            )
+    def weighed_anew(self, candidate: Candidate) -> Candidate:
+        """The same fit under the present noise: its evidence moves with it, and the linear model says how."""
+        axes = standard(candidate.hypothesis, self.measurement)
+        return self._weighed(candidate, axes, axes.to_u(candidate.x))
 
-        bounds = (objective.low, objective.high)
-        return descend(residuals, starts, bounds, SEARCH.iterations, behind=SEARCH.given_up)
+    def linear(self, candidate: Candidate) -> Linear:
+        """The linear model of a candidate in the coordinates of `standard`, each over the sd of its local prior."""
+        axes = standard(candidate.hypothesis, self.measurement)
+        u = axes.to_u(candidate.x)
+        spread, _ = axes.local(u)
+        own = self.noise.white(candidate.slopes * (axes.slope(u) * spread))
+        data = self.noise.white(candidate.residual) + own @ (u / spread)
+        return Linear(data, (Block(own), *self._forms(candidate)), self.scale_sd)
 
-    def _white(self, objective: Objective, x: Array) -> tuple[Array, Array]:
-        """Whitened residuals (B, N) and slopes (B, N, k); a start without a curve is nan, and only that one."""
-        r, j = objective.batch(x)
-        wide = np.moveaxis(np.concatenate([r[:, :, None], j], axis=2), 1, 0)
-        white = np.full(wide.shape, np.nan)
-        good = np.all(np.isfinite(wide), axis=(0, 2))
-        white[:, good] = self.noise.white(wide[:, good])
-        white = np.moveaxis(white, 0, 1)
-        return white[:, :, 0], white[:, :, 1:]
+    def steepness(self, candidate: Candidate) -> Array:
+        """(k,) dx over the coefficients of `linear`."""
+        axes = standard(candidate.hypothesis, self.measurement)
+        u = axes.to_u(candidate.x)
+        return np.asarray(axes.slope(u) * axes.local(u)[0])
+
+    @property
+    def scale_sd(self) -> float:
+        """sd of ln of the noise over its reference."""
+        return FORM.stated_scale_sd if self.noise.stated else FORM.scale_sd
 
     def covariance(self, candidate: Candidate) -> Array:
-        """(k, k) of the coordinates about a fit of this search, by Laplace's approximation."""
-        _, spread = prior_moments(candidate.hypothesis)
-        white = np.sqrt(self.weight) * self.noise.white(candidate.slopes)
-        scaled = np.eye(spread.size) + spread[:, None] * (white.T @ white) * spread
-        return np.asarray(spread[:, None] * np.linalg.inv(scaled) * spread)
+        """(k, k) of the coordinates about a fit of this search, its form error included."""
+        _, covariance = self.linear(candidate).coefficients(candidate.theta)
+        steep, k = self.steepness(candidate), candidate.x.size
+        return np.asarray(steep[:, None] * covariance[:k, :k] * steep)
 
-    def _candidate(self, objective: Objective, x: Array, size: float) -> Candidate:
-        hypothesis = objective.hypothesis
+    # ---- form error ----------------------------------------------------------------------------------------------
+
+    def _forms(self, candidate: Candidate) -> list[Block]:
+        """What the form error of its energy and of its laws could look like, freed of noise."""
+        fitted = self.measurement.force - candidate.residual
+        out = [Block(self.noise.white(fitted[:, None] * self.factors.state), _moments(ENERGY))]
+        for effect, trace in zip(candidate.hypothesis.effects, candidate.traces, strict=True):
+            if not effect.exact:
+                out.append(Block(self.noise.white(trace[:, None] * self.factors.progress), _moments(LAW)))
+        return out
+
+    def _freeing(self, parent: Candidate | None) -> Freeing:
+        if parent is None:
+            force = np.abs(self.measurement.force)[:, None]
+            columns = float(np.exp(_moments(ENERGY)[0])) * self.noise.white(force * self.factors.state)
+        else:
+            eta = np.exp(parent.theta[1:])
+            columns = np.column_stack([e * b.columns for e, b in zip(eta, self._forms(parent), strict=True)])
+        q, s, _ = np.linalg.svd(columns, full_matrices=False)
+        keep = s > SEARCH.least_form
+        return Freeing(self.noise, q[:, keep], 1 - 1 / np.sqrt(1 + s[keep] ** 2))
+
+    # ---- one fit -------------------------------------------------------------------------------------------------
+
+    def _descended(
+        self, objective: Objective, axes: Standard, freeing: Freeing, starts: Array, most: int = SEARCH.iterations
+    ) -> tuple[Array, Array]:
+        """Where searches from u (B, k) end, and the roots of their sums of squares (B,), the prior's included."""
+
+        def residuals(u: Array) -> tuple[Array, Array]:
+            r, j = _freed(freeing, *objective.batch(axes.to_x(u)))
+            pull, steep = axes.pull(u)
+            diagonal = steep[:, :, None] * np.eye(u.shape[1])
+            return (
+                np.concatenate([r, pull], axis=1),
+                np.concatenate([j * axes.slope(u)[:, None, :], diagonal], axis=1),
+            )
+
+        return descend(residuals, starts, axes.bounds, most, behind=SEARCH.given_up, slow_below=SEARCH.slow_below)
+
+    def _candidate(self, objective: Objective, axes: Standard, u: Array) -> Candidate:
+        x = axes.to_x(u)
         r, j = objective.batch(x[None, :])
         slopes = np.where(np.isfinite(j[0]), j[0], 0.0)
-        _, spread = prior_moments(hypothesis)
-        white = np.sqrt(self.weight) * self.noise.white(slopes)
-        _, log_det = np.linalg.slogdet(np.eye(x.size) + spread * (white.T @ white) * spread[:, None])
-        # A half-normal prior is twice as dense on the side that is allowed.
-        halves = sum(isinstance(p.prior, HalfNormal) for p in objective.parameters)
-        log_evidence = -0.5 * size**2 - 0.5 * log_det + halves * np.log(2.0) + _heavy_tails(hypothesis, x)
-        return Candidate(hypothesis, x, -r[0], slopes, float(log_evidence), _at_bound(objective, x))
+        forward: Forward = objective.forward
+        trace = traces(forward, x[None, :], r + self.measurement.force)[0]
+        nothing = np.zeros(r.shape[1])
+        found = Candidate(
+            objective.hypothesis, x, -r[0], slopes, -np.inf, _at_bound(objective, axes, u), trace, np.empty(0),
+            np.empty(0), nothing,
+        )  # fmt: skip
+        return self._weighed(found, axes, u)
+
+    def _weighed(self, found: Candidate, axes: Standard, u: Array) -> Candidate:
+        model = self.linear(found)
+        z = weighed(model, found.theta)
+        spread, larger = axes.local(u)
+        mean, covariance = model.coefficients(z.theta)
+        low, high = (b / spread for b in axes.bounds)
+        k = u.size
+        inside = log_inside(mean[:k], covariance[:k, :k], np.where(axes.one_sided, 0.0, low), high)
+        form = self._coloured(found, mean[k:])
+        return replace(found, log_evidence=z.log_evidence + larger + inside, theta=z.theta, theta_sd=z.sd, form=form)
+
+    def _coloured(self, found: Candidate, coefficients: Array) -> Array:
+        """(N,) N: the form error with these coefficients."""
+        fitted = self.measurement.force - found.residual
+        parts = [fitted[:, None] * self.factors.state]
+        for effect, trace in zip(found.hypothesis.effects, found.traces, strict=True):
+            if not effect.exact:
+                parts.append(trace[:, None] * self.factors.progress)
+        return np.asarray(np.column_stack(parts) @ coefficients)
 
 
-def starts_with(bases: Sequence[Array], effect: Effect) -> list[Array]:
-    """Starts for ``bases`` (k,) with one more effect: from the first a small and a middling one, from the others a
-    small one, and both signs where both are allowed.
+def _freed(freeing: Freeing, r: Array, j: Array) -> tuple[Array, Array]:
+    """Residuals (B, N) and slopes (B, N, k) freed; a start without a curve is nan, and only that one."""
+    wide = np.moveaxis(np.concatenate([r[:, :, None], j], axis=2), 1, 0)
+    out = np.full(wide.shape, np.nan)
+    good = np.all(np.isfinite(wide), axis=(0, 2))
+    out[:, good] = freeing(wide[:, good])
+    out = np.moveaxis(out, 0, 1)
+    return out[:, :, 0], out[:, :, 1:]
+
+
+def starts_with(bases: Sequence[Array], effect: Effect, scale: float) -> list[Array]:
+    """Starts for ``bases`` (k,) with one more effect of the expected size ``scale``: from the first a small and a
+    middling one, from the others a small one, and both signs where both are allowed.
     """
     signs = (1.0,) if effect.size.one_sided else (1.0, -1.0)
     small, middling = SEARCH.small_share, SEARCH.middling_share
@@ -123,59 +227,29 @@ def starts_with(bases: Sequence[Array], effect: Effect) -> list[Array]:
             for share in (small, middling) if i == 0 else (small,):
                 for shape in [{}, *effect.starts] if share == small and i == 0 else [{}]:
                     theta = np.array([shape.get(p.name, p.typical) for p in effect.coordinates])
-                    theta[0] = (effect.size.null or 0.0) + sign * share * effect.size.scale
+                    theta[0] = (effect.size.null or 0.0) + sign * share * scale
                     out.append(np.concatenate([base, effect.within_bounds(theta)]))
     return out
 
 
-def prior_moments(hypothesis: Hypothesis) -> tuple[Array, Array]:
-    """Centre and spread (k,) of the normal prior that stands for the proper one: a size is centred at its null."""
-    found = [_moments(p) for p in hypothesis.parameters[: hypothesis.curve_size]]
-    centre, spread = np.array(found).T
-    return centre, spread
-
-
-def _heavy_tails(hypothesis: Hypothesis, x: Array) -> float:
-    """ln of Cauchy over normal density, summed over the sizes of effects at x (k,).
-
-    The expected size is a rough guess: an effect several times larger that fits must not lose to a smaller one that
-    does not. Searches keep the normal, which makes them sums of squares.
-    """
-    out = 0.0
-    for p, value in zip(hypothesis.parameters[: hypothesis.curve_size], x, strict=True):
-        if isinstance(p, EffectParameter) and p.null is not None:
-            z = (float(value) - p.null) / p.scale
-            out += 0.5 * z**2 - float(np.log1p(z**2)) + 0.5 * float(np.log(2 / np.pi))
-    return out
-
-
-@cache
 def _moments(p: Parameter) -> tuple[float, float]:
-    if isinstance(p, EffectParameter) and p.null is not None:
-        return p.null, p.scale
-    return float(p.prior.quantile(0.5)), float(p.prior.distribution().std())
+    assert isinstance(p.prior, Normal)
+    return p.prior.mean, p.prior.sd
 
 
-def _at_bound(objective: Objective, x: Array) -> tuple[str, ...]:
+def _at_bound(objective: Objective, axes: Standard, u: Array) -> tuple[str, ...]:
     """Coordinates at a bound that stops them: not at the absence of an effect, nor where its law ends of itself."""
     out = []
-    for i, p in enumerate(objective.parameters):
-        low, high = p.bounds
-        # Bounds that are decades apart are near in the logarithm.
-        by = np.log if low > 0 else np.asarray
-        tolerance = SEARCH.at_bound * float(by(high) - by(low))
-        ends = {getattr(p, "null", None), *map(float, p.prior.distribution().support())}
+    for i, (p, axis) in enumerate(zip(objective.parameters, axes.axes, strict=True)):
+        low, high = axes.bounds[0][i], axes.bounds[1][i]
+        support = [float(axis.to_u(np.asarray(e))) for e in _ends(p) if np.isfinite(e)]
+        ends = {*support, *([0.0] if axis.one_sided else [])}
         for bound in (low, high):
-            if abs(float(by(x[i]) - by(bound))) <= tolerance and bound not in ends:
+            if abs(u[i] - bound) <= SEARCH.at_bound * max(high - low, TINY) and bound not in ends:
                 out.append(p.name)
     return tuple(out)
 
 
-def effective_weight(residual_white: Array) -> float:
-    """n_eff / N = (1 - r1) / (1 + r1) of whitened residuals (N,), at most 1: what correlation is left."""
-    if residual_white.size < 3:
-        return 1.0
-    r = residual_white - residual_white.mean()
-    scale = float(r @ r)
-    r1 = float(r[1:] @ r[:-1]) / scale if scale > 0 else 0.0
-    return float(np.clip((1 - r1) / (1 + r1), SEARCH.least_weight, 1.0))
+def _ends(p: Parameter) -> tuple[float, float]:
+    low, high = p.prior.distribution().support()
+    return float(low), float(high)

@@ -21,7 +21,7 @@ def signatures(search: Search, model: Candidate, effects: Sequence[Effect]) -> l
     own = orthonormal(search.noise.white(model.slopes))
     found = []
     for effect in effects:
-        for slope, side in _slopes(search, model, effect):
+        for slope, side in slopes_of_effect(search, model, effect):
             white = search.noise.white(slope)
             left = white - own @ (own.T @ white)
             whole, length = float(np.linalg.norm(white)), float(np.linalg.norm(left))
@@ -31,7 +31,7 @@ def signatures(search: Search, model: Candidate, effects: Sequence[Effect]) -> l
     return found
 
 
-def _slopes(search: Search, model: Candidate, effect: Effect) -> list[tuple[Array, int]]:
+def slopes_of_effect(search: Search, model: Candidate, effect: Effect) -> list[tuple[Array, int]]:
     """((N,) d (reading) / d (size), side on which it was taken) for several shapes; without those that have no film."""
     rows = _rows(model, effect)
     whole = search.measurement

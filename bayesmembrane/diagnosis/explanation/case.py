@@ -1,10 +1,9 @@
-"""A case: one measurement and the model that is asked about, with all that is known so far; and how candidates fare."""
+"""A case: one measurement with every energy fitted to it, its noise, and what the tests say of the given model."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -14,30 +13,51 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate, available
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.candidates.signatures import signatures
 from bayesmembrane.diagnosis.detection.detect import Detection, detect
-from bayesmembrane.diagnosis.detection.lack_of_fit import LackOfFit, lack_of_fit
-from bayesmembrane.diagnosis.detection.periodicity import periodicity
 from bayesmembrane.diagnosis.detection.scores import Signature
 from bayesmembrane.diagnosis.reference.inferred import own_noise
-from bayesmembrane.diagnosis.reference.noise import Whitened, whitened
+from bayesmembrane.diagnosis.reference.noise import orthonormal, whitened
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
-from bayesmembrane.diagnosis.thresholds import EXPLANATION, SEARCH
+from bayesmembrane.diagnosis.thresholds import SEARCH
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.materials.base import Material
 
 Tell = Callable[[str], None]
 """Takes a line on what is being done."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of a measurement.
+
+    hypothesis : the energy that is preferred, effects that are known to be at work, noise and convexity
+    declared : False if the energy was not named: all of them are as probable
+    quick : True: one effect at most
+    """
+
+    hypothesis: Hypothesis
+    declared: bool = True
+    quick: bool = False
+
+    @property
+    def energy(self) -> str | None:
+        """The name of the energy that was declared."""
+        return self.hypothesis.material.name if self.declared else None
 
 
 @dataclass(frozen=True, eq=False)
 class OpenCase:
     """Everything that the steps of a diagnosis need, and what they have found so far.
 
+    question : what is asked
     search : fits candidates; it has the measurement, its noise, the seed and the solver
     smooth : (N, p) the reference that no physics could beat
-    null : the model as given, fitted
+    plain : by energy, the fit without any but the given effects
+    null : the one of these that was asked about: with the declared energy, or else the most probable
     effects : of the library, that could be at work
     signatures : of these effects beside the null model, without the invisible ones
     detection : tests of the null model
@@ -45,8 +65,10 @@ class OpenCase:
     tell : what is being done
     """
 
+    question: Question
     search: Search
     smooth: Array
+    plain: Mapping[str, Candidate]
     null: Candidate
     effects: tuple[Effect, ...]
     signatures: tuple[Signature, ...]
@@ -64,70 +86,85 @@ class OpenCase:
         names = {s.effect for s in self.signatures}
         return [e for e in self.effects if e.name in names]
 
-    @cached_property
-    def before(self) -> LackOfFit:
-        """Of the null model."""
-        return lack_of_fit(self.whitened(self.null.residual, self.null.slopes))
-
-    def whitened(self, residual: Array, slopes: Array) -> Whitened:
-        """What a model with these slopes (N, k) leaves (N,), freed of noise that allows for its own error."""
-        return whitened(residual, slopes, self.smooth, self.search.noise.cautious())
-
-
-@dataclass(frozen=True, eq=False)
-class Judged:
-    """A candidate and how well it fits.
-
-    unexplained : part of the null model's misfit that is left
-    p_value : of what is left, if as much of the null model's misfit may be as `leaves_little` allows
-    gain : ln of the Bayes factor over the null model
-    ripples : True if waves are left that weigh as much as what it takes away
-    explains : True if the null model is no rival of it, and it leaves noise, or little beside what was there
-    """
-
-    candidate: Candidate
-    fit: LackOfFit
-    unexplained: float
-    p_value: float
-    gain: float
-    ripples: bool
-    explains: bool
-
     @property
-    def log_evidence(self) -> float:
-        return self.candidate.log_evidence
+    def best_plain(self) -> Candidate:
+        """The most probable energy without any but the given effects."""
+        return max(self.plain.values(), key=lambda c: c.log_evidence)
+
+    def tested(self, candidate: Candidate) -> Detection:
+        """The tests of another model."""
+        effects = [e for e in self.effects if e.name not in candidate.names]
+        found = signatures(self.search, candidate, effects)
+        white = whitened(candidate.residual, candidate.slopes, self.smooth, self.search.noise.cautious())
+        return detect(self.measurement, white, found, self.rng)
 
 
-def opened(measurement: Measurement, hypothesis: Hypothesis, seed: int, solve: Solve, tell: Tell) -> OpenCase:
-    """The model as given, fitted and tested; first with the reference's noise, then with one that knows its slopes.
+def opened(measurement: Measurement, question: Question, seed: int, solve: Solve, tell: Tell) -> OpenCase:
+    """Every energy fitted, the null model tested; first with the reference's noise, then with one that knows slopes.
 
     Raises `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
     """
+    hypothesis = question.hypothesis
     _check_size(measurement, hypothesis)
-    tell(f"fitting {hypothesis.label()}")
     smooth = smooth_reference(measurement)
     search = Search(measurement, own_noise(measurement, smooth), seed, solve)
-    null = search.fit(hypothesis, search.material_starts(hypothesis))
-    if null is None:
-        raise SettingsError(
-            f"no {hypothesis.label()} film reaches the data", remedy="use a shorter range or another material"
-        )
-    search = replace(search, noise=own_noise(measurement, np.column_stack([smooth, null.slopes])))
-    null = search.fit(hypothesis, [null.x]) or null
+    plain = _energies(search, question, tell)
+    best = max(plain.values(), key=lambda c: c.log_evidence)
+    search = renewed(search, smooth, best)
+    plain = {name: search.weighed_anew(c) for name, c in plain.items()}
+    best = max(plain.values(), key=lambda c: c.log_evidence)
+    null = plain[hypothesis.material.name] if question.declared else best
     tell("testing the residual")
     effects = tuple(available(measurement, hypothesis))
     rng = np.random.default_rng([seed, 7])
     found = signatures(search, null, effects)
     seen = whitened(null.residual, null.slopes, smooth, search.noise.cautious())
-    return OpenCase(search, smooth, null, effects, tuple(found), detect(measurement, seen, found, rng), rng, tell)
+    detection = detect(measurement, seen, found, rng)
+    return OpenCase(question, search, smooth, plain, null, effects, tuple(found), detection, rng, tell)
 
 
-def reopened(case: OpenCase, null: Candidate) -> OpenCase:
-    """The same case with another null model: one that has more effects, or other parameters."""
-    effects = tuple(e for e in case.effects if e.name not in null.names)
-    found = signatures(case.search, null, effects)
-    detection = detect(case.measurement, case.whitened(null.residual, null.slopes), found, case.rng)
-    return replace(case, null=null, effects=effects, signatures=tuple(found), detection=detection)
+def renewed(search: Search, smooth: Array, best: Candidate) -> Search:
+    """The search with the noise that the reference leaves together with the slopes of the best candidate so far.
+
+    Misfit looks like noise that remembers: what the best model leaves is closer to the truth.
+    """
+    basis = np.column_stack([smooth, best.slopes])
+    if orthonormal(basis).shape[1] >= len(search.measurement):
+        return search  # few points: what the best model leaves is nothing at all, and says nothing of noise
+    return replace(search, noise=own_noise(search.measurement, basis))
+
+
+def _energies(search: Search, question: Question, tell: Tell) -> dict[str, Candidate]:
+    """Every energy with the given effects; raises `SettingsError` if the declared one, or none, reaches the data."""
+    kinds: dict[str, type[Material]] = {question.hypothesis.material.name: question.hypothesis.material} | materials()
+    found = {}
+    for name, kind in kinds.items():
+        hypothesis = replace(question.hypothesis, material=kind)
+        if len(search.measurement) < hypothesis.curve_size + SEARCH.spare_points:
+            continue
+        tell(f"fitting {hypothesis.label()}")
+        candidate = _reaching(search, hypothesis, needed=question.declared and kind is question.hypothesis.material)
+        if candidate is not None:
+            found[name] = candidate
+    if not found:
+        raise SettingsError("no film of any energy reaches the data", remedy="use a shorter range")
+    return found
+
+
+def _reaching(search: Search, hypothesis: Hypothesis, needed: bool) -> Candidate | None:
+    """The fit of one energy; None if none of its films reaches the data, and it is not ``needed``."""
+    try:
+        starts = search.material_starts(hypothesis)
+    except SettingsError:
+        if needed:
+            raise
+        return None
+    found = search.fit(hypothesis, starts)
+    if found is None and needed:
+        raise SettingsError(
+            f"no {hypothesis.label()} film reaches the data", remedy="use a shorter range or another material"
+        )
+    return found
 
 
 def _check_size(measurement: Measurement, hypothesis: Hypothesis) -> None:
@@ -138,29 +175,3 @@ def _check_size(measurement: Measurement, hypothesis: Hypothesis) -> None:
             f"{len(measurement)} points leave too little to tell what {hypothesis.label()} misses",
             remedy=f"use at least {least} points, or a material with fewer parameters",
         )
-
-
-def judged(case: OpenCase, candidate: Candidate) -> Judged:
-    """Its lack of fit, the part of the null model's that is left, and whether it explains the curve."""
-    white = case.whitened(candidate.residual, candidate.slopes)
-    fit = lack_of_fit(white)
-    left, p_value = fit.part_left_of(case.before), fit.p_if_left(EXPLANATION.unexplained_large, case.before)
-    gain = candidate.log_evidence - case.null.log_evidence
-    wave = periodicity(case.measurement, white)
-    taken = EXPLANATION.wave_share * max(case.before.chi2 - fit.chi2, 0.0)
-    ripples = wave is not None and wave.p_value < EXPLANATION.wave_level and wave.squares > taken
-    explains = _is_little(fit, left, p_value) and gain > EXPLANATION.probable and not ripples
-    return Judged(candidate, fit, left, p_value, gain, ripples, explains)
-
-
-def leaves_little(case: OpenCase, residual: Array, slopes: Array) -> bool:
-    """True if what a model with these slopes (N, k) leaves (N,) is noise, or little of the null model's misfit."""
-    fit = lack_of_fit(case.whitened(residual, slopes))
-    left, p_value = fit.part_left_of(case.before), fit.p_if_left(EXPLANATION.unexplained_large, case.before)
-    return _is_little(fit, left, p_value)
-
-
-def _is_little(fit: LackOfFit, unexplained: float, p_value: float) -> bool:
-    small = fit.reduced_chi2 <= EXPLANATION.small_chi2
-    allowed = EXPLANATION.unexplained if small else EXPLANATION.unexplained_large
-    return p_value > EXPLANATION.level or unexplained <= allowed

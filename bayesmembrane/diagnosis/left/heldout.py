@@ -12,6 +12,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.thresholds import HELD_OUT
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.form_error import FormFactors, traces
 from bayesmembrane.physics.forward import Forward
 
 
@@ -80,7 +81,7 @@ def validate(search: Search, before: Candidate, after: Candidate, rivals: list[C
     part = _on_the_others(search, mask)
     fits = {}
     for candidate in {c.label: c for c in (before, after, *rivals)}.values():
-        found = part.fit(candidate.hypothesis, [candidate.x])
+        found = part.fit(candidate.hypothesis, [candidate.x], candidate.at(~mask))
         if found is not None:
             fits[candidate.label] = found
     if before.label not in fits or after.label not in fits:
@@ -94,16 +95,27 @@ def validate(search: Search, before: Candidate, after: Candidate, rivals: list[C
 
 def _on_the_others(search: Search, mask: NDArray[np.bool_]) -> Search:
     seen = search.measurement.select(~mask)
-    return replace(search, measurement=seen, noise=search.noise.part(seen, ~mask))
+    factors = FormFactors(search.factors.state[~mask], search.factors.progress[~mask])
+    return replace(search, measurement=seen, noise=search.noise.part(seen, ~mask), known_factors=factors)
 
 
 def _predicted(part: Search, fit: Candidate, search: Search, mask: NDArray[np.bool_]) -> tuple[Misfit, float]:
-    """(error, part inside the 90 % band) of a model fitted to the others, at the points of ``mask``."""
-    whole, sd = search.measurement, search.noise.each[mask]
-    forward = Forward(fit.hypothesis, whole, whole.deflection, search.solve)
+    """(error, part inside the 90 % band) of a model fitted to the others, at the points of ``mask``.
+
+    Its form error goes on as far as it is smooth; the band has what is not known of it, of the coordinates, and noise.
+    """
+    whole, sd = search.measurement, search.noise.each[mask] * float(np.exp(fit.theta[0]))
+    forward = Forward(fit.hypothesis, whole, whole.deflection, search.quick)
     new = forward(fit.x[None, :], sensitivities=True, reached=False)
     assert new.sensitivity is not None
-    residual = np.nan_to_num(whole.force - new.force[0], nan=float(np.max(whole.force)))[mask]
-    slopes = np.nan_to_num(new.sensitivity[0][mask])
-    band = HELD_OUT.band * np.sqrt(np.einsum("ni,ij,nj->n", slopes, part.covariance(fit), slopes) + sd**2)
-    return misfit_of(residual, sd), float(np.mean(np.abs(residual) <= band))
+    force = np.nan_to_num(new.force[0])
+    columns = [np.nan_to_num(new.sensitivity[0]) * part.steepness(fit), force[:, None] * search.factors.state]
+    for effect, trace in zip(fit.hypothesis.effects, traces(forward, fit.x[None, :], force[None, :])[0], strict=True):
+        if not effect.exact:
+            columns.append(trace[:, None] * search.factors.progress)
+    here = np.column_stack(columns)[mask]
+    mean, covariance = part.linear(fit).coefficients(fit.theta)
+    k = fit.x.size
+    residual = (whole.force - force)[mask] - here[:, k:] @ mean[k:]
+    band = HELD_OUT.band * np.sqrt(np.einsum("ni,ij,nj->n", here, covariance, here) + sd**2)
+    return misfit_of(residual, search.noise.each[mask]), float(np.mean(np.abs(residual) <= band))

@@ -13,11 +13,15 @@ from bayesmembrane.ground.parameters import Array
 
 @dataclass(frozen=True)
 class Plateau:
-    """Readings that share one force, which is the largest or the smallest: a load cell at its limit."""
+    """Readings that share one force, which is the largest or the smallest: a load cell at its limit.
+
+    step : N, the smallest difference between two readings: the load cell's resolution, as far as it shows
+    """
 
     readings: int
     force: float
     largest: bool
+    step: float
 
 
 @dataclass(frozen=True)
@@ -66,17 +70,17 @@ def residual_shape(measurement: Measurement, residual: Array) -> ResidualShape:
         cycles=tuple((int(c), _rms(r[measurement.cycle == c])) for c in np.unique(measurement.cycle)),
         trend=float(np.corrcoef(place, r)[0, 1]) if varies else 0.0,
         timed=measurement.time is not None,
-        plateau=_plateau(measurement.force),
+        plateau=plateau_of(measurement.force),
     )
 
 
-def _plateau(y: Array) -> Plateau | None:
+def plateau_of(y: Array) -> Plateau | None:
     """Many readings (N,) that share the largest or the smallest value."""
     quantum = np.min(np.diff(np.unique(y))) if np.unique(y).size > 1 else 0.0
     for value in (y.max(), y.min()):
         same = int(np.count_nonzero(np.abs(y - value) <= WORDS.same_reading * quantum))
         if same >= max(WORDS.plateau_points, WORDS.plateau_share * y.size) and value != 0:
-            return Plateau(same, float(value), bool(value == y.max()))
+            return Plateau(same, float(value), bool(value == y.max()), float(quantum))
     return None
 
 

@@ -62,6 +62,14 @@ class OwnNoise:
             return np.asarray(solve_triangular(self.root, flat, lower=True)).reshape(values.shape)
         return decorrelated(divided(values, self.profile), self.rho, self.gaps) / self.sd
 
+    @property
+    def log_root(self) -> float:
+        """ln |L|, with S = L L^T."""
+        if self.root is not None:
+            return float(np.sum(np.log(np.diag(self.root))))
+        forgot = forgotten(self.rho, self.gaps)
+        return float(np.sum(np.log(self.each)) + 0.5 * np.sum(np.log1p(-(forgot**2))))
+
     def part(self, measurement: Measurement, keep: NDArray[np.bool_]) -> OwnNoise:
         """The same noise for the points at ``keep`` (N,); ``measurement`` is that part."""
         root = None

@@ -6,7 +6,6 @@ import math
 
 from bayesmembrane.diagnosis.left.heldout import Misfit
 from bayesmembrane.diagnosis.result import Diagnosis
-from bayesmembrane.diagnosis.thresholds import EXPLANATION
 from bayesmembrane.ground.registry import components
 from bayesmembrane.report.blocks import Column, Table, Value
 from bayesmembrane.words.candidates import candidate_title, sizes
@@ -69,9 +68,10 @@ def ranking_table(d: Diagnosis, name: str) -> Table:
     columns = (
         Column("candidate", "candidate"),
         Column("size", "size"),
+        Column("probability", "probability", ".3g"),
         Column("log_bayes_factor", "ln Bayes factor", "+.1f"),
         Column("unexplained", "unexplained", "%"),
-        Column("explains", "explains it"),
+        Column("law_error", "error of its law", "%"),
         Column("at_bound", "at a bound"),
         Column("in_answer", "in the answer"),
     )
@@ -83,18 +83,19 @@ def ranking_table(d: Diagnosis, name: str) -> Table:
             (
                 candidate_title(c, d.null),
                 ", ".join(sizes(c, d.null)) or "-",
-                j.log_evidence - d.null.log_evidence,
+                j.probability,
+                j.gain,
                 j.unexplained,
-                j.explains,
+                max(c.law_errors.values(), default=None),
                 ", ".join(spoken_parameter(n) for n in c.at_bound) or "-",
                 c.label in members,
             )
         )
     caption = (
-        f"What could explain the residual of {spoken(d.null.hypothesis)}: each candidate was refitted with "
-        "the material. ln Bayes factor: against the model as it was (Laplace approximation). Unexplained: part of the "
-        "lack of fit that is left; a candidate explains the curve if that is noise, or at most "
-        f"{100 * EXPLANATION.unexplained:g} %."
+        f"What could explain the residual of {spoken(d.null.hypothesis)}: every hypothesis was fitted as a whole. "
+        "Probability: among all of them, nothing foreign beside it. ln Bayes factor: against the model as it was, "
+        "noise and form error integrated out. Unexplained: part of the squares beyond noise that is left. Error of "
+        "its law: what the trace of its effects would have to be off."
     )
     if len(d.ranking) > MOST_CANDIDATES:
         caption += f" The {MOST_CANDIDATES} most probable of {len(d.ranking)}."

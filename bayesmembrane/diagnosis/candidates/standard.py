@@ -1,0 +1,186 @@
+"""Coordinates in which every prior is about standard normal: what searches step in, and evidence is computed in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.thresholds import SIZES
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Parameter, Prior, Uniform
+from bayesmembrane.physics.effects.base import EffectParameter
+from bayesmembrane.physics.hypothesis import Hypothesis
+
+EDGE = 1e-9
+"""Of a probability: as near to 0 or 1 a quantile is taken, so that it is a number."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """The size of an effect: z = (x - null) / scale with a Cauchy prior, cut to one side where physics allows one.
+
+    The expected size is a rough guess: one several times larger that fits must not lose to a smaller one that does not.
+    """
+
+    null: float
+    scale: float
+    one_sided: bool
+    bounds: tuple[float, float]
+    heavy = True
+
+    def to_x(self, u: Array) -> Array:
+        return self.null + self.scale * u
+
+    def to_u(self, x: Array) -> Array:
+        return np.asarray((x - self.null) / self.scale)
+
+    def slope(self, u: Array) -> Array:
+        return np.full_like(u, self.scale)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Any other coordinate: u with a standard normal prior, cut at zero for a half-normal one.
+
+    A log-normal one in its logarithm; one of another prior by its probability, u = Phi^-1(P(x)).
+    """
+
+    prior: Prior
+    bounds: tuple[float, float]
+    heavy = False
+
+    @property
+    def one_sided(self) -> bool:
+        return isinstance(self.prior, HalfNormal)
+
+    def to_x(self, u: Array) -> Array:
+        match self.prior:
+            case Normal(mean, sd):
+                return mean + sd * u
+            case LogNormal(median, spread):
+                return np.asarray(median * np.exp(spread * u))
+            case HalfNormal(scale, origin):
+                return origin + scale * u
+            case Uniform(low, high):
+                return np.asarray(low + (high - low) * ndtr(u))
+        return self.prior.quantile(ndtr(u))
+
+    def to_u(self, x: Array) -> Array:
+        match self.prior:
+            case Normal(mean, sd):
+                return np.asarray((x - mean) / sd)
+            case LogNormal(median, spread):
+                return np.asarray(np.log(x / median) / spread)
+            case HalfNormal(scale, origin):
+                return np.asarray((x - origin) / scale)
+            case Uniform(low, high):
+                return np.asarray(ndtri(np.clip((x - low) / (high - low), EDGE, 1 - EDGE)))
+        return np.asarray(ndtri(np.clip(self.prior.distribution().cdf(x), EDGE, 1 - EDGE)))
+
+    def slope(self, u: Array) -> Array:
+        """dx / du."""
+        match self.prior:
+            case Normal(_, sd):
+                return np.full_like(u, sd)
+            case LogNormal(_, spread):
+                return np.asarray(spread * self.to_x(u))
+            case HalfNormal(scale, _):
+                return np.full_like(u, scale)
+            case Uniform(low, high):
+                return np.asarray((high - low) * np.exp(-0.5 * u * u) / np.sqrt(2 * np.pi))
+        h = 1e-4
+        return np.asarray((self.to_x(u + h) - self.to_x(u - h)) / (2 * h))
+
+
+@dataclass(frozen=True)
+class Standard:
+    """The coordinates of one hypothesis (k,), for one measurement: x, as parameters declare them, and u.
+
+    Sizes that are lengths or forces count in parts of what the test reached: 20 mm of travel and 200 have other slips.
+    """
+
+    axes: tuple[Size | Shape, ...]
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """(k,), (k,) of u."""
+        with np.errstate(divide="ignore"):
+            ends = [[float(a.to_u(np.asarray(b, dtype=float))) for b in a.bounds] for a in self.axes]
+        low, high = np.array(ends).T
+        return np.maximum(low, -8.0), np.minimum(high, np.where(self.heavy, np.inf, 8.0))
+
+    @cached_property
+    def heavy(self) -> Array:
+        """(k,) True for sizes, whose prior is Cauchy's."""
+        return np.array([a.heavy for a in self.axes])
+
+    @cached_property
+    def one_sided(self) -> Array:
+        """(k,) True where u may not be negative."""
+        return np.array([a.one_sided for a in self.axes])
+
+    def to_x(self, u: Array) -> Array:
+        return np.stack([a.to_x(u[..., i]) for i, a in enumerate(self.axes)], axis=-1)
+
+    def to_u(self, x: Array) -> Array:
+        with np.errstate(divide="ignore"):
+            u = np.stack([a.to_u(x[..., i]) for i, a in enumerate(self.axes)], axis=-1)
+        return np.clip(u, *self.bounds)
+
+    def slope(self, u: Array) -> Array:
+        """dx / du, the shape of u."""
+        return np.stack([a.slope(u[..., i]) for i, a in enumerate(self.axes)], axis=-1)
+
+    def pull(self, u: Array) -> tuple[Array, Array]:
+        """(p, dp/du) with p^2 / 2 = -ln prior density + const, for u (..., k)."""
+        square = np.log1p(u * u)
+        root = np.sign(u) * np.sqrt(2 * square)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            steep = np.where(np.abs(u) > 1e-6, 2 * u / ((1 + u * u) * root), np.sqrt(2.0))
+        return np.where(self.heavy, root, u), np.where(self.heavy, steep, 1.0)
+
+    def local(self, u: Array) -> tuple[Array, float]:
+        """((k,) standard deviations s of normal priors about 0 that stand for the priors near u (k,), ln of what the
+        true density is larger at u, summed).
+
+        For a Cauchy density s^2 = (1 + u^2) / 2, which has its slope at u.
+        """
+        s = np.where(self.heavy, np.sqrt(0.5 * (1 + u * u)), 1.0)
+        cauchy = -np.log(np.pi) - np.log1p(u * u)
+        normal = -0.5 * (u / s) ** 2 - np.log(s * np.sqrt(2 * np.pi))
+        larger = np.where(self.heavy, cauchy - normal, 0.0) + np.where(self.one_sided, np.log(2.0), 0.0)
+        return s, float(np.sum(larger))
+
+
+def standard(hypothesis: Hypothesis, measurement: Measurement) -> Standard:
+    """Of the coordinates of ``hypothesis`` that shape the curve."""
+    scales = size_scales(measurement)
+    return Standard(tuple(_axis(p, scales) for p in hypothesis.parameters[: hypothesis.curve_size]))
+
+
+def size_scales(measurement: Measurement) -> dict[str, float]:
+    """{SI unit: size that is expected before the data} of effects whose size is no pure number."""
+    travel = measurement.full_range
+    force = float(np.max(np.abs(measurement.force)))
+    duration = max(float(np.ptp(measurement.path.clock)), 1e-12)
+    return {
+        "m": SIZES.travel * travel,
+        "N": SIZES.force * force,
+        "N/s": SIZES.force * force / duration,
+        "N/m": SIZES.force * force / travel,
+        "m/N": SIZES.travel * travel / force,
+    }
+
+
+def _axis(p: Parameter, scales: dict[str, float]) -> Size | Shape:
+    if not isinstance(p, EffectParameter) or p.null is None:
+        return Shape(p.prior, p.bounds)
+    if p.unit not in scales:
+        return Size(p.null, p.scale, p.one_sided, p.bounds)
+    scale = scales[p.unit]
+    low = p.null if p.one_sided and p.bounds[0] == p.null else p.null - SIZES.largest * scale
+    high = p.null if p.one_sided and p.bounds[1] == p.null else p.null + SIZES.largest * scale
+    return Size(p.null, scale, p.one_sided, (low, high))

@@ -1,0 +1,43 @@
+"""What is believed before the data: how probable effects, energies and what is foreign are. All priors of the sum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import comb, log
+
+
+@dataclass(frozen=True)
+class Beliefs:
+    """Prior probabilities of hypotheses; those of parameters stand with their components, and of sizes in `SIZES`.
+
+    How large the error of forms may be stands in `physics.form_error`.
+    """
+
+    effects: tuple[float, ...] = (0.45, 0.45, 0.08, 0.02)
+    """Of none, one, two and three effects beyond those given; sets of one size are equally probable."""
+    foreign: float = 0.15
+    """Of something that no effect of the library describes, on top of whatever else is at work."""
+    declared: float = 0.5
+    """Of the energy that was declared; the others share the rest. Without one, all are equally probable."""
+
+    @property
+    def most(self) -> int:
+        """Effects of the largest set."""
+        return len(self.effects) - 1
+
+    def log_set(self, size: int, visible: int) -> float:
+        """ln of the probability of one set of ``size`` of the ``visible`` effects."""
+        return log(self.effects[size]) - log(comb(max(visible, size), size))
+
+    def log_foreign(self, kinds: int) -> float:
+        """ln of the probability of one of the ``kinds`` of foreign things; of none of them if there are no kinds."""
+        return log(self.foreign / kinds) if kinds else log(1 - self.foreign)
+
+    def log_energy(self, name: str, declared: str | None, count: int) -> float:
+        """ln of the probability of one energy of ``count``."""
+        if declared is None or count == 1:
+            return -log(count)
+        return log(self.declared) if name == declared else log((1 - self.declared) / (count - 1))
+
+
+BELIEFS = Beliefs()

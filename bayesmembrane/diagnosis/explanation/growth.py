@@ -1,0 +1,189 @@
+"""Sets of effects, grown one by one from the most probable so far, with every energy; a beam and no threshold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
+from bayesmembrane.diagnosis.candidates.search import Search, starts_with
+from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
+from bayesmembrane.diagnosis.candidates.standard import standard
+from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
+from bayesmembrane.diagnosis.explanation.case import OpenCase, renewed
+from bayesmembrane.diagnosis.thresholds import GROWTH
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.effects.base import Effect
+from bayesmembrane.physics.hypothesis import Hypothesis
+
+Key = tuple[str, frozenset[str]]
+"""Energy, and all effects."""
+
+
+@dataclass(eq=False)
+class Grown:
+    """Every hypothesis that was fitted, by energy and effects; the search under whose noise they were weighed.
+
+    starts : by energy, draws of its prior brought to their best modulus
+    """
+
+    case: OpenCase
+    search: Search
+    found: dict[Key, Candidate] = field(default_factory=dict)
+    starts: dict[str, list[Array]] = field(default_factory=dict)
+
+    def add(self, candidate: Candidate | None) -> None:
+        """Keep the better of two fits of one hypothesis."""
+        if candidate is None:
+            return
+        key = (candidate.hypothesis.material.name, frozenset(candidate.names))
+        if key not in self.found or candidate.log_evidence > self.found[key].log_evidence:
+            self.found[key] = candidate
+
+    def of_size(self, size: int) -> list[Candidate]:
+        """Those with so many effects beyond the given ones, the most probable first."""
+        given = len(self.case.null.names)
+        return sorted(
+            (c for (_, names), c in self.found.items() if len(names) - given == size), key=lambda c: -c.log_evidence
+        )
+
+    def best_of_each_set(self, size: int) -> list[Candidate]:
+        """Of every set of so many effects the most probable energy; the most probable set first."""
+        best: dict[frozenset[str], Candidate] = {}
+        for c in self.of_size(size):
+            best.setdefault(frozenset(c.names), c)
+        return list(best.values())
+
+    def polish(self, size: int) -> None:
+        """The most probable of this size searched on with the form error that they show themselves."""
+        for c in self.of_size(size)[: GROWTH.polished]:
+            self.add(self.search.polished(c))
+
+    def renew(self) -> None:
+        """Noise from the best candidate, and all of them weighed under it."""
+        best = max(self.found.values(), key=lambda c: c.log_evidence)
+        self.search = renewed(self.search, self.case.smooth, best)
+        self.found = {key: self.search.weighed_anew(c) for key, c in self.found.items()}
+
+
+def grown(case: OpenCase) -> Grown:
+    """All hypotheses that could carry weight: each single effect, and sets that grow from the most probable ones.
+
+    Growth ends where a larger set has less than `GROWTH.worth` of what the smaller ones have together.
+    """
+    out = Grown(case, case.search)
+    for c in case.plain.values():
+        out.add(c)
+    most = 1 if case.question.quick else BELIEFS.most
+    for size in range(1, most + 1):
+        bases = [case.best_plain] if size == 1 else _beam(out, size - 1)
+        for base in bases:
+            for effect in _promising(out, base, size):
+                out.add(_added(out, base, effect))
+        if not out.of_size(size):
+            break
+        out.renew()
+        _with_other_energies(out, size)
+        out.polish(size)
+        if not _worth_more(out, size):
+            break
+    return out
+
+
+def _beam(out: Grown, size: int) -> list[Candidate]:
+    """The most probable sets so far that a further effect is added to."""
+    every = out.best_of_each_set(size)
+    return [c for c in every[: GROWTH.beam] if every[0].log_evidence - c.log_evidence < GROWTH.beam_reach]
+
+
+def _promising(out: Grown, base: Candidate, size: int) -> list[Effect]:
+    """Effects worth a fit beside ``base``: all that are visible beside the plain model, else those whose trace, to
+    first order, takes most away.
+    """
+    rest = [e for e in out.case.visible if e.name not in base.names]
+    if size == 1:
+        return rest
+    gains = {e.name: first_order(out.search, base, e) for e in rest}
+    known = {frozenset(c.names) for c in out.of_size(size)}
+    rest = [e for e in rest if frozenset((*base.names, e.name)) not in known]
+    rest.sort(key=lambda e: -gains[e.name])
+    return [e for e in rest[: GROWTH.refits] if gains[e.name] > gains[rest[0].name] - GROWTH.refit_reach]
+
+
+def first_order(search: Search, base: Candidate, effect: Effect) -> float:
+    """ln K of a little of ``effect`` beside ``base``, to first order, at the best of several shapes.
+
+    ln K = (s.r)^2 / (s.s + 1) / 2 - ln(1 + s.s) / 2 of the slope s by the expected size, both freed of what the base
+    can follow.
+    """
+    model = search.linear(base)
+    size = standard(with_effects(base.hypothesis, [effect]), search.measurement).axes[base.x.size].slope(np.zeros(1))[0]
+    slopes = [(slope * float(size), side) for slope, side in slopes_of_effect(search, base, effect)]
+    if not slopes:
+        return -np.inf
+    white = search.noise.white(np.column_stack([s for s, _ in slopes]))
+    freed = model.freed(base.theta, white)
+    along, square = freed.T @ model.data, np.sum(white * freed, axis=0)
+    allowed = np.array([not effect.size.one_sided or side * a > 0 for a, (_, side) in zip(along, slopes, strict=True)])
+    gain = 0.5 * along**2 / (square + 1) * allowed - 0.5 * np.log1p(square)
+    return float(np.max(gain))
+
+
+def _added(out: Grown, base: Candidate, effect: Effect) -> Candidate | None:
+    """``base`` with one more effect."""
+    names = [e.title for e in base.hypothesis.effects if e.name not in out.case.null.names]
+    out.case.tell(f"refitting with {' and '.join([*names, effect.title])}")
+    hypothesis = with_effects(base.hypothesis, [effect])
+    scale = float(standard(hypothesis, out.case.measurement).axes[base.x.size].slope(np.zeros(1))[0])
+    return out.search.fit(hypothesis, starts_with(_bases(out, base), effect, scale), base)
+
+
+def _bases(out: Grown, base: Candidate) -> list[Array]:
+    """Where a further effect starts from: the fit, and draws of the prior where the fit may be bent."""
+    if base.hypothesis.effects != out.case.null.hypothesis.effects:
+        return [base.x]
+    name = base.hypothesis.material.name
+    if name not in out.starts:
+        out.starts[name] = out.search.material_starts(base.hypothesis)[: GROWTH.further_starts]
+    return [base.x, *out.starts[name]]
+
+
+def _with_other_energies(out: Grown, size: int) -> None:
+    """The most probable sets with every other energy, from that energy's own fit and the effects of the set's."""
+    names = list(out.case.plain)
+    for best in out.best_of_each_set(size)[: GROWTH.with_other_energies]:
+        for name in names:
+            if (name, frozenset(best.names)) in out.found:
+                continue
+            plain = out.case.plain[name]
+            out.case.tell(f"trying {best.label} with the energy {plain.hypothesis.material.title}")
+            out.add(_transplanted(out, best, plain))
+        names = [n for n in names if _behind(out, best, n) < GROWTH.energy_reach]
+
+
+def _behind(out: Grown, best: Candidate, energy: str) -> float:
+    """ln of the Bayes factor by which an energy is behind the best one with the same effects."""
+    same = {e: c.log_evidence for (e, names), c in out.found.items() if names == frozenset(best.names)}
+    return max(same.values()) - same.get(energy, -np.inf)
+
+
+def _transplanted(out: Grown, best: Candidate, plain: Candidate) -> Candidate | None:
+    hypothesis: Hypothesis = replace(plain.hypothesis, effects=best.hypothesis.effects)
+    given = plain.hypothesis.material_size
+    effects = best.x[best.hypothesis.material_size :]
+    return out.search.fit(hypothesis, [np.concatenate([plain.x[:given], effects])], best)
+
+
+def _worth_more(out: Grown, size: int) -> bool:
+    """True if sets of this size carry enough for larger ones to be looked at."""
+    here = _mass(out, out.of_size(size), size)
+    below = [_mass(out, out.of_size(s), s) for s in range(size)]
+    return bool(here > float(np.logaddexp.reduce(below)) + np.log(GROWTH.worth))
+
+
+def _mass(out: Grown, candidates: Iterable[Candidate] | Sequence[Candidate], size: int) -> float:
+    visible = len(out.case.visible)
+    every = [c.log_evidence for c in candidates]
+    return float(np.logaddexp.reduce(every)) + BELIEFS.log_set(size, visible) if every else -np.inf

@@ -1,0 +1,53 @@
+"""What a model leaves of the misfit, and what of that its form error carries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.ground.parameters import Array
+
+
+@dataclass(frozen=True)
+class Remaining:
+    """What is left.
+
+    share : part of the squares beyond noise that the plain model leaves; 1 where it is the plain model's own
+    reduced_chi2 : of what is left, by the measurement's own noise
+    carried : part of what is left beyond noise that the form error takes: smooth, and no effect
+    rms : N, root mean square of the form error
+    energy_error : relative error of the energy's form
+    law_errors : by effect, relative error of its law
+    """
+
+    share: float
+    reduced_chi2: float
+    carried: float
+    rms: float
+    energy_error: float
+    law_errors: Mapping[str, float]
+
+
+def remaining(search: Search, model: Candidate, plain: Candidate) -> Remaining:
+    """What ``model`` leaves, beside what the ``plain`` one does."""
+    white = search.noise.white
+    dof = max(model.residual.size - model.x.size, 1)
+    left, before = _beyond(white(model.residual), model), _beyond(white(plain.residual), plain)
+    rest = _beyond(white(model.residual - model.form), model)
+    return Remaining(
+        share=float(np.clip(left / before, 0.0, 1.0)) if before > 0 else 0.0,
+        reduced_chi2=float(np.sum(white(model.residual) ** 2)) / dof,
+        carried=1 - min(rest / left, 1.0) if left > 0 else 0.0,
+        rms=float(np.sqrt(np.mean(model.form**2))),
+        energy_error=model.energy_error,
+        law_errors=model.law_errors,
+    )
+
+
+def _beyond(white: Array, model: Candidate) -> float:
+    """Squares beyond those of noise alone."""
+    return max(float(white @ white) - (white.size - model.x.size), 0.0)

@@ -1,0 +1,86 @@
+"""ln Z of a linear model against dense matrices and against integration."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import approx_fprime
+from scipy.stats import multivariate_normal, norm
+
+from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, log_inside, weighed
+
+
+def model(seed: int, n: int = 60, size: float = 1.0) -> Linear:
+    rng = np.random.default_rng(seed)
+    own, state, law = (rng.standard_normal((n, k)) for k in (3, 4, 5))
+    data = own @ rng.standard_normal(3) + size * state @ rng.standard_normal(4) + rng.standard_normal(n)
+    return Linear(data, (Block(3 * own), Block(state, (-1.0, 1.0)), Block(law, (-2.0, 1.0))), 0.25)
+
+
+def dense(linear: Linear, theta: np.ndarray) -> float:
+    n = linear.data.size
+    covariance = np.exp(2 * theta[0]) * np.eye(n)
+    etas = iter(theta[1:])
+    for b in linear.blocks:
+        covariance += (1.0 if b.ln_eta is None else np.exp(2 * next(etas))) * b.columns @ b.columns.T
+    prior = norm.logpdf(theta, linear.priors[:, 0], linear.priors[:, 1]).sum()
+    return float(multivariate_normal.logpdf(linear.data, np.zeros(n), covariance) + prior)
+
+
+@pytest.mark.parametrize("theta", [(0.0, -1.0, -2.0), (0.3, 0.5, -4.0), (-0.4, -6.0, 0.1)])
+def test_the_density_equals_that_of_the_dense_covariance(theta) -> None:
+    linear = model(1)
+    assert linear.log_density(np.array(theta))[0] == pytest.approx(dense(linear, np.array(theta)), abs=1e-8)
+
+
+def test_slopes_are_those_of_the_density() -> None:
+    linear, theta = model(2), np.array([0.1, -0.7, -1.5])
+    numeric = approx_fprime(theta, lambda t: linear.log_density(t)[0], 1e-6)
+    assert linear.log_density(theta)[1] == pytest.approx(numeric, rel=1e-4, abs=1e-4)
+
+
+def test_coefficients_are_those_of_a_ridge_regression() -> None:
+    linear, theta = model(3), np.array([0.2, -0.5, -1.0])
+    columns = np.column_stack([b.columns for b in linear.blocks])
+    precision = columns.T @ columns / np.exp(0.4) + np.diag(1 / linear.variances(theta))
+    mean, covariance = linear.coefficients(theta)
+    assert covariance == pytest.approx(np.linalg.inv(precision), abs=1e-9)
+    assert mean == pytest.approx(np.linalg.solve(precision, columns.T @ linear.data / np.exp(0.4)), abs=1e-9)
+
+
+def test_freed_values_are_those_of_the_inverse() -> None:
+    linear, theta = model(4), np.array([0.2, -0.5, -1.0])
+    columns = np.column_stack([b.columns for b in linear.blocks])
+    whole = np.exp(0.4) * np.eye(60) + columns * linear.variances(theta) @ columns.T
+    values = np.random.default_rng(0).standard_normal((60, 2))
+    assert linear.freed(theta, values) == pytest.approx(np.linalg.solve(whole, values), abs=1e-9)
+
+
+@pytest.mark.parametrize("size", [0.0, 0.3, 3.0])
+def test_the_evidence_integrates_the_size_of_a_form_error(size) -> None:
+    """Noise nearly fixed and one block: the integral over ln eta is one of a single variable."""
+    whole = model(5, size=size)
+    linear = Linear(whole.data, whole.blocks[:2], 1e-4)
+    top = weighed(linear)
+
+    def density(t: float) -> float:
+        return float(np.exp(linear.log_density(np.array([0.0, t]))[0] - top.log_evidence))
+
+    # ln s is normal with so small a deviation that it integrates to one.
+    ratio = quad(density, -7, 5, limit=200)[0] * 1e-4 * np.sqrt(2 * np.pi)
+    assert np.log(ratio) == pytest.approx(0.0, abs=0.15)
+
+
+def test_bounds_take_what_lies_beyond_them() -> None:
+    covariance = np.array([[1.0, 0.6], [0.6, 2.0]])
+    mean, low = np.array([0.3, -0.4]), np.array([0.0, -1.0])
+    high = np.full(2, np.inf)
+    rng = np.random.default_rng(1)
+    draws = rng.multivariate_normal(mean, covariance, 400_000)
+    inside = np.mean(np.all(draws > low, axis=1))
+    assert log_inside(mean, covariance, low, high) == pytest.approx(np.log(inside), abs=0.02)
+    assert log_inside(mean, covariance, low - 100, high) == 0.0
+
+
+def test_a_tail_far_beyond_a_bound_is_a_tail() -> None:
+    found = log_inside(np.array([-12.0]), np.eye(1), np.zeros(1), np.full(1, np.inf))
+    assert found == pytest.approx(norm.logsf(12.0), rel=1e-9)

@@ -1,0 +1,50 @@
+"""Coordinates in which priors are standard, for every material and effect of the library."""
+
+import numpy as np
+import pytest
+from scipy.stats import cauchy, norm
+
+from bayesmembrane.diagnosis.candidates.standard import standard
+from bayesmembrane.ground.registry import components, materials
+from bayesmembrane.physics.hypothesis import Hypothesis
+from tests.diagnosis.curves import measured, triangle
+
+CURVE = measured(np.linspace(0.01, 1.0, 60), triangle(60))
+EFFECTS = sorted(components("effects"))
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_there_and_back_is_the_same(name) -> None:
+    axes = standard(Hypothesis(materials()["yeoh"], (components("effects")[name](),)), CURVE)
+    low, high = (np.clip(b, -2.5, 2.5) for b in axes.bounds)
+    u = np.random.default_rng(0).uniform(low, high, (20, low.size))
+    assert axes.to_u(axes.to_x(u)) == pytest.approx(u, abs=1e-6)
+    step = 1e-5
+    numeric = (axes.to_x(u + step) - axes.to_x(u - step)) / (2 * step)
+    assert axes.slope(u) == pytest.approx(numeric, rel=1e-4, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_absence_is_at_zero_and_its_side_is_kept(name) -> None:
+    effect = components("effects")[name]()
+    axes = standard(Hypothesis(materials()["gent"], (effect,)), CURVE)
+    x = np.concatenate([np.zeros(2), effect.null])
+    assert axes.to_u(x)[2] == pytest.approx(0.0, abs=1e-12)
+    assert axes.one_sided[2] == effect.size.one_sided
+    assert axes.heavy[2]
+
+
+def test_pulls_are_roots_of_the_prior_and_local_normals_have_its_value_and_slope() -> None:
+    axes = standard(Hypothesis(materials()["gent"], (components("effects")["friction"](),)), CURVE)
+    u = np.array([0.4, -1.2, 3.0, 0.7])
+    pull, steep = axes.pull(u)
+    log_prior = np.where(axes.heavy, cauchy.logpdf(u), norm.logpdf(u))
+    at_zero = np.where(axes.heavy, cauchy.logpdf(0.0), norm.logpdf(0.0))
+    assert 0.5 * pull**2 == pytest.approx(at_zero - log_prior)
+    h = 1e-6
+    assert steep == pytest.approx((axes.pull(u + h)[0] - axes.pull(u - h)[0]) / (2 * h), rel=1e-5)
+    spread, larger = axes.local(u)
+    halves = np.log(2.0) * np.sum(axes.one_sided)
+    assert larger + np.sum(norm.logpdf(u, 0, spread)) - halves == pytest.approx(np.sum(log_prior))
+    slope = np.where(axes.heavy, -2 * u / (1 + u * u), -u)
+    assert -u / spread**2 == pytest.approx(slope)
