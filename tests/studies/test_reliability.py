@@ -1,0 +1,133 @@
+"""The reliability study: its plan is frozen and balanced, and its tables count what they say."""
+
+from collections import Counter
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from tests.generator.energies import DECLARED
+from tests.studies.reliability_plan import ROUND, Case, measured, plan
+from tests.studies.reliability_rows import answer_row, beliefs, right_name, truth_row, wrong_name
+from tests.studies.reliability_table import held, merged, of_truth, report
+
+
+def row(probabilities=None, **other):
+    """A row of a case with friction 20 and drift 2, the second of them faint."""
+    truth = {
+        "effects": {"friction": {}, "force_drift": {}},
+        "snr": {"friction": 21.0, "force_drift": 4.0},
+        "snr_own": {"friction": 20.0, "force_drift": 2.0},
+        "family": "gent",
+        "expected": ["named", "ambiguous"],
+    }
+    answer = {
+        "verdict": "named",
+        "effects": ["friction"],
+        "material": "",
+        "sentence": "",
+        "error": {"heldout_coverage_90_after": 0.9, "after": {"reduced_chi2": 1.0}},
+        "probabilities": probabilities,
+    }
+    head = {"number": 0, "group": "pair", "energy": "declared", "seed": 2, "seconds": 1.0}
+    return head | truth_row(truth | other.pop("truth", {}), True) | answer_row(answer | other)
+
+
+def test_the_halves_share_no_seed_and_every_prefix_is_balanced() -> None:
+    one, two = list(plan("calibration")), list(plan("test"))
+    assert {c.seed % 2 for c in one} == {0}
+    assert {c.seed % 2 for c in two} == {1}
+    assert [(c.group, c.kind) for c in one] == [(c.group, c.kind) for c in two]
+    assert len({c.key for c in (*one, *two)}) == len(one) + len(two)
+    assert one == list(plan("calibration"))
+    for rounds in (1, 7, 60):
+        found = Counter(c.group for c in one[: rounds * len(ROUND)])
+        assert found == {g: rounds * n for g, n in Counter(ROUND).items()}
+    singles = Counter(c.kind for c in islice((c for c in one if c.group == "single"), 26))
+    assert set(singles.values()) == {2}
+    for c in one:
+        assert c.material in DECLARED
+        assert not c.kind.startswith(f"typical:{c.material}")
+        own = [s for k, s in zip(c.kind.split("+"), c.strengths, strict=False) if ":" not in k]
+        assert not own or (min(own) >= max(own) / 5 * 0.999 and 0.25 <= max(own) <= 5.0)
+
+
+@pytest.mark.parametrize("number", [2, 6, 19])
+def test_a_case_is_one_measurement(number: int) -> None:
+    case = next(islice(plan("calibration"), number, None))
+    one, two = measured(case), measured(case)
+    assert one.csv == two.csv
+    assert sorted(one.truth["effects"]) == sorted(k for k in case.kind.split("+") if ":" not in k)
+    assert f"{1e6 * one.bench.thickness:.6g}" in one.toml
+
+
+def test_a_film_that_locks_is_pulled_less_far() -> None:
+    case = Case(0, "null", "null", "gent", (), 0)
+    reach = []
+    for seed in range(0, 40, 2):
+        d = measured(Case(0, "null", "null", "gent", (), seed))
+        reach.append(d.path.largest / (d.film.outer - d.film.inner))
+    assert case.key == "null|gent||0"
+    assert all(np.isfinite(reach))
+    assert max(reach) <= 1.7
+
+
+def test_faint_effects_are_no_truth_and_unknown_ones_are_foreign() -> None:
+    r = row({"effects": {"force_drift+friction": 0.6, "friction": 0.3, "none": 0.1}, "energies": {}, "foreign": {}})
+    assert (r["truth"], r["faint"], r["foreign"]) == (["friction"], ["force_drift"], [])
+    assert merged(r) == pytest.approx({("friction",): 0.9, (): 0.1})
+    assert of_truth(r) == pytest.approx(0.9)
+    assert right_name(r)
+    assert right_name(r | {"effects": ["force_drift", "friction"]})
+    assert wrong_name(r | {"effects": ["friction", "mullins"]})
+    assert wrong_name(r | {"effects": ["force_drift"]})
+    assert not wrong_name(r | {"verdict": "ambiguous", "effects": ["mullins"]})
+    strange = row(truth={"effects": {"ripple": {}}, "snr_own": {"ripple": 30.0}})
+    assert strange["foreign"] == ["ripple"]
+    assert wrong_name(strange)
+
+
+def test_the_truth_is_held_where_the_most_probable_sets_reach_it() -> None:
+    def with_(p: dict[str, float], **foreign: float):
+        return row({"effects": p, "energies": {}, "foreign": foreign})
+
+    assert held(with_({"mullins": 0.9, "friction": 0.1}))
+    assert not held(with_({"mullins": 0.96, "friction": 0.04}))
+    assert not held(with_({"mullins": 0.94, "none": 0.02, "friction": 0.01}))
+    # Foreign faults are rivals of the sets where one sum holds them all, and otherwise a question of their own.
+    assert not held(with_({"friction": 0.03, "none": 0.01}, ripple=0.96))
+    assert held(with_({"friction": 0.4, "mullins": 0.6}, ripple=0.96))
+    assert of_truth(with_({"friction": 0.4, "none": 0.1}, ripple=0.5)) == pytest.approx(0.4)
+
+
+def test_names_of_sets_are_in_one_order_and_nothing_is_lost() -> None:
+    found = beliefs(
+        {"effects": {"b+a": 0.2, "a+b": 0.3, "none": 0.5}, "energies": {"gent": 1.0}, "foreign": {"none": 1}}
+    )
+    assert found == {"effects": {"a+b": 0.5, "none": 0.5}, "energies": {"gent": 1.0}, "foreign": {}}
+    assert beliefs(None) is None
+
+
+def test_stated_probabilities_that_are_frequencies_pass_as_such() -> None:
+    rng = np.random.default_rng(5)
+    rows = []
+    for i in range(400):
+        p = float(rng.choice([0.3, 0.7, 0.97]))
+        effects = {"friction": p, "mullins": 1 - p}
+        named = {} if rng.random() < p else {"effects": {"mullins": {}}, "snr_own": {"mullins": 9.0}}
+        rows.append(row({"effects": effects, "energies": {"gent": 1.0}, "foreign": {}}, truth=named) | {"number": i})
+    text = report(rows, "made up")
+    hits = sum(r["truth"] == ["friction"] for r in rows)
+    assert f"| named and right | {hits} / 400" in text.replace("effects of the library: named", "named")
+    lines = [x for x in text.split("## Sets of effects")[1].split("##")[0].splitlines() if " to " in x]
+    for line in lines:
+        _, _, mean, found, _ = (x.strip() for x in line.split("|"))
+        low, high = (float(x) / 100 for x in found.split("[")[1].rstrip("]").split(", "))
+        assert low - 0.1 <= float(mean) <= high + 0.1
+    assert len(lines) == 4  # 0.01 to 0.05, 0.2 to 0.5, 0.5 to 0.8, 0.95 to 0.99
+
+
+def test_an_answer_without_probabilities_is_counted_by_its_name_alone() -> None:
+    text = report([row(), row() | {"effects": ["mullins"]}], "made up")
+    assert "2 without probabilities" in text
+    assert "| wrong unique names, of all names | 1 / 2" in text
