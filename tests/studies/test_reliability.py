@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.generator.energies import DECLARED
+from tests.generator.setups import setup
 from tests.studies.reliability_plan import ROUND, Case, measured, plan
 from tests.studies.reliability_rows import answer_row, beliefs, right_name, truth_row, wrong_name
 from tests.studies.reliability_table import held, merged, of_truth, report
@@ -47,7 +48,7 @@ def test_the_halves_share_no_seed_and_every_prefix_is_balanced() -> None:
     assert set(singles.values()) == {2}
     for c in one:
         assert c.material in DECLARED
-        assert not c.kind.startswith(f"typical:{c.material}")
+        assert c.kind.partition("+")[0] != f"typical:{c.material}"
         own = [s for k, s in zip(c.kind.split("+"), c.strengths, strict=False) if ":" not in k]
         assert not own or (min(own) >= max(own) / 5 * 0.999 and 0.25 <= max(own) <= 5.0)
 
@@ -61,15 +62,18 @@ def test_a_case_is_one_measurement(number: int) -> None:
     assert f"{1e6 * one.bench.thickness:.6g}" in one.toml
 
 
-def test_a_film_that_locks_is_pulled_less_far() -> None:
-    case = Case(0, "null", "null", "gent", (), 0)
-    reach = []
-    for seed in range(0, 40, 2):
-        d = measured(Case(0, "null", "null", "gent", (), seed))
-        reach.append(d.path.largest / (d.film.outer - d.film.inner))
-    assert case.key == "null|gent||0"
-    assert all(np.isfinite(reach))
-    assert max(reach) <= 1.7
+def test_a_film_that_locks_is_pulled_less_far(monkeypatch) -> None:
+    tried = []
+
+    def further(faults, seed, shrink):
+        tried.append(shrink)
+        return setup(faults, seed, 4 * shrink)
+
+    monkeypatch.setattr("tests.studies.reliability_plan.setup", further)
+    d = measured(Case(0, "null", "null", "gent", (), 8))
+    assert len(tried) > 1
+    np.testing.assert_allclose(tried, 0.8 ** np.arange(len(tried)))
+    assert d.path.largest == pytest.approx(max(further((), 8, tried[-1]).protocol.peaks))
 
 
 def test_faint_effects_are_no_truth_and_unknown_ones_are_foreign() -> None:
