@@ -42,7 +42,7 @@ DECLARED, NONE = "declared", "none"
 ENERGIES = {"declared": (DECLARED,), "none": (NONE,), "both": (DECLARED, NONE)}
 
 
-def run_case(case: Case, half: str, energy: str) -> Row:
+def run_case(case: Case, energy: str, half: str) -> Row:
     """Everything that the tables need of one case; ``seconds`` are those of the process, for the diagnosis alone."""
     head = {**asdict(case), "half": half, "energy": energy, "key": key(case, energy)}
     try:
