@@ -68,6 +68,6 @@ class Noise:
 
     def covariance(self, deflection: Array) -> Array:
         """(N, N) N^2 at deflections (N,) m; rounding counts as a white part of variance quantum^2 / 12."""
-        size, sd = deflection.size, self.deviations(deflection)
+        size, growth = deflection.size, self.deviations(deflection) / self.sd
         lag = np.abs(np.subtract.outer(np.arange(size), np.arange(size)))
-        return sd[:, None] * sd * self.rho**lag + np.eye(size) * self.quantum**2 / 12
+        return self.sd**2 * self.rho**lag * (growth[:, None] * growth) + np.eye(size) * self.quantum**2 / 12

@@ -1,5 +1,6 @@
 """`make study-reliability`: are the probabilities of a diagnosis right, and its names; docs/studies/reliability.md.
 
+`make study-second` asks the same of the second generator (`--generator second`), once; docs/studies/second.md.
 Each case is one line of a JSON-lines file, written as soon as it is done; cases that stand there are skipped, so that
 the study can be interrupted and goes on where it was. `--first 0 --count 40 --half calibration --results FILE` runs a
 part and prints a line for each case; `--summary FILE` prints the tables of what is there.
@@ -12,9 +13,9 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import islice, product
 from pathlib import Path
@@ -30,26 +31,54 @@ from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.words.diagnosis import document
 from tests.generator.datasets import Dataset, generate
 from tests.generator.film import NoSolutionError
+from tests.generator_two.datasets import Dataset as SecondDataset
+from tests.generator_two.membrane import LockedError
+from tests.studies import reliability_plan, second_plan
 from tests.studies.loop_intervals import covered
-from tests.studies.reliability_plan import HALVES, SEED, Case, measured, plan
+from tests.studies.reliability_plan import HALVES, Case
 from tests.studies.reliability_rows import Row, answer_row, right_name, spoken_truth, top, truth_row
 from tests.studies.reliability_table import report
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "reports" / "study-reliability"
-TABLE = ROOT / "docs" / "studies" / "reliability.md"
 DECLARED, NONE = "declared", "none"
 ENERGIES = {"declared": (DECLARED,), "none": (NONE,), "both": (DECLARED, NONE)}
 
 
-def run_case(case: Case, energy: str, half: str) -> Row:
+@dataclass(frozen=True)
+class Source:
+    """A generator with a plan of its own: half, base of the seeds, cases, measurement of a case, and a title."""
+
+    half: str
+    seed: int
+    plan: Callable[[str, int], Iterator[Case]]
+    measured: Callable[[Case], Dataset | SecondDataset]
+    title: str
+
+
+OWN, SECOND = "own", "second"
+SOURCES = {
+    OWN: Source("test", reliability_plan.SEED, reliability_plan.plan, reliability_plan.measured, "Reliability"),
+    SECOND: Source(
+        second_plan.HALF,
+        second_plan.SEED,
+        second_plan.plan,
+        second_plan.measured,
+        "Reliability on the second generator, looked at once",
+    ),
+}
+
+
+def run_case(case: Case, energy: str, source: str, half: str) -> Row:
     """Everything that the tables need of one case; ``seconds`` are those of the process, for the diagnosis alone."""
     head = {**asdict(case), "half": half, "energy": energy, "key": key(case, energy)}
     try:
-        data = measured(case)
-    except NoSolutionError as error:
+        data = SOURCES[source].measured(case)
+    except (NoSolutionError, LockedError) as error:
         return head | {"skipped": str(error)}
-    head |= truth_row(data.truth, data.identifiable) | {"protocol": data.truth["protocol"]}
+    head |= truth_row(data.truth, data.identifiable if isinstance(data, Dataset) else None) | {
+        "protocol": data.truth["protocol"]
+    }
     with tempfile.TemporaryDirectory() as folder:
         measurement = read_measurement(*data.write(Path(folder)))
     begun = time.process_time()
@@ -66,7 +95,7 @@ def diagnosed(measurement: Measurement, material: str | None) -> Diagnosis:
     return diagnose(measurement, None if material is None else Hypothesis(materials()[material]))  # type: ignore[arg-type]
 
 
-def intervals(row: Row, found: Diagnosis, measurement: Measurement, data: Dataset) -> dict[str, Any]:
+def intervals(row: Row, found: Diagnosis, measurement: Measurement, data: Dataset | SecondDataset) -> dict[str, Any]:
     """Whether the 90 % intervals hold the film that was put in, where the truth is named with its energy."""
     if not right_name(row) or found.best.hypothesis.material.name != row["family"]:
         return {}
@@ -110,7 +139,10 @@ def line_of(row: Row) -> str:
     )
 
 
-def run(todo: Iterable[tuple[Case, str]], half: str, path: Path, seconds: float, jobs: int) -> None:
+Work = Callable[[tuple[Case, str]], Row]
+
+
+def run(todo: Iterable[tuple[Case, str]], work: Work, path: Path, seconds: float, jobs: int) -> None:
     """Run the (case, energy) that are not stored yet, until ``seconds`` have passed."""
     path.parent.mkdir(parents=True, exist_ok=True)
     done = stored(path)
@@ -118,14 +150,13 @@ def run(todo: Iterable[tuple[Case, str]], half: str, path: Path, seconds: float,
     if not rest:
         return
     with path.open("a", encoding="utf-8") as file:
-        for row in _results(rest, half, seconds, jobs):
+        for row in _results(rest, work, seconds, jobs):
             file.write(json.dumps(row) + "\n")
             file.flush()
             print(line_of(row), flush=True)
 
 
-def _results(rest: list[tuple[Case, str]], half: str, seconds: float, jobs: int) -> Iterator[Row]:
-    work = partial(_one, half=half)
+def _results(rest: list[tuple[Case, str]], work: Work, seconds: float, jobs: int) -> Iterator[Row]:
     if jobs == 1:
         warmed()
         end = time.monotonic() + seconds
@@ -141,18 +172,19 @@ def _results(rest: list[tuple[Case, str]], half: str, seconds: float, jobs: int)
             yield from pool.map(work, some)
 
 
-def _one(item: tuple[Case, str], half: str) -> Row:
-    return run_case(*item, half)
+def _one(item: tuple[Case, str], source: str, half: str) -> Row:
+    return run_case(*item, source, half)
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run, and write or print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--half", choices=tuple(HALVES), default="test", help="even seeds are for calibration")
+    parser.add_argument("--generator", choices=tuple(SOURCES), default=OWN, help="the second one is for the end")
+    parser.add_argument("--half", choices=tuple(HALVES), default=None, help="of the own generator; test by default")
     parser.add_argument("--energy", choices=tuple(ENERGIES), default=DECLARED, help="what is declared")
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
     parser.add_argument("--count", type=int, default=None, help="so many cases; all that follow by default")
-    parser.add_argument("--seed", type=int, default=SEED, help="base of the seeds, an even number")
+    parser.add_argument("--seed", type=int, default=None, help="base of the seeds, an even number")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="begin no case after this time")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--results", type=Path, default=None, help="JSON lines, one a case")
@@ -162,16 +194,19 @@ def main(arguments: list[str] | None = None) -> int:
     if asked.summary is not None:
         print(report(list(stored(asked.summary).values()), f"--summary {asked.summary}"))
         return 0
-    results = asked.results or RESULTS / f"{asked.half}.jsonl"
+    source = SOURCES[asked.generator]
+    half, seed = asked.half or source.half, source.seed if asked.seed is None else asked.seed
+    results = asked.results or RESULTS / f"{half}.jsonl"
     end = None if asked.count is None else asked.first + asked.count
-    cases = list(islice(plan(asked.half, asked.seed), asked.first, end))
+    cases = list(islice(source.plan(half, seed), asked.first, end))
     todo = list(product(cases, ENERGIES[asked.energy]))
-    run(todo, asked.half, results, asked.seconds, asked.jobs)
+    run(todo, partial(_one, source=asked.generator, half=half), results, asked.seconds, asked.jobs)
     have = stored(results)
     rows = [have[key(*item)] for item in todo if key(*item) in have]
     told = "" if asked.count is None else f" --first {asked.first} --count {asked.count}"
-    what = f"--half {asked.half} --energy {asked.energy} --seed {asked.seed}{told}"
-    text = report(rows, f"python -m tests.studies.reliability {what}", len(todo))
+    which = f"--generator {SECOND}" if asked.generator == SECOND else f"--half {half}"
+    what = f"{which} --energy {asked.energy} --seed {seed}{told}"
+    text = report(rows, f"python -m tests.studies.reliability {what}", len(todo), source.title)
     if asked.table is not None:
         asked.table.parent.mkdir(parents=True, exist_ok=True)
         asked.table.write_text(text, encoding="utf-8")

@@ -8,6 +8,7 @@ import pytest
 
 from tests.generator.energies import DECLARED
 from tests.generator.setups import setup
+from tests.studies import reliability, second_plan
 from tests.studies.reliability_plan import ROUND, Case, measured, plan
 from tests.studies.reliability_rows import answer_row, beliefs, right_name, truth_row, wrong_name
 from tests.studies.reliability_table import held, merged, of_truth, report
@@ -74,6 +75,48 @@ def test_a_film_that_locks_is_pulled_less_far(monkeypatch) -> None:
     assert len(tried) > 1
     np.testing.assert_allclose(tried, 0.8 ** np.arange(len(tried)))
     assert d.path.largest == pytest.approx(max(further((), 8, tried[-1]).protocol.peaks))
+
+
+def test_the_second_plan_is_balanced_and_made_by_the_second_generator() -> None:
+    cases = list(second_plan.plan())
+    for rounds in (1, 15):
+        found = Counter(c.group for c in cases[: rounds * len(second_plan.ROUND)])
+        assert found == {g: rounds * n for g, n in Counter(second_plan.ROUND).items()}
+    assert len({c.key for c in cases}) == len(cases)
+    assert {c.seed for c in cases}.isdisjoint(c.seed for h in ("calibration", "test") for c in plan(h))
+    pair = next(c for c in cases if c.group == "pair")
+    data = second_plan.measured(pair)
+    assert sorted(data.truth["effects"]) == sorted(pair.kind.split("+")[1:])
+    with pytest.raises(ValueError, match="tuned"):
+        next(second_plan.plan("calibration"))
+
+
+@pytest.mark.parametrize(("source", "half"), [("own", "calibration"), ("second", "second")])
+def test_a_case_is_asked_as_it_says_and_kept(monkeypatch, tmp_path, capsys, source, half) -> None:
+    asked = []
+
+    def answered(measurement, material):
+        asked.append(material)
+        return None
+
+    said = {"verdict": "unknown", "effects": [], "material": "", "sentence": "s"}
+    said["error"] = {"heldout_coverage_90_after": None, "after": {"reduced_chi2": 2.0}}
+    said["probabilities"] = {"effects": {"none": 0.7, "mullins": 0.3}, "energies": {"gent": 1.0}, "foreign": {}}
+    monkeypatch.setattr(reliability, "diagnosed", answered)
+    monkeypatch.setattr(reliability, "document", lambda found: said)
+    monkeypatch.setattr(reliability, "warmed", lambda: None)
+    file = tmp_path / "results.jsonl"
+    halves = ["--half", half] if source == "own" else []
+    call = ["--generator", source, *halves, "--count", "2", "--energy", "both", "--results", str(file)]
+    assert reliability.main(call) == 0
+    declared = [c.material for c in islice(reliability.SOURCES[source].plan(half, reliability.SOURCES[source].seed), 2)]
+    assert asked == [declared[0], None, declared[1], None]
+    assert "none 0.7, mullins 0.3 | gent 1" in capsys.readouterr().out
+    assert reliability.main(call) == 0  # nothing is asked twice
+    assert len(asked) == 4
+    assert {r["half"] for r in reliability.stored(file).values()} == {half}
+    assert reliability.main(["--summary", str(file)]) == 0
+    assert "4 diagnoses of the plan" in capsys.readouterr().out
 
 
 def test_faint_effects_are_no_truth_and_unknown_ones_are_foreign() -> None:
