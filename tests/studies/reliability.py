@@ -131,7 +131,7 @@ def line_of(row: Row) -> str:
     if "skipped" in row:
         return f"{row['number']:4d} {row['group']}: skipped, {row['skipped']}"
     said = "+".join(row["effects"]) or row.get("found_material") or "-"
-    mark = "" if row["identifiable"] is not False else " (not identifiable)"
+    mark = " (not identifiable)" if row["truth"] and row["identifiable"] is False else ""
     return (
         f"{row['number']:4d} {row['group']}, {row['material'] if row['energy'] == DECLARED else 'no energy'} declared, "
         f"{row['protocol']}: {spoken_truth(row)}{mark} -> {row['verdict']} {said} [{top(row)}] "

@@ -36,6 +36,7 @@ ROUND = (
     *("null", "pair", "single", "foreign", "triple", "energy", "null", "pair", "single", "mixed"),
 )
 """Groups of one round, in this order: null 4, single 5, pair 4, triple 2, energy 2, mixed 1, foreign 2."""
+GROUPS = ("null", "single", "pair", "triple", "energy", "mixed", "foreign")
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,8 @@ def plan(half: str, base: int = SEED) -> Iterator[Case]:
     for number in range(ROUNDS * len(ROUND)):
         group = ROUND[number % len(ROUND)]
         kind = designs[group][taken[group] % len(designs[group])]
-        material = DECLARED[(taken[group] + taken[group] // len(DECLARED)) % len(DECLARED)]
+        turn = taken[group] + taken[group] // len(DECLARED) + GROUPS.index(group)
+        material = DECLARED[turn % len(DECLARED)]
         taken[group] += 1
         seed = base + 2 * number + HALVES[half]
         family = kind.partition("+")[0].partition(":")[2]

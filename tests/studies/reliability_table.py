@@ -10,6 +10,7 @@ import numpy as np
 
 from bayesmembrane.ground.registry import components
 from tests.studies.loop_table import counted, share
+from tests.studies.reliability_plan import GROUPS
 from tests.studies.reliability_rows import (
     FAINT,
     NONE,
@@ -26,7 +27,6 @@ LISTED = 0.001  # sets less probable are not in the reliability table of sets
 FLOOR = 1e-4  # of the probability of the truth, in the log score
 MASS = 0.95
 CLEAR = 10.0  # ratio of an effect's own trace from which it has to be named
-GROUPS = ("null", "single", "pair", "triple", "energy", "mixed", "foreign")
 # The diagnosis and the generators have different words for the same thing.
 ALIASES = {
     "ripple": ("ripple",),

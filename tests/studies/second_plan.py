@@ -14,7 +14,7 @@ import numpy as np
 from tests.generator_two.datasets import Dataset, generate
 from tests.generator_two.elastic import COMMON, UNKNOWN
 from tests.generator_two.faults import EFFECTS, FOREIGN
-from tests.studies.reliability_plan import Case
+from tests.studies.reliability_plan import GROUPS, Case
 
 SEED = 900_000
 ROUNDS = 15
@@ -50,7 +50,7 @@ def plan(half: str = HALF, base: int = SEED) -> Iterator[Case]:
     taken = dict.fromkeys(designs, 0)
     for number in range(ROUNDS * len(ROUND)):
         group = ROUND[number % len(ROUND)]
-        turn, faults = taken[group], designs[group][taken[group] % len(designs[group])]
+        turn, faults = taken[group] + GROUPS.index(group), designs[group][taken[group] % len(designs[group])]
         taken[group] += 1
         family = (UNKNOWN if group in ("energy", "mixed") else COMMON)[(turn + turn // 5) % 5]
         declared = family if family in COMMON else COMMON[(turn + turn // 5 + number) % 5]
