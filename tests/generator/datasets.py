@@ -5,6 +5,7 @@ Nothing here knows the package under test: film, energies, faults and noise are 
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path as FilePath
@@ -13,7 +14,7 @@ from zlib import crc32
 
 import numpy as np
 
-from tests.generator.distortions import DISTORTIONS, LIBRARY, Active, response
+from tests.generator.distortions import DISTORTIONS, LIBRARY, USUAL, Active, Scale, response
 from tests.generator.energies import FAMILIES, Array
 from tests.generator.film import Film, NoSolutionError, film
 from tests.generator.noise import Noise
@@ -26,6 +27,27 @@ INNER, OUTER, THICKNESS = 0.010, 0.035, 50e-6  # m
 GAIN = 0.03  # of the force, at strength 1: the material absorbs it, so no ratio can size it
 MARGIN = 3.5e-3  # m of deflection beyond the largest, for shifts
 STRONGEST_FAMILY = 2.5
+USUAL_REACH, USUAL_FORCE = 0.040, 2.5  # m and N: the test for which the sizes of faults are meant
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Rig and film: inner and outer radius, thickness (m). Another one than the usual scales the sizes of faults."""
+
+    inner: float = INNER
+    outer: float = OUTER
+    thickness: float = THICKNESS
+
+    def margin(self, path: Path) -> float:
+        """m of deflection that the film's law is made to hold beyond the largest."""
+        return MARGIN if self == Bench() else MARGIN / USUAL_REACH * path.largest
+
+    def scale(self, film_: Film, path: Path) -> Scale:
+        """By which lengths and forces of this test are larger than the usual ones."""
+        if self == Bench():
+            return USUAL
+        top = float(film_.force(np.array([path.largest]))[0])
+        return Scale(path.largest / USUAL_REACH, top / USUAL_FORCE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +71,7 @@ class Dataset:
     path: Path
     film: Film
     at_work: dict[str, Active] = field(repr=False)
+    bench: Bench = Bench()
 
     @property
     def csv(self) -> str:
@@ -61,7 +84,7 @@ class Dataset:
         """Specimen and rig; the noise is left for the reader to find out."""
         return (
             '[specimen]\nname = "synthetic film"\n'
-            f"thickness_um = {1e6 * THICKNESS:.6g}\n\n"
+            f"thickness_um = {1e6 * self.bench.thickness:.6g}\n\n"
             '[rig]\nkind = "annulus"\n'
             f"inner_radius_mm = {1e3 * self.film.inner:.6g}\nouter_radius_mm = {1e3 * self.film.outer:.6g}\n\n"
             '[origin]\nstatement = "SYNTHETIC, not measured"\n'
@@ -86,7 +109,7 @@ class Dataset:
 
         An effect outside the library has its angles too. Rivals without a trace of their own are left out.
         """
-        others = rivals(self.film, self.path, self.projector)
+        others = rivals(self.film, self.path, self.projector, self.bench.scale(self.film, self.path))
         out = {}
         for name, active in self.at_work.items():
             alone = response(self.film, self.path, {name: active}) - response(self.film, self.path, {})
@@ -105,11 +128,14 @@ class Dataset:
         declared = self.truth["material"]
         names = FAMILIES[declared].parameters
         same = declared == self.truth["family"]
-        start = np.array([self.truth["parameters"][n] for n in names]) if same else _typical(declared)
+        start = np.array([self.truth["parameters"][n] for n in names]) if same else self._typical(declared)
         rig = (self.film.inner, self.film.outer, self.film.reach)
         return float(
             np.linalg.norm(best_fit(declared, start, rig, self.path.deflection, self.clean_N, self.covariance)[1])
         )
+
+    def _typical(self, family: str) -> Array:
+        return drawn(family, self.bench, np.random.default_rng(0))
 
     @property
     def identifiable(self) -> bool:
@@ -123,53 +149,63 @@ def generate(
     material: str = "yeoh",
     protocol: str | Protocol = "staircase",
     noise: str | Noise = "white",
-    strength: float = 1.0,
+    strength: float | Sequence[float] = 1.0,
     seed: int = 0,
-    inner: float = INNER,
-    outer: float = OUTER,
+    bench: Bench = Bench(),
 ) -> Dataset:
     """A measurement of a film declared as ``material`` with a fault of ``kind``.
 
     ``kind``: "null", a name of `DISTORTIONS`, several joined by "+"; "family:NAME" for a film that is not of the
     declared family, and so far from it that its ratio is the one asked for; "typical:NAME" for a film of that family
     as they come, however far (either may be joined too). ``strength`` times 20 is the signal-to-noise ratio of each
-    projected signature by itself. ``noise``: words of `Noise.named`. One seed gives one material, one path, one noise
-    and one set of details, whatever the strength.
+    projected signature by itself; several are one for each name. ``noise``: words of `Noise.named`. One seed gives one
+    material, one path, one noise and one set of details, whatever the strength.
     """
     noise = Noise.named(noise) if isinstance(noise, str) else noise
     protocol = PROTOCOLS[protocol] if isinstance(protocol, str) else protocol
     material_rng, path_rng, noise_rng = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     path = sample(protocol, path_rng, noise.uneven)
-    covariance = noise.covariance(path.time.size)
-    rig = (inner, outer, path.largest + MARGIN)
+    rig = (bench.inner, bench.outer, path.largest + bench.margin(path))
     names = [] if kind == "null" else kind.split("+")
     families = [n for n in names if ":" in n]
     faults = [n for n in names if ":" not in n]
-    target = FULL_SNR * strength
+    strengths = dict(zip(names, np.broadcast_to(np.asarray(strength, dtype=float), len(names)), strict=True))
+    targets = {n: FULL_SNR * float(s) for n, s in strengths.items()}
 
-    parameters = FAMILIES[material].draw(material_rng)
+    parameters = drawn(material, bench, material_rng)
     true_family, null, snr = material, None, {}
     if families:
         manner, true_family = families[0].split(":")
-        wanted = {"family": target, "typical": None}[manner]
+        parameters = drawn(true_family, bench, material_rng)
+    if noise.relative:
+        law = film(true_family, tuple(float(v) for v in parameters), *rig)
+        noise = noise.at(float(law.force(np.array([path.largest]))[0]))
+    covariance = noise.covariance(path.deflection)
+    if families:
+        start = drawn(material, bench, material_rng)
+        wanted = {"family": targets[families[0]], "typical": None}[manner]
         parameters, null, snr[families[0]] = _foreign(
-            material, true_family, path, rig, covariance, wanted, material_rng
+            (material, start), (true_family, parameters), path, rig, covariance, wanted
         )
     law = film(true_family, tuple(float(v) for v in parameters), *rig)
+    scale = bench.scale(law, path)
     unspoilt = response(law, path, {})
     projector = Projector(covariance, law.sensitivities(path.deflection))
     at_work: dict[str, Active] = {}
     for name in faults:
         code = crc32(name.encode())
-        at_work[name] = _fault(name, law, path, projector, strength, np.random.default_rng([seed, code]))
+        details_rng = np.random.default_rng([seed, code])
+        at_work[name] = _fault(name, law, path, projector, (strengths[name], scale), details_rng)
         snr[name] = float(np.linalg.norm(projector(response(law, path, {name: at_work[name]}) - unspoilt)))
     clean = response(law, path, at_work) if at_work else unspoilt
-    force = noise.rounded(clean + noise.draw(noise_rng, clean.size))
-    asked = (
-        [abs(s / target - 1) < 0.05 for n, s in snr.items() if n != "gain" and not n.startswith("typical:")]
-        if target > 0
-        else []
-    )
+    force = noise.rounded(clean + noise.draw(noise_rng, path.deflection))
+    asked = [
+        abs(s / targets[n] - 1) < 0.05
+        for n, s in snr.items()
+        if n != "gain" and not n.startswith("typical:") and targets[n] > 0
+    ]
+    single = len(set(strengths.values())) < 2
+    each = float(max(strengths.values(), default=float(np.max(strength)))) if single else list(strengths.values())
     truth = {
         "kind": kind,
         "material": material,
@@ -181,14 +217,17 @@ def generate(
         "snr": snr,
         "snr_together": float(np.linalg.norm(projector(clean - unspoilt))),
         "snr_own": _own(law, path, projector, at_work),
-        "target_snr": target,
+        "target_snr": FULL_SNR * each if isinstance(each, float) else [FULL_SNR * s for s in each],
         "reached": all(asked),
-        "strength": strength,
+        "strength": each,
         "protocol": protocol.name,
-        "noise": {"sd": noise.sd, "rho": noise.rho, "quantum": noise.quantum, "uneven": noise.uneven},
+        "noise": {"sd": noise.sd, "rho": noise.rho, "quantum": noise.quantum, "uneven": noise.uneven}
+        | ({"grows": noise.grows} if noise.grows else {}),
         "seed": seed,
-        "expected": _expected(faults, families, strength, bool(families) and material == "ogden", all(asked)),
+        "expected": _expected(faults, families, strengths, bool(families) and material == "ogden", all(asked)),
     }
+    if bench != Bench():
+        truth["bench"] = {"inner": bench.inner, "outer": bench.outer, "thickness": bench.thickness}
     return Dataset(
         path.time,
         1e3 * path.deflection,
@@ -200,11 +239,21 @@ def generate(
         path,
         law,
         at_work,
+        bench,
     )
 
 
-def _fault(name: str, law: Film, path: Path, projector: Projector, strength: float, rng: np.random.Generator) -> Active:
+def drawn(family: str, bench: Bench, rng: np.random.Generator) -> Array:
+    """Parameters of a film of ``family`` as they come, as thick as the bench says."""
+    p = FAMILIES[family].draw(rng)
+    return p if bench.thickness == THICKNESS else FAMILIES[family].thicker(p, bench.thickness / THICKNESS)
+
+
+def _fault(
+    name: str, law: Film, path: Path, projector: Projector, size: tuple[float, Scale], rng: np.random.Generator
+) -> Active:
     d = DISTORTIONS[name]
+    strength, scale = size[0], size[1].of(d.unit)
     sign, form, details = d.draw(rng)
     if name == "gain":
         return Active(sign * GAIN * strength, form, details)
@@ -215,7 +264,7 @@ def _fault(name: str, law: Film, path: Path, projector: Projector, strength: flo
             np.linalg.norm(projector(response(law, path, {name: Active(sign * size, form, details)}) - unspoilt))
         )
 
-    return Active(sign * sized(snr, FULL_SNR * strength, 3 * d.probe, d.largest), form, details)
+    return Active(sign * sized(snr, FULL_SNR * strength, 3 * d.probe * scale, d.largest * scale), form, details)
 
 
 def _own(law: Film, path: Path, projector: Projector, at_work: dict[str, Active]) -> dict[str, float]:
@@ -233,27 +282,25 @@ def _own(law: Film, path: Path, projector: Projector, at_work: dict[str, Active]
 
 
 def _foreign(
-    declared: str,
-    family: str,
+    claim: tuple[str, Array],
+    true: tuple[str, Array],
     path: Path,
     rig: tuple[float, float, float],
     covariance: Array,
     target: float | None,
-    rng: np.random.Generator,
 ) -> tuple[Array, Array, float]:
-    """(parameters of ``family``, (N,) N of ``declared`` at its best, ratio of what that leaves).
+    """(parameters of the true family, (N,) N of the declared one at its best, ratio of what that leaves).
 
-    Without a target the parameters are as drawn.
+    Of both the name and parameters as they come; without a target the true ones stay so.
     """
-    drawn = FAMILIES[family].draw(rng)
     if target == 0:
         raise ValueError("a wrong family of strength 0 is a null: ask for kind 'null'")
-    start = FAMILIES[declared].draw(rng)
+    (declared, start), (family, full) = claim, true
     fits: dict[float, tuple[Array, Array]] = {}
 
     def residual(a: float) -> float:
         nonlocal start
-        p = FAMILIES[family].toward_neo_hookean(drawn, a)
+        p = FAMILIES[family].toward_neo_hookean(full, a)
         law = film(family, tuple(float(v) for v in p), *rig)
         fits[a] = best_fit(declared, start, rig, path.deflection, law.force(path.deflection), covariance)
         start = fits[a][0]
@@ -268,23 +315,23 @@ def _foreign(
         raise NoSolutionError(f"no film of the family {family} could be solved")
     p, r = fits[size]
     best = film(declared, tuple(float(v) for v in p), *rig).force(path.deflection)
-    return FAMILIES[family].toward_neo_hookean(drawn, size), best, float(np.linalg.norm(r))
+    return FAMILIES[family].toward_neo_hookean(full, size), best, float(np.linalg.norm(r))
 
 
-def _typical(family: str) -> Array:
-    return FAMILIES[family].draw(np.random.default_rng(0))
-
-
-def _expected(faults: list[str], families: list[str], strength: float, flexible: bool, reached: bool) -> list[str]:
+def _expected(
+    faults: list[str], families: list[str], strengths: Mapping[str, float], flexible: bool, reached: bool
+) -> list[str]:
     """The verdicts that are right, of those that `diagnose` gives.
 
     "adequate" is among them where the trace is weaker than was asked for, or where the declared family is so
     ``flexible`` (six parameters) that the best fit here may be missed, and the ratio is then only a bound from above.
     """
-    spoilt = [f for f in faults if f != "gain"]
-    if (strength == 0 and not families) or not (spoilt or families):
+    spoilt = [f for f in faults if f != "gain" and strengths[f] > 0]
+    if not (spoilt or families):
         return ["adequate"]
     weak = ["adequate"] if flexible or not reached else []
+    if families and spoilt:
+        return ["named", "ambiguous", "unknown", *weak]
     if families:
         return ["material", "unknown", *weak]
     return [*(("named", "ambiguous") if all(f in LIBRARY for f in spoilt) else ("unknown",)), *weak]

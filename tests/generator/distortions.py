@@ -27,8 +27,28 @@ class Active:
 
 
 @dataclass(frozen=True)
+class Scale:
+    """Of a test against the usual one, in deflection and in force: what sizes in m and in N are measured by."""
+
+    length: float = 1.0
+    force: float = 1.0
+
+    def of(self, unit: str) -> float:
+        """By how much a size in ``unit`` is larger."""
+        if unit.startswith("m/N"):
+            return self.length / self.force
+        return {"m": self.length, "N": self.force}.get(unit.partition(" ")[0], 1.0)
+
+
+USUAL = Scale()
+
+
+@dataclass(frozen=True)
 class Distortion:
-    """A kind: unit of its size in SI, whether the sign is free, largest size, probing size, draws per form."""
+    """A kind: unit of its size in SI, whether the sign is free, largest size, probing size, draws per form.
+
+    The sizes are those of the usual test; `Scale.of` says what they are elsewhere.
+    """
 
     name: str
     unit: str
@@ -143,6 +163,15 @@ DISTORTIONS = {
             },
         ),
         Distortion("rate", "per e-fold of speed", False, 0.3, 0.003, {"logarithm": {}, "power": {}, "asinh": {}}),
+        Distortion(
+            "hysteresis",
+            "share",
+            False,
+            0.7,
+            0.01,
+            {"proportional": {"length": (0.04, 0.25)}, "lead": {"width": (0.1, 0.5)}},
+            False,
+        ),
         # ---- what no library holds
         Distortion(
             "ripple", "N", False, 0.5, 0.005, {"pitch": {"length": (1.5e-3, 5e-3), "phase": (0.0, 6.28)}}, False
@@ -232,14 +261,43 @@ def relaxed_share(active: Active, lag: Array) -> Array:
     return -d["share"] * np.expm1(-x) - (1 - d["share"]) * np.expm1(-x / d["ratio"])
 
 
-def convolved(active: Active, force: Array, time: Array) -> Array:
-    """F(t) = F_e(t) - size int (1 - k(t - s)) dF_e(s), F_e linear between the samples; slack where that would push."""
+def memory(active: Active, time: Array) -> Array:
+    """(N, N - 1): what has relaxed at each time of what was added in each step, linear between the samples."""
     grid = (time[-1] - time[0]) * np.linspace(0, 1, 3000) ** 2
     share = relaxed_share(active, grid)
     integral = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]) * np.diff(grid))])
     lag = np.interp(np.maximum(time[:, None] - time[None, :], 0.0), grid, integral)
-    weight = (lag[:, :-1] - lag[:, 1:]) / np.diff(time)
+    return np.asarray((lag[:, :-1] - lag[:, 1:]) / np.diff(time))
+
+
+def convolved(active: Active, force: Array, weight: Array) -> Array:
+    """F(t) = F_e(t) - size int (1 - k(t - s)) dF_e(s), ``weight`` from `memory`; slack where that would push."""
     return np.maximum(force - active.size * (weight @ np.diff(force)), 0.0)
+
+
+def rubbed(length: float, path: Path) -> Array:
+    """(N,) what relaxes towards +1 while loading and -1 while unloading, over ``length`` (m)."""
+    state = np.zeros(path.deflection.size)
+    for i in range(1, state.size):
+        way = path.deflection[i] - path.deflection[i - 1]
+        goal = np.sign(way)
+        state[i] = goal + (state[i - 1] - goal) * np.exp(-abs(way) / length)
+    return state
+
+
+def lead(active: Active, deflection: Array, path: Path) -> Array:
+    """(N,) m that friction within the material is ahead on loading and behind on unloading, at any speed: the mean of
+    stops that slide at 1/8 to 8/8 of the widest.
+    """
+    widest = active.details["width"] * path.largest
+    total = np.zeros(deflection.size)
+    for part in range(1, 9):
+        at, last = 0.0, 0.0
+        for i, x in enumerate(deflection):
+            at = min(max(at + x - last, -widest * part / 8), widest * part / 8)
+            last = x
+            total[i] += at / 8
+    return active.size * total
 
 
 def rate_factor(active: Active, path: Path) -> Array:
@@ -267,11 +325,7 @@ def give(active: Active, force: Array) -> Array:
 def rubbing(active: Active, force: Array, path: Path) -> Array:
     """(N,) N: towards +1 while loading and -1 while unloading, over a length of presliding."""
     d = active.details
-    state = np.zeros(force.size)
-    for i in range(1, force.size):
-        way = path.deflection[i] - path.deflection[i - 1]
-        goal = np.sign(way)
-        state[i] = goal + (state[i - 1] - goal) * np.exp(-abs(way) / d["length"])
+    state = rubbed(d["length"], path)
     if active.form == "stribeck":
         state = state * (1 + d["excess"] * np.exp(-path.speed / d["speed"]))
     if active.form == "loaded":
@@ -312,17 +366,21 @@ def cut(active: Active, force: Array) -> Array:
 def response(film: Film, path: Path, at_work: Mapping[str, Active]) -> Array:
     """(N,) N: the force that a noiseless instrument would write, all distortions composed in the physical order."""
     reading = path.deflection
-    force = _film_force(film, path, at_work, reading)
+    lazy = at_work.get("viscoelastic")
+    weight = None if lazy is None else memory(lazy, path.time)
+    force = _film_force(film, path, at_work, reading, weight)
     if "machine_compliance" in at_work:
         for _ in range(30):
             before = force
-            force = _film_force(film, path, at_work, reading - give(at_work["machine_compliance"], force))
+            force = _film_force(film, path, at_work, reading - give(at_work["machine_compliance"], force), weight)
             if np.max(np.abs(force - before)) < 1e-10:
                 break
     return _sensed(force, path, at_work)
 
 
-def _film_force(film: Film, path: Path, at_work: Mapping[str, Active], deflection: Array) -> Array:
+def _film_force(
+    film: Film, path: Path, at_work: Mapping[str, Active], deflection: Array, weight: Array | None
+) -> Array:
     """(N,) N on the film whose disc is at ``deflection`` (N,) m, memory and rate included."""
     get = at_work.get
     if lost := get("backlash"):
@@ -333,6 +391,9 @@ def _film_force(film: Film, path: Path, at_work: Mapping[str, Active], deflectio
         # A film left longer hangs slack below its set.
         taut = np.maximum(deflection - left.size * growth(left, deflection, path), 0.0)
         deflection = np.where(deflection > 0, taut, deflection)
+    inner = get("hysteresis")
+    if inner and inner.form == "lead":
+        deflection = np.maximum(deflection + lead(inner, deflection, path), np.minimum(deflection, 0.0))
     slip = None
     if gone := get("clamp_slip"):
         slip = gone.size * growth(gone, deflection, path)
@@ -342,11 +403,13 @@ def _film_force(film: Film, path: Path, at_work: Mapping[str, Active], deflectio
         force = force * softening(soft, deflection, film, path)
     if torn := get("tearing"):
         force = force * (1 - torn.size * growth(torn, deflection, path))
+    if inner and inner.form == "proportional":
+        force = force * (1 + inner.size * rubbed(inner.details["length"] * path.largest, path))
     if warm := get("temperature_step"):
         when, duration = (warm.details[k] * path.time[-1] for k in ("when", "duration"))
         force = force * (1 + warm.size * expit((path.time - when) / duration))
-    if lazy := get("viscoelastic"):
-        force = convolved(lazy, force, path.time)
+    if weight is not None:
+        force = convolved(at_work["viscoelastic"], force, weight)
     if fast := get("rate"):
         force = force * rate_factor(fast, path)
     return force

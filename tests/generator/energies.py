@@ -26,7 +26,8 @@ class Family:
     """One strain energy: its parameters' names, its derivatives, how to draw it and how to weaken it.
 
     derivatives(p, l1, l2) -> Derivatives; draw(rng) -> parameters; toward_neo_hookean(p, a) -> parameters, with a = 1
-    for p itself, a = 0 for the neo-Hookean film of the same modulus and a > 1 for a stronger departure.
+    for p itself, a = 0 for the neo-Hookean film of the same modulus and a > 1 for a stronger departure. ``pure``: the
+    parameters that are numbers; the others grow with the thickness.
     """
 
     name: str
@@ -34,6 +35,11 @@ class Family:
     derivatives: Callable[[Array, Array, Array], Derivatives]
     draw: Callable[[np.random.Generator], Array]
     toward_neo_hookean: Callable[[Array, float], Array]
+    pure: tuple[str, ...] = ()
+
+    def thicker(self, p: Array, times: float) -> Array:
+        """The parameters of a film of the same material, so many times as thick."""
+        return p * np.where([name in self.pure for name in self.parameters], 1.0, times)
 
 
 # ---- from functions of the invariants to functions of the stretches --------------------------------------------------
@@ -270,16 +276,25 @@ FAMILIES: dict[str, Family] = {
             _gent,
             lambda r: np.array([_scale(r), r.uniform(12, 40)]),
             lambda p, a: np.array([p[0], p[1] / a]),
+            ("c2",),
         ),
         Family("yeoh", ("c1", "c2", "c3"), _yeoh, _draw_yeoh, lambda p, a: np.array([p[0], a * p[1], a * p[2]])),
-        Family("ogden", ("c1", "c2", "c3", "a1", "a2", "a3"), _ogden, _draw_ogden, _weaker_ogden),
-        Family("gent_gent", ("c1", "jm", "c2"), _gent_gent, _draw_gent_gent, _weaker_gent_gent),
+        Family(
+            "ogden",
+            ("c1", "c2", "c3", "a1", "a2", "a3"),
+            _ogden,
+            _draw_ogden,
+            _weaker_ogden,
+            ("a1", "a2", "a3"),
+        ),
+        Family("gent_gent", ("c1", "jm", "c2"), _gent_gent, _draw_gent_gent, _weaker_gent_gent, ("jm",)),
         Family(
             "arruda_boyce",
             ("c1", "n"),
             _arruda_boyce,
             lambda r: np.array([_scale(r), 1 / r.uniform(4, 15)]),
             lambda p, a: np.array([p[0], a * p[1]]),
+            ("n",),
         ),
         Family(
             "fung",
@@ -287,8 +302,16 @@ FAMILIES: dict[str, Family] = {
             _fung,
             lambda r: np.array([_scale(r), r.uniform(0.02, 0.08)]),
             lambda p, a: np.array([p[0], a * p[1]]),
+            ("b",),
         ),
-        Family("lopez_pamies", ("c1", "c2", "a1", "a2"), _lopez_pamies, _draw_lopez_pamies, _weaker_lopez_pamies),
+        Family(
+            "lopez_pamies",
+            ("c1", "c2", "a1", "a2"),
+            _lopez_pamies,
+            _draw_lopez_pamies,
+            _weaker_lopez_pamies,
+            ("a1", "a2"),
+        ),
         Family("carroll", ("c1", "c2", "c3"), _carroll, _draw_carroll, _weaker_carroll),
     )
 }

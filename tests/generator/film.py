@@ -194,9 +194,11 @@ def forces(family: Family, p: Array, edges: Edges, deflections: Array, elements:
     return np.array([s.force for s in states(family, p, edges, deflections, elements)])
 
 
-# Dense near zero, where wrinkles and slack begin (m); the second part is solved for those who slip that far.
+# Dense near zero, where wrinkles and slack begin (m); the second part is solved for those who slip that far. These are
+# for a film of this length, and in proportion for others.
+USUAL_SPAN = 0.035 - 0.010
 SLIPS = np.array([0.0, 0.05, 0.1, 0.2, 0.4, 0.7]) * 1e-3, np.array([1.0, 1.3, 1.65, 2.0]) * 1e-3
-SMALL_SLIP, LARGEST_SLIP = float(SLIPS[0][-1]), float(SLIPS[1][-1])
+LARGEST_SLIP = float(SLIPS[1][-1])
 
 
 class Film:
@@ -213,6 +215,7 @@ class Film:
         self.elements, knots = (ELEMENTS // 2, KNOTS // 2) if coarse else (ELEMENTS, KNOTS)
         self.inner, self.outer, self.reach = inner, outer, reach
         self.span = outer - inner
+        self.slips = tuple(self.span / USUAL_SPAN * s for s in SLIPS)
         self.grid = reach * (np.arange(1, knots + 1) / knots) ** 1.2
         self._laws: dict[tuple[float, float], CubicSpline] = {}
         self._tables: dict[tuple[float, bool], RectBivariateSpline] = {}
@@ -223,10 +226,12 @@ class Film:
         size, chord = np.abs(deflection), np.hypot(self.span, deflection)
         if slip is None or not np.any(slip):
             return self._law(prestretch, 0.0)(np.minimum(chord - self.span, self._end())) * deflection / chord
-        if np.max(slip) > LARGEST_SLIP or np.max(size) > self.reach:
+        if np.max(slip) > self.slips[1][-1] or np.max(size) > self.reach:
             raise NoSolutionError("beyond the table")
         excess = chord - self.span - (slip if prestretch == 1 else 0.0)
-        total = self._slipped(prestretch, bool(np.max(slip) > SMALL_SLIP))(np.maximum(excess, 0.0), slip, grid=False)
+        total = self._slipped(prestretch, bool(np.max(slip) > self.slips[0][-1]))(
+            np.maximum(excess, 0.0), slip, grid=False
+        )
         return np.where(excess > 0, total, 0.0) * deflection / chord
 
     def sensitivities(self, deflection: Array) -> Array:
@@ -246,7 +251,7 @@ class Film:
     def _slipped(self, prestretch: float, far: bool) -> RectBivariateSpline:
         """T against excess and slip."""
         if (prestretch, far) not in self._tables:
-            slips = np.concatenate(SLIPS) if far else SLIPS[0]
+            slips = np.concatenate(self.slips) if far else self.slips[0]
             laws = [self._law(prestretch, float(s)) for s in slips]
             knots = laws[0].x
             self._tables[prestretch, far] = RectBivariateSpline(knots, slips, np.stack([g(knots) for g in laws], 1))

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
-from tests.generator.distortions import DISTORTIONS, LIBRARY, Active, response
+from tests.generator.distortions import DISTORTIONS, LIBRARY, USUAL, Active, Scale, response
 from tests.generator.energies import Array
 from tests.generator.film import Film, NoSolutionError, film
 from tests.generator.protocols import Path
@@ -76,19 +76,19 @@ def sized(
     return best[1]
 
 
-def signature(film_: Film, path: Path, kind: str, form: str, size: float | None = None) -> Array:
+def signature(film_: Film, path: Path, kind: str, form: str, scale: Scale = USUAL) -> Array:
     """(N,) N that a distortion of ``kind``, alone, in ``form`` with middling details and of a small size, adds."""
     d = DISTORTIONS[kind]
-    active = Active(d.probe if size is None else size, form, d.middle(form))
+    active = Active(d.probe * scale.of(d.unit), form, d.middle(form))
     return response(film_, path, {kind: active}) - response(film_, path, {})
 
 
-def rivals(film_: Film, path: Path, projector: Projector) -> dict[str, list[Array]]:
+def rivals(film_: Film, path: Path, projector: Projector, scale: Scale = USUAL) -> dict[str, list[Array]]:
     """Unit projected signatures of every effect of the library, one per form; none of those that leave no trace."""
     out: dict[str, list[Array]] = {}
     for kind in LIBRARY:
         for form in DISTORTIONS[kind].forms:
-            raw = signature(film_, path, kind, form)
+            raw = signature(film_, path, kind, form, scale)
             left = projector(raw)
             whole = float(np.linalg.norm(projector.whiten(raw)))
             if whole > 0 and np.linalg.norm(left) > LEAST_VISIBLE * whole:

@@ -15,7 +15,8 @@ class Protocol:
     """A path of straight legs 0 -> peak -> valley -> peak ..., at one speed each; sampled ``points`` times along it.
 
     peaks : m; speeds : m/s, one per peak (its loading and its unloading); points : samples; unload : False ends at the
-    last peak
+    last peak; dwells : s for which the disc stands still at each peak and at each valley; readings : samples of each
+    dwell, beside ``points``
     """
 
     name: str
@@ -23,6 +24,8 @@ class Protocol:
     speeds: tuple[float, ...]
     points: int
     unload: bool = True
+    dwells: tuple[float, float] = (0.0, 0.0)
+    readings: int = 16
 
 
 PROTOCOLS = {
@@ -39,7 +42,10 @@ PROTOCOLS = {
 
 @dataclass(frozen=True)
 class Path:
-    """A sampled protocol; arrays (N,): time s, deflection m, leg (0, 1, ...; even ones load), speed m/s, peak m."""
+    """A sampled protocol; arrays (N,): time s, deflection m, leg (0, 1, ...; even ones load), speed m/s, peak m.
+
+    A dwell belongs to the leg before it, and has its speed.
+    """
 
     time: Array
     deflection: Array
@@ -83,4 +89,24 @@ def sample(protocol: Protocol, rng: np.random.Generator, uneven: bool = False) -
     begun = np.concatenate([[0.0], np.cumsum(lengths / speeds)])
     time = begun[leg] + done / speeds[leg]
     peak = np.maximum(turns, starts)[leg]
-    return Path(time, np.maximum(deflection, 0.0), leg, speeds[leg], peak)
+    path = Path(time, np.maximum(deflection, 0.0), leg, speeds[leg], peak)
+    return _with_dwells(path, protocol, turns, begun[1:]) if max(protocol.dwells) > 0 else path
+
+
+def _with_dwells(path: Path, protocol: Protocol, turns: Array, ends: Array) -> Path:
+    """``path`` with the readings of the dwells put in at its ``turns``, reached at ``ends`` (s) without dwells."""
+    parts, counts, waited = [], [], 0.0
+    for leg, (turn, end) in enumerate(zip(turns, ends, strict=True)):
+        on = path.leg == leg
+        parts.append(np.stack([path.time[on] + waited, path.deflection[on]]))
+        counts.append(np.count_nonzero(on))
+        dwell = protocol.dwells[leg % 2]
+        if dwell > 0:
+            at = end + waited + dwell * np.arange(1, protocol.readings + 1) / (protocol.readings + 1)
+            parts.append(np.stack([at, np.full(at.size, turn)]))
+            counts[-1] += at.size
+            waited += dwell
+    time, deflection = np.concatenate(parts, axis=1)
+    leg = np.repeat(np.arange(turns.size), counts)
+    first = np.searchsorted(path.leg, leg)
+    return Path(time, deflection, leg, path.speed[first], path.peak[first])

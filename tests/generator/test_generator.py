@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from bayesmembrane.data.reading import read_measurement
-from tests.generator.datasets import generate
-from tests.generator.distortions import DISTORTIONS, LIBRARY, OUTSIDE, Active, convolved, give, response
+from tests.generator.datasets import Bench, generate
+from tests.generator.distortions import DISTORTIONS, LIBRARY, OUTSIDE, Active, convolved, give, memory, response
 from tests.generator.energies import DECLARED, FAMILIES, relaxed
 from tests.generator.film import LARGEST_SLIP, Edges, Film, forces
 from tests.generator.noise import Noise
-from tests.generator.protocols import PROTOCOLS, sample
+from tests.generator.protocols import PROTOCOLS, Protocol, sample
+from tests.generator.setups import setup
 
 FOLDER = Path(__file__).parent
 INNER, OUTER = 0.010, 0.035
@@ -183,11 +184,38 @@ def test_protocols_have_the_legs_that_their_names_promise() -> None:
 @pytest.mark.parametrize("rho", [0.0, 0.3, 0.5, 0.8])
 def test_noise_has_the_deviation_and_the_correlation_that_it_claims(rho) -> None:
     noise = Noise(sd=0.004, rho=rho)
-    x = noise.draw(np.random.default_rng(7), 60_000)
+    x = noise.draw(np.random.default_rng(7), np.ones(60_000))
     assert np.std(x) == pytest.approx(0.004, rel=0.03)
     assert np.corrcoef(x[1:], x[:-1])[0, 1] == pytest.approx(rho, abs=0.015)
-    c = noise.covariance(4)
+    c = noise.covariance(np.ones(4))
     np.testing.assert_allclose(c[0], 0.004**2 * rho ** np.arange(4), atol=1e-18)
+
+
+def test_noise_grows_with_the_deflection_where_it_says_so() -> None:
+    noise, at = Noise(sd=0.001, grows=2.0), np.repeat([0.0, 0.04], 30_000)
+    x = noise.draw(np.random.default_rng(8), at)
+    assert np.std(x[:30_000]) == pytest.approx(0.001, rel=0.03)
+    assert np.std(x[30_000:]) == pytest.approx(0.001 * 5**0.5, rel=0.03)
+    np.testing.assert_allclose(np.diag(noise.covariance(at[[0, -1]])), [1e-6, 5e-6], rtol=1e-12)
+    assert Noise(sd=0.002, quantum=0.001, relative=True).at(3.0) == Noise(sd=0.006, quantum=0.003)
+
+
+def test_dwells_are_readings_at_rest_and_nothing_else_is_moved() -> None:
+    plain = Protocol("plain", (0.01, 0.02), (1e-3, 2e-3), 80)
+    held = Protocol("held", (0.01, 0.02), (1e-3, 2e-3), 80, dwells=(30.0, 7.0), readings=20)
+    for uneven in (False, True):
+        before = sample(plain, np.random.default_rng(3), uneven)
+        after = sample(held, np.random.default_rng(3), uneven)
+        assert after.time.size == 80 + 4 * 20
+        assert np.all(np.diff(after.time) > 0)
+        assert np.all(np.diff(after.leg) >= 0)
+        still = np.concatenate([np.flatnonzero(after.leg == leg)[-20:] for leg in range(4)])
+        assert np.array_equal(np.unique(after.deflection[still]), [0.0, 0.01, 0.02])
+        moving = np.setdiff1d(np.arange(after.time.size), still)
+        for name in ("deflection", "leg", "speed", "peak"):
+            np.testing.assert_array_equal(getattr(after, name)[moving], getattr(before, name))
+        waited = after.time[moving] - before.time
+        np.testing.assert_allclose(waited, np.array([0.0, 30.0, 37.0, 67.0])[before.leg], atol=1e-9)
 
 
 def test_quantised_and_uneven_measurements_are_so() -> None:
@@ -274,7 +302,7 @@ def test_the_machine_gives_way_until_it_balances_the_film() -> None:
 def test_relaxation_of_a_steady_pull_is_the_integral_of_its_kernel() -> None:
     time = np.linspace(0, 60, 90)
     active = Active(0.4, "two_times", {"time": 10.0, "ratio": 8.0, "share": 0.6})
-    found = convolved(active, 0.1 * time, time)
+    found = convolved(active, 0.1 * time, memory(active, time))
     lost = time - sum(s * t * -np.expm1(-time / t) for s, t in ((0.6, 10.0), (0.4, 80.0)))
     np.testing.assert_allclose(found, 0.1 * (time - 0.4 * lost), atol=2e-5)
 
@@ -289,6 +317,50 @@ def test_angles_tell_what_a_protocol_can_separate() -> None:
     compliance = generate("machine_compliance", "yeoh", "staircase", seed=4)
     assert not compliance.identifiable
     assert set(compliance.angles["machine_compliance"]) <= set(LIBRARY) - {"machine_compliance"}
+
+
+def test_hysteresis_within_the_material_is_the_same_at_any_speed() -> None:
+    film = generate("null", "gent", seed=5).film
+    slow, quick = (sample(Protocol("p", (0.03, 0.03), (v, v), 300), None) for v in (1e-4, 1e-2))
+    for form in DISTORTIONS["hysteresis"].forms:
+        active = {"hysteresis": Active(0.1, form, DISTORTIONS["hysteresis"].middle(form))}
+        found = response(film, slow, active)
+        np.testing.assert_allclose(found, response(film, quick, active), rtol=1e-12, atol=1e-15)
+        change = found - response(film, slow, {})
+        deep = (slow.deflection > 0.01) & (slow.deflection < 0.02)
+        assert np.all(change[deep & slow.loading] > 0)
+        assert np.all(change[deep & ~slow.loading] < 0)
+
+
+@pytest.mark.parametrize("bench", [Bench(0.005, 0.030, 20e-6), Bench(0.015, 0.060, 200e-6)], ids=["thin", "thick"])
+def test_other_rigs_and_thicknesses_have_faults_of_the_strength_asked_for(bench) -> None:
+    protocol = Protocol("p", tuple((bench.outer - bench.inner) * x for x in (0.6, 1.2, 1.2)), (1e-3,) * 3, 300)
+    kind, strengths = "friction+clamp_slip+force_drift", (1.0, 0.5, 0.2)
+    d = generate(kind, "yeoh", protocol, Noise(0.002, relative=True), strengths, 31, bench)
+    assert d.truth["snr"] == pytest.approx(dict(zip(kind.split("+"), (20.0, 10.0, 4.0), strict=True)), rel=0.05)
+    assert d.truth["reached"]
+    assert d.truth["strength"] == list(strengths)
+    assert d.truth["noise"]["sd"] == pytest.approx(0.002 * np.max(d.null_N), rel=0.01)
+    thin = generate(kind, "yeoh", protocol, Noise(0.002, relative=True), strengths, 31, Bench(bench.inner, bench.outer))
+    np.testing.assert_allclose(d.null_N, thin.null_N * bench.thickness / 50e-6, rtol=1e-9)
+    exact = forces(FAMILIES["yeoh"], d.film.p, Edges(bench.inner, bench.outer, bench.inner, bench.outer), AT[2:5], 80)
+    np.testing.assert_allclose(d.film.force(AT[2:5]), exact, rtol=5e-5)
+
+
+def test_setups_are_drawn_by_their_seed_within_what_they_promise() -> None:
+    for seed in range(60):
+        faults = (("rate",), ("friction", "mullins"), ())[seed % 3]
+        s = setup(faults, seed)
+        assert s == setup(faults, seed)
+        assert 0.005 <= s.bench.inner <= 0.015 < 0.030 <= s.bench.outer <= 0.060
+        assert 20e-6 <= s.bench.thickness <= 200e-6
+        assert 0.9 <= max(s.protocol.peaks) / (s.bench.outer - s.bench.inner) <= 1.7
+        assert max(setup(faults, seed, 0.5).protocol.peaks) == pytest.approx(0.5 * max(s.protocol.peaks))
+        if faults == ("rate",):
+            assert len(set(s.protocol.speeds)) == 2
+            assert max(s.protocol.dwells) == 0
+        if faults:
+            assert len(s.protocol.peaks) > 1
 
 
 def test_a_pair_is_two_faults_of_the_strength_asked_for() -> None:

@@ -1,0 +1,218 @@
+"""`make study-reliability`: are the probabilities of a diagnosis right, and its names; docs/studies/reliability.md.
+
+`make study-second` asks the same of the second generator (`--generator second`), once; docs/studies/second.md.
+Each case is one line of a JSON-lines file, written as soon as it is done; cases that stand there are skipped, so that
+the study can be interrupted and goes on where it was. `--first 0 --count 40 --half calibration --results FILE` runs a
+part and prints a line for each case; `--summary FILE` prints the tables of what is there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import islice, product
+from pathlib import Path
+from typing import Any
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.reading import read_measurement
+from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.ground.errors import BayesmembraneError
+from bayesmembrane.ground.registry import materials
+from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.words.diagnosis import document
+from tests.generator.datasets import Dataset, generate
+from tests.generator.film import NoSolutionError
+from tests.generator_two.datasets import Dataset as SecondDataset
+from tests.generator_two.membrane import LockedError
+from tests.studies import reliability_plan, second_plan
+from tests.studies.loop_intervals import covered
+from tests.studies.reliability_plan import HALVES, Case
+from tests.studies.reliability_rows import Row, answer_row, right_name, spoken_truth, top, truth_row
+from tests.studies.reliability_table import report
+
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "reports" / "study-reliability"
+DECLARED, NONE = "declared", "none"
+ENERGIES = {"declared": (DECLARED,), "none": (NONE,), "both": (DECLARED, NONE)}
+
+
+@dataclass(frozen=True)
+class Source:
+    """A generator with a plan of its own: half, base of the seeds, cases, measurement of a case, and a title."""
+
+    half: str
+    seed: int
+    plan: Callable[[str, int], Iterator[Case]]
+    measured: Callable[[Case], Dataset | SecondDataset]
+    title: str
+
+
+OWN, SECOND = "own", "second"
+SOURCES = {
+    OWN: Source("test", reliability_plan.SEED, reliability_plan.plan, reliability_plan.measured, "Reliability"),
+    SECOND: Source(
+        second_plan.HALF,
+        second_plan.SEED,
+        second_plan.plan,
+        second_plan.measured,
+        "Reliability on the second generator, looked at once",
+    ),
+}
+
+
+def run_case(case: Case, energy: str, source: str, half: str) -> Row:
+    """Everything that the tables need of one case; ``seconds`` are those of the process, for the diagnosis alone."""
+    head = {**asdict(case), "half": half, "energy": energy, "key": key(case, energy)}
+    try:
+        data = SOURCES[source].measured(case)
+    except (NoSolutionError, LockedError) as error:
+        return head | {"skipped": str(error)}
+    head |= truth_row(data.truth, data.identifiable if isinstance(data, Dataset) else None) | {
+        "protocol": data.truth["protocol"]
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        measurement = read_measurement(*data.write(Path(folder)))
+    begun = time.process_time()
+    try:
+        found = diagnosed(measurement, None if energy == NONE else case.material)
+    except BayesmembraneError as error:
+        return head | {"verdict": "error", "effects": [], "sentence": str(error), "probabilities": None}
+    row = head | {"seconds": time.process_time() - begun} | answer_row(document(found))
+    return row | intervals(row, found, measurement, data)
+
+
+def diagnosed(measurement: Measurement, material: str | None) -> Diagnosis:
+    """The answer with an energy declared, or with none."""
+    return diagnose(measurement, None if material is None else Hypothesis(materials()[material]))  # type: ignore[arg-type]
+
+
+def intervals(row: Row, found: Diagnosis, measurement: Measurement, data: Dataset | SecondDataset) -> dict[str, Any]:
+    """Whether the 90 % intervals hold the film that was put in, where the truth is named with its energy."""
+    if not right_name(row) or found.best.hypothesis.material.name != row["family"]:
+        return {}
+    return {"covered": covered(found, found.best, measurement, data)}
+
+
+def key(case: Case, energy: str) -> str:
+    """What makes it the same diagnosis in another run."""
+    return f"{case.key}|{energy}"
+
+
+def warmed() -> None:
+    """What is compiled on first use is no part of a case's time."""
+    data = generate("friction+clamp_slip", "neo_hookean", "two_speeds", seed=1)
+    with tempfile.TemporaryDirectory() as folder:
+        diagnosed(read_measurement(*data.write(Path(folder))), "neo_hookean")
+
+
+def stored(path: Path) -> dict[str, Row]:
+    """Results by key; a line that an interruption cut short is left out."""
+    out = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+        try:
+            row = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        out[row["key"]] = row
+    return out
+
+
+def line_of(row: Row) -> str:
+    """Truth, verdict, effects, most probable sets and seconds of one case."""
+    if "skipped" in row:
+        return f"{row['number']:4d} {row['group']}: skipped, {row['skipped']}"
+    said = "+".join(row["effects"]) or row.get("found_material") or "-"
+    mark = " (not identifiable)" if row["truth"] and row["identifiable"] is False else ""
+    return (
+        f"{row['number']:4d} {row['group']}, {row['material'] if row['energy'] == DECLARED else 'no energy'} declared, "
+        f"{row['protocol']}: {spoken_truth(row)}{mark} -> {row['verdict']} {said} [{top(row)}] "
+        f"{row.get('seconds', 0):.1f} s"
+    )
+
+
+Work = Callable[[tuple[Case, str]], Row]
+
+
+def run(todo: Iterable[tuple[Case, str]], work: Work, path: Path, seconds: float, jobs: int) -> None:
+    """Run the (case, energy) that are not stored yet, until ``seconds`` have passed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    done = stored(path)
+    rest = [(case, energy) for case, energy in todo if key(case, energy) not in done]
+    if not rest:
+        return
+    with path.open("a", encoding="utf-8") as file:
+        for row in _results(rest, work, seconds, jobs):
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            print(line_of(row), flush=True)
+
+
+def _results(rest: list[tuple[Case, str]], work: Work, seconds: float, jobs: int) -> Iterator[Row]:
+    if jobs == 1:
+        warmed()
+        end = time.monotonic() + seconds
+        for item in rest:
+            if time.monotonic() > end:
+                return
+            yield work(item)
+        return
+    with ProcessPoolExecutor(jobs, initializer=warmed) as pool:
+        # A few at a time: what has begun is finished, and nothing more is begun after the end.
+        items, end = iter(rest), time.monotonic() + seconds
+        while time.monotonic() < end and (some := list(islice(items, 8 * jobs))):
+            yield from pool.map(work, some)
+
+
+def _one(item: tuple[Case, str], source: str, half: str) -> Row:
+    return run_case(*item, source, half)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run, and write or print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--generator", choices=tuple(SOURCES), default=OWN, help="the second one is for the end")
+    parser.add_argument("--half", choices=tuple(HALVES), default=None, help="of the own generator; test by default")
+    parser.add_argument("--energy", choices=tuple(ENERGIES), default=DECLARED, help="what is declared")
+    parser.add_argument("--first", type=int, default=0, help="number of the first case")
+    parser.add_argument("--count", type=int, default=None, help="so many cases; all that follow by default")
+    parser.add_argument("--seed", type=int, default=None, help="base of the seeds, an even number")
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="begin no case after this time")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--results", type=Path, default=None, help="JSON lines, one a case")
+    parser.add_argument("--table", type=Path, default=None, help="Markdown; printed only, if not given")
+    parser.add_argument("--summary", type=Path, default=None, help="print the tables of these results, run nothing")
+    asked = parser.parse_args(arguments)
+    if asked.summary is not None:
+        print(report(list(stored(asked.summary).values()), f"--summary {asked.summary}"))
+        return 0
+    source = SOURCES[asked.generator]
+    half, seed = asked.half or source.half, source.seed if asked.seed is None else asked.seed
+    results = asked.results or RESULTS / f"{half}.jsonl"
+    end = None if asked.count is None else asked.first + asked.count
+    cases = list(islice(source.plan(half, seed), asked.first, end))
+    todo = list(product(cases, ENERGIES[asked.energy]))
+    run(todo, partial(_one, source=asked.generator, half=half), results, asked.seconds, asked.jobs)
+    have = stored(results)
+    rows = [have[key(*item)] for item in todo if key(*item) in have]
+    told = "" if asked.count is None else f" --first {asked.first} --count {asked.count}"
+    which = f"--generator {SECOND}" if asked.generator == SECOND else f"--half {half}"
+    what = f"{which} --energy {asked.energy} --seed {seed}{told}"
+    text = report(rows, f"python -m tests.studies.reliability {what}", len(todo), source.title)
+    if asked.table is not None:
+        asked.table.parent.mkdir(parents=True, exist_ok=True)
+        asked.table.write_text(text, encoding="utf-8")
+    print(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
