@@ -81,9 +81,9 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
         noise=search.noise,
         power=smallest_sizes(case.signatures, case.detection.score.critical),
         absorbed=tuple(e.name for e in absorbed(case.measurement, null.hypothesis)),
-        before=misfit_of(null.residual, sd, null.x.size),
-        after=misfit_of(best.residual, sd, best.x.size),
-        shape=residual_shape(case.measurement, null.residual),
+        before=misfit_of(search.adapted(null), sd, null.x.size),
+        after=misfit_of(search.adapted(best), sd, best.x.size),
+        shape=residual_shape(case.measurement, search.adapted(null)),
         validation=validation,
         experiments=_experiments(search, found),
     )

@@ -110,6 +110,8 @@ class SearchThresholds:
     """Times the least sum of squares: a search as far behind is not waited for."""
     at_bound: float = 1e-3
     """Of the width of the bounds: an estimate as near lies at its bound."""
+    rank: float = 1e-7
+    """Of the largest singular value: coordinates along directions below it stay where they are."""
     spare_points: int = 3
     """Points beyond the parameters, at least: fewer tell no misfit from noise."""
     better_null: float = 1.0

@@ -24,6 +24,8 @@ from typing import Any
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.explanation.case import Question
+from bayesmembrane.diagnosis.explanation.total import set_name
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.errors import BayesmembraneError
 from bayesmembrane.ground.registry import materials
@@ -86,13 +88,23 @@ def run_case(case: Case, energy: str, source: str, half: str) -> Row:
         found = diagnosed(measurement, None if energy == NONE else case.material)
     except BayesmembraneError as error:
         return head | {"verdict": "error", "effects": [], "sentence": str(error), "probabilities": None}
-    row = head | {"seconds": time.process_time() - begun} | answer_row(document(found))
+    row = head | {"seconds": time.process_time() - begun} | answer_row(document(found)) | {"terms": terms(found)}
     return row | intervals(row, found, measurement, data)
 
 
 def diagnosed(measurement: Measurement, material: str | None) -> Diagnosis:
     """The answer with an energy declared, or with none."""
-    return diagnose(measurement, None if material is None else Hypothesis(materials()[material]))  # type: ignore[arg-type]
+    asked = Hypothesis(materials()[material or min(materials())])
+    return diagnose(measurement, Question(asked, declared=material is not None))
+
+
+def terms(found: Diagnosis) -> list[tuple[str, str, float]]:
+    """(energy, set of effects, ln Z) of every hypothesis: enough to weigh them by other beliefs."""
+    given = found.null.names
+    return [
+        (j.candidate.hypothesis.material.name, set_name(j.candidate, given), round(j.log_evidence, 3))
+        for j in found.ranking
+    ]
 
 
 def intervals(row: Row, found: Diagnosis, measurement: Measurement, data: Dataset | SecondDataset) -> dict[str, Any]:

@@ -114,6 +114,15 @@ class Search:
         data = self.noise.white(candidate.residual) + own @ (u / spread)
         return Linear(data, (Block(own), *self._forms(candidate)), self.scale_sd)
 
+    def adapted(self, candidate: Candidate) -> Array:
+        """(N,) N: the residual once the coordinates have taken what they can of it, to first order, without form error.
+
+        By least squares: what a user would call the best fit of this model.
+        """
+        white = self.noise.white(np.column_stack([candidate.slopes, candidate.residual]))
+        taken = np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=SEARCH.rank)[0]
+        return np.asarray(candidate.residual - candidate.slopes @ taken)
+
     def steepness(self, candidate: Candidate) -> Array:
         """(k,) dx over the coefficients of `linear`."""
         axes = standard(candidate.hypothesis, self.measurement)

@@ -13,10 +13,13 @@ class Beliefs:
     How large the error of forms may be stands in `physics.form_error`.
     """
 
-    effects: tuple[float, ...] = (0.45, 0.45, 0.08, 0.02)
+    effects: tuple[float, ...] = (0.40, 0.40, 0.15, 0.05)
     """Of none, one, two and three effects beyond those given; sets of one size are equally probable."""
     foreign: float = 0.15
     """Of something that no effect of the library describes, on top of whatever else is at work."""
+    supported: float = 1.0
+    """ln of the Bayes factor that a further effect needs to count as seen: below it, the set counts as the one without
+    it."""
     declared: float = 0.5
     """Of the energy that was declared; the others share the rest. Without one, all are equally probable."""
 

@@ -74,7 +74,7 @@ class Total:
 
 def set_name(candidate: Candidate, given: Sequence[str]) -> str:
     """The effects of a candidate beyond those given, in alphabetical order, joined by "+"."""
-    return "+".join(sorted(set(candidate.names) - set(given))) or NOTHING
+    return _joined(frozenset(candidate.names) - set(given))
 
 
 def summed(grown: Grown) -> Total:
@@ -118,11 +118,35 @@ def _normalised(log_weights: Array) -> Array:
 
 def _added_up(terms: Sequence[tuple[Candidate, str, float]], p: Array, given: Sequence[str]) -> Probabilities:
     effects, energies, kinds = (defaultdict[str, float](float) for _ in range(3))
+    owners = _owners([c for c, kind, _ in terms if kind == NOTHING], given)
     for (c, kind, _), q in zip(terms, p, strict=True):
-        effects[set_name(c, given)] += float(q)
+        effects[owners[set_name(c, given)]] += float(q)
         energies[c.hypothesis.material.name] += float(q)
         kinds[kind] += float(q)
     return Probabilities(*(dict(sorted(d.items(), key=lambda i: -i[1])) for d in (effects, energies, kinds)))
+
+
+def _owners(every: Sequence[Candidate], given: Sequence[str]) -> dict[str, str]:
+    """{set of effects: the part of it that the data speak for}.
+
+    A further effect that the data do not support is not seen to be there, nor seen to be absent: such a set says no
+    more than the set without it.
+    """
+    support: dict[frozenset[str], float] = {}
+    for c in every:
+        own = frozenset(c.names) - set(given)
+        support[own] = max(support.get(own, -np.inf), c.log_evidence)
+    out: dict[frozenset[str], frozenset[str]] = {}
+    for own in sorted(support, key=len):
+        smaller = [own - {e} for e in own if own - {e} in support]
+        best = max(smaller, key=lambda s: support[s], default=None)
+        idle = best is not None and support[best] > support[own] - BELIEFS.supported
+        out[own] = out[best] if idle and best is not None else own
+    return {_joined(own): _joined(owner) for own, owner in out.items()}
+
+
+def _joined(names: frozenset[str]) -> str:
+    return "+".join(sorted(names)) or NOTHING
 
 
 def _judged(grown: Grown, c: Candidate, probability: float) -> Judged:
@@ -140,5 +164,5 @@ def _judged(grown: Grown, c: Candidate, probability: float) -> Judged:
 
 def _excess(grown: Grown, c: Candidate) -> float:
     """Squares beyond those of noise, over its variance; 0 or more."""
-    white = grown.search.noise.white(c.residual)
+    white = grown.search.noise.white(grown.search.adapted(c))
     return max(float(white @ white) - (c.residual.size - c.x.size), 0.0)

@@ -95,7 +95,9 @@ def _first_order(case: OpenCase) -> Probabilities:
     none = float(np.logaddexp.reduce(list(log_energy.values())))
     sets = {NOTHING: BELIEFS.log_set(0, len(visible))}
     for e in visible:
-        sets[e.name] = BELIEFS.log_set(1, len(visible)) + first_order(case.search, case.null, e)
+        gain = first_order(case.search, case.null, e)
+        if gain > BELIEFS.supported:
+            sets[e.name] = BELIEFS.log_set(1, len(visible)) + gain
     return Probabilities(_shares(sets), _shares({n: w - none for n, w in log_energy.items()}), {NOTHING: 1.0})
 
 
