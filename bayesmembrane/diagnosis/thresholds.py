@@ -222,6 +222,8 @@ class VerdictThresholds:
     """Of an ambiguous answer; if more are needed, nothing can be told."""
     carried: float = 0.05
     """Relative error of an energy from which on none of those known is said to hold."""
+    law_carried: float = 0.6
+    """Relative error of a law from which on the effect is no longer the one that the library means."""
     least_coverage: float = 0.45
     """Of held-out points inside the 90 % band: a model that covers fewer predicts nothing, and is not named."""
 

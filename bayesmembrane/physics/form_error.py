@@ -23,9 +23,9 @@ from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.physics.forward import Forward
 
 ENERGY = Parameter(
-    "ln_eta", "-", "log of the relative error of the energy's form", Normal(float(np.log(3e-3)), 1.5), (-12.0, 0.0)
+    "ln_eta", "-", "log of the relative error of the energy's form", Normal(float(np.log(2e-3)), 1.0), (-12.0, 0.0)
 )
-"""eta_a: half of the prior lies below 0.3 %, 95 % within 0.015 % to 6 %."""
+"""eta_a: half of the prior lies below 0.2 %, 95 % within 0.03 % to 1.5 %."""
 
 LAW = Parameter(
     "ln_eta_law", "-", "log of the relative error of an effect's law", Normal(float(np.log(0.05)), 1.0), (-9.0, 0.7)

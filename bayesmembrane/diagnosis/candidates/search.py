@@ -94,7 +94,7 @@ class Search:
         objective = Objective(found.hypothesis, self.measurement, "euclidean", self.quick)
         axes = standard(found.hypothesis, self.measurement)
         u, size = self._descended(
-            objective, axes, self._freeing(found), axes.to_u(found.x)[None, :], SEARCH.last_iterations
+            objective, axes, self._freeing(found, False), axes.to_u(found.x)[None, :], SEARCH.last_iterations
         )
         if not np.isfinite(size[0]):
             return found
@@ -151,12 +151,14 @@ class Search:
                 out.append(Block(self.noise.white(trace[:, None] * self.factors.progress), _moments(LAW)))
         return out
 
-    def _freeing(self, parent: Candidate | None) -> Freeing:
+    def _freeing(self, parent: Candidate | None, capped: bool = True) -> Freeing:
         if parent is None:
             force = np.abs(self.measurement.force)[:, None]
             columns = float(np.exp(_moments(ENERGY)[0])) * self.noise.white(force * self.factors.state)
         else:
-            eta = np.exp(parent.theta[1:])
+            # A poor parent's form error is large, and would take what the coordinates are to explain.
+            usual = np.array([b.ln_eta[0] for b in self._forms(parent) if b.ln_eta is not None])
+            eta = np.exp(np.minimum(parent.theta[1:], usual) if capped else parent.theta[1:])
             columns = np.column_stack([e * b.columns for e, b in zip(eta, self._forms(parent), strict=True)])
         q, s, _ = np.linalg.svd(columns, full_matrices=False)
         keep = s > SEARCH.least_form

@@ -73,7 +73,8 @@ class Shape:
             case Normal(mean, sd):
                 return np.asarray((x - mean) / sd)
             case LogNormal(median, spread):
-                return np.asarray(np.log(x / median) / spread)
+                with np.errstate(divide="ignore"):  # a bound at zero is far away
+                    return np.asarray(np.log(x / median) / spread)
             case HalfNormal(scale, origin):
                 return np.asarray((x - origin) / scale)
             case Uniform(low, high):

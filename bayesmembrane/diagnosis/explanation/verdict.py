@@ -54,8 +54,16 @@ def decided(case: OpenCase, total: Total) -> Verdict:
     names = {set_name(m.candidate, given) for m in members}
     if names == {NOTHING}:
         return _without_effects(case, total, members)
+    if any(_carried(m.candidate) for m in members):
+        return Verdict("unknown", (), total.ranking, p)
     verdict = "named" if len(members) == 1 else "ambiguous"
     return Verdict(verdict, members, total.ranking, p)
+
+
+def _carried(candidate: Candidate) -> bool:
+    """True if it is not the effects that explain the curve, but errors of their laws or of the energy."""
+    law = max(candidate.law_errors.values(), default=0.0)
+    return candidate.energy_error > VERDICT.carried or law > VERDICT.law_carried
 
 
 def _smallest(total: Total, given: tuple[str, ...]) -> tuple[Judged, ...] | None:
