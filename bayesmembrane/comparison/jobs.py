@@ -12,7 +12,7 @@ import numpy as np
 
 from bayesmembrane.calibration.fingerprint import code_of
 from bayesmembrane.calibration.posterior import Posterior
-from bayesmembrane.calibration.prior import DRAWS, Mass
+from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.run import Run, RunSettings, load_run, sample
 from bayesmembrane.calibration.sampling.walk import Progress, Settings
 from bayesmembrane.calibration.starts import starting_points
@@ -142,14 +142,8 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
 
 
 def _mass(posterior: Posterior, seed: int) -> Mass:
-    """The part of the prior that its own convexity mode leaves; as `JointPrior.survey`, without what it says of others.
-
-    None of n draws inside is a mass of zero, with the error of one draw.
-    """
-    x = posterior.prior.draw(np.random.default_rng(seed), DRAWS)
-    hits = int(np.count_nonzero(posterior.log_prior(x) > -np.inf))
-    part = hits / DRAWS
-    return Mass(part, float(np.sqrt(part * (1 - part) / DRAWS)) if hits else 1 / DRAWS)
+    """The part of the prior that its own convexity mode leaves; none of the points inside is a mass of zero."""
+    return posterior.prior.mass(lambda x: posterior.log_prior(x) > -np.inf, seed)
 
 
 def _no_mass(hypothesis: Hypothesis) -> str:
