@@ -64,6 +64,11 @@ class Evidence:
         return float(np.hypot(self.log_evidence_sd[NESTED], self.log_evidence_sd[BRIDGE]))
 
     @property
+    def most(self) -> float:
+        """The largest ln Z that either estimator leaves open, by five standard errors and the modes missed."""
+        return max(z + 5 * self.log_evidence_sd[name] for name, z in self.log_evidence.items()) + self.missed
+
+    @property
     def best(self) -> tuple[float, float]:
         """(ln Z, its standard error): the mean with weights 1 / sd^2, its error no less than the smaller one.
 
