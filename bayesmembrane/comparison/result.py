@@ -49,7 +49,6 @@ class Row:
     rest: LeaveRangeOut | None = None
     prior_mass: Mass | None = None
     posterior_probability: float | None = None
-    posterior_probability_sd: float | None = None
     widths: tuple[Widened, ...] = ()
     modes: tuple[ByMode, ...] = ()
     run: Path | None = None
@@ -57,6 +56,7 @@ class Row:
     seconds: float = 0.0
     quality: Quality | None = None
     failure: str = ""
+    posterior_probability_sd: float | None = None
 
     @property
     def fitted(self) -> bool:

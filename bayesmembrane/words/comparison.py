@@ -175,8 +175,8 @@ def covered(found: Comparison) -> str:
     least = min(known, key=lambda c: c.points)
     return (
         f"Modes were searched for from {least.points} points that fill the prior of each hypothesis, independent of "
-        f"its draws, with {min(c.ascents for c in known)} ascents at least: one that is higher than its surroundings on "
-        f"{100 * least.volume:.2g} % of the prior would have been met with 99 % probability, a smaller one perhaps not."
+        f"its draws, with {min(c.ascents for c in known)} ascents at least: one that is higher than its surroundings "
+        f"on {100 * least.volume:.2g} % of the prior would have been met with 99 %, a smaller one perhaps not."
     )
 
 

@@ -27,7 +27,7 @@ ROUNDS, EACH, LAST = 3, 256, 1024  # of importance sampling around each mode, an
 CLOUD = 512  # draws that tell others where a mode is
 DEGREES, WIDER = 4.0, 1.2
 MODES, LEAST = 6, 16.0  # most modes that are kept, and how much less in ln mass than the first they may hold
-SURE_SD, LEAST_GAP = 0.3, 0.1  # of ln Z, for a mode to count as missed
+SIGMAS, LEAST_GAP, LARGEST_SHARE = 4.0, 0.2, 0.05  # for a mode to count as missed: of ln Z, and of the largest weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +38,7 @@ class Modes:
     log_masses : ln of the part of Z that is around each
     log_total, sd : ln of their sum by importance sampling, and its standard error: if that is small, Z is no
         smaller
+    largest : share of the largest weight in that sum
     """
 
     clouds: tuple[Array, ...]
@@ -45,6 +46,7 @@ class Modes:
     log_total: float
     sd: float
     coverage: Coverage
+    largest: float = 1.0
 
     @property
     def weights(self) -> Array:
@@ -58,10 +60,11 @@ class Modes:
     def beyond(self, log_evidence: float, sd: float) -> float:
         """By how much ln Z is larger at least than ``log_evidence``, which knows of fewer modes; 0 if it need not be.
 
-        Three standard errors are no proof, and neither is a sum over weights that rest on a few draws.
+        A few standard errors are no proof, and neither is a sum over weights that rest on a few draws.
         """
         gap = self.log_total - log_evidence
-        return gap if self.sd < SURE_SD and gap > max(3 * float(np.hypot(self.sd, sd)), LEAST_GAP) else 0.0
+        sure = self.largest < LARGEST_SHARE and gap > max(SIGMAS * float(np.hypot(self.sd, sd)), LEAST_GAP)
+        return gap if sure else 0.0
 
 
 def search(problem: Problem, rng: np.random.Generator) -> Modes:
@@ -266,7 +269,7 @@ def _weighed(problem: Problem, fitted: list[Mixture], rng: np.random.Generator, 
             masses.append(float(np.log(np.mean(own)) + np.max(log_weight)))
     total = float(np.log(np.mean(w)) + np.max(log_weight))
     sd = float(np.std(w) / np.mean(w) / np.sqrt(len(w)))
-    return Modes(tuple(clouds), tuple(masses), total, sd, coverage)
+    return Modes(tuple(clouds), tuple(masses), total, sd, coverage, float(np.max(w) / np.sum(w)))
 
 
 def _in_x(problem: Problem, v: Array) -> Array:
