@@ -22,11 +22,13 @@ _EVIDENCE = (
     Column("bridge", "ln Z, bridge", ".2f"),
     Column("bridge_sd", "+-", ".2f"),
     Column("probability", "posterior probability", "p"),
+    Column("probability_sd", "+-", "p"),
     Column("elpd_loo", "elpd, leave one out", ".1f"),
     Column("loo_se", "+-", ".1f"),
     Column("refits", "refits", ".0f"),
     Column("held_rmse", "rms error of the rest (N)", ".3g"),
     Column("mass", "prior mass", ".3f"),
+    Column("mass_sd", "+-", ".3f"),
     Column("reason", "remark"),
 )
 
@@ -52,11 +54,13 @@ def _evidence(name: str, row: Row) -> tuple[Value, ...]:
         e.log_evidence[BRIDGE] if e else None,
         e.log_evidence_sd[BRIDGE] if e else None,
         row.posterior_probability,
+        row.posterior_probability_sd,
         loo.elpd if loo else None,
         loo.se if loo else None,
         len(loo.refitted) if loo else None,
         row.rest.rmse_N if row.rest else None,
         row.prior_mass.value if row.prior_mass else None,
+        row.prior_mass.sd if row.prior_mass else None,
         remark(row) or "-",
     )
 
