@@ -54,7 +54,7 @@ class Search:
         """
 
         def quick(asked: Request) -> Curves:
-            return self.solve(replace(asked, solver="ritz_alone"))
+            return api.unaided(asked, self.solve)
 
         exact = Objective(hypothesis, self.measurement, "euclidean", self.solve)
         x, size = self._descended(Objective(hypothesis, self.measurement, "euclidean", quick), np.array(starts))
