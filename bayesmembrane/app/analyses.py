@@ -15,7 +15,7 @@ from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.calibration.fingerprint import fingerprint
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.calibration.fit import fit as run_fit
-from bayesmembrane.calibration.predictions import Wanted
+from bayesmembrane.calibration.predictions import Wanted, rest_of
 from bayesmembrane.calibration.run import Run, RunSettings, predictions_of
 from bayesmembrane.calibration.run import sample as run_sample
 from bayesmembrane.calibration.sampling.walk import Progress
@@ -109,17 +109,10 @@ def sample(
     solve = work.solve
     how = RunSettings(work.seed, work.out, name, work.ess, predictions=False)
     run = run_sample(measurement, claim, how, progress=tell, solve=solve)
-    rest = _rest(measurement, whole)
-    if run.path is not None and not run.interrupted:
+    rest = rest_of(measurement, whole)
+    if run.path is not None:  # of an interrupted run, too: a report shows what there is, and solves nothing
         predictions_of(run, Wanted(rest=rest, breaks=tuple(breaks)) if breaks or rest is not None else None, solve)
     return Answer(run, {**document(run), "stored": None if run.path is None else str(run.path)})
-
-
-def _rest(measurement: Measurement, whole: Measurement | None) -> Measurement | None:
-    """The points of ``whole`` beyond the end of ``measurement``; None if there are none."""
-    if whole is None or not whole.deflection.max() > measurement.deflection.max():
-        return None
-    return whole.select(whole.deflection > measurement.deflection.max())
 
 
 def compare(
