@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from bayesmembrane.diagnosis.loop import loop as run_loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.jobs import Tell, silent
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -152,7 +154,7 @@ def valleys_with_draws(
 def diagnose(measurement: Measurement, claim: Hypothesis, work: Work) -> Answer[Diagnosis]:
     """Whether the hypothesis misses something, and what."""
     found = run_diagnose(measurement, claim, seed=work.seed, tell=lambda text: work.tell(claim.label(), text))
-    what = asked("diagnose", run_diagnose, [measurement], [claim], {"seed": work.seed})
+    what = asked("diagnose", run_diagnose, [measurement], [claim], {"seed": work.seed}, library())
     return kept("diagnosis", found, document(found), what, work.out)
 
 
@@ -168,8 +170,13 @@ def loop(
     how = LoopSettings(work.seed, runs or work.out, work.ess, adapt_noise)
     found = run_loop(measurement, claim, how, tell=lambda text: work.tell(claim.label(), text))
     settings = {"seed": work.seed, "ess": work.ess, "adapt_noise": adapt_noise}
-    what = asked("loop", run_loop, [measurement], [claim], settings)
+    what = asked("loop", run_loop, [measurement], [claim], settings, library())
     return kept("loop", found, document(found), what, work.out)
+
+
+def library() -> list[type[Any]]:
+    """Every effect and every material: what a search for something missing may try, and thus depends on."""
+    return [*components("effects").values(), *materials().values()]
 
 
 def _mark(draws: Array) -> str:
