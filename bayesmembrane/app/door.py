@@ -12,7 +12,7 @@ from typing import Any
 from bayesmembrane.app import analyses, documents
 from bayesmembrane.app.folders import lying
 from bayesmembrane.calibration.fit import Fit
-from bayesmembrane.calibration.run import Run
+from bayesmembrane.calibration.run import Run, predictions_of
 from bayesmembrane.comparison.compare import Range
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement
@@ -23,6 +23,7 @@ from bayesmembrane.physics import hypothesis as hypotheses
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.report.page import write_report
+from bayesmembrane.report.runs import read as read_run
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
 
@@ -142,9 +143,10 @@ def reconstruct(*, seed: int = 0, out: Folder | None = None) -> Reconstruction:
 def report(*shown: Any, out: Folder, title: str | None = None) -> Path:
     """Write ``out/index.html`` about results, and about all that lies in folders, and return its path.
 
-    Raises `SettingsError` if there is nothing to show, `StorageError` for a folder that holds nothing.
+    A stored answer that cannot be read is left out with a warning. Raises `SettingsError` if there is nothing to show,
+    `StorageError` for a folder that holds nothing.
     """
-    return write_report(shown, Path(out), title)
+    return write_report([_predicted(result) for result in shown], Path(out), title)
 
 
 def load(folder: Folder) -> Any:
@@ -159,6 +161,11 @@ def load(folder: Folder) -> Any:
 def as_dict(result: Any) -> dict[str, Any]:
     """A result as plain values, the ones that ``--json`` prints: for JSON, pandas or a notebook of one's own."""
     return documents.document(result)
+
+
+def _predicted(result: Any) -> Any:
+    """A run with its predictions, which are made here where none are stored; any other result as it is."""
+    return read_run(result, predictions_of(result)) if isinstance(result, Run) else result
 
 
 def _work(seed: int, out: Folder | None, ess: float = 1000.0) -> analyses.Work:

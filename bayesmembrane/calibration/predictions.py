@@ -49,6 +49,14 @@ class Wanted:
     draws: int = DRAWS
 
 
+def rest_of(measurement: Measurement, whole: Measurement | None) -> Measurement | None:
+    """The points of ``whole`` beyond the end of ``measurement``; None if there are none."""
+    end = float(measurement.deflection.max())
+    if whole is None or not whole.deflection.max() > end:
+        return None
+    return whole.select(whole.deflection > end)
+
+
 @dataclass(frozen=True, eq=False)
 class Predictions:
     """A run in numbers that can be drawn. SI units; Q stands for 5, 50 and 95 %.

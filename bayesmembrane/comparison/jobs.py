@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from bayesmembrane.calibration.fingerprint import code_of
 from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.predictions import Wanted, rest_of
 from bayesmembrane.calibration.prior import Mass
-from bayesmembrane.calibration.run import Run, RunSettings, load_run, sample
+from bayesmembrane.calibration.run import Run, RunSettings, load_run, predictions_of, sample, stored_predictions
 from bayesmembrane.calibration.sampling.walk import Progress, Settings
 from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.calibration.store import describe, run_name
@@ -96,7 +97,9 @@ def judge(job: Job, tell: Tell) -> Row:
         mass = _mass(posterior, job.judging.seed)
         if mass.value == 0.0:
             raise SettingsError(_no_mass(job.hypothesis))
-        return _row(job, posterior, mass, _run(job, tell), tell)
+        run = _run(job, tell)
+        _predict(job, run, tell)
+        return _row(job, posterior, mass, run, tell)
     except (SettingsError, DataError) as error:
         return Row(job.label, job.hypothesis, prior_mass=mass, failure=str(error))
 
@@ -186,6 +189,13 @@ def _run(job: Job, tell: Tell) -> Run:
     if run.interrupted:
         raise KeyboardInterrupt
     return run
+
+
+def _predict(job: Job, run: Run, tell: Tell) -> None:
+    """Store what a report will show of a run, unless that is there."""
+    if run.path is not None and stored_predictions(run) is None:
+        tell(job.label, "predictions")
+        predictions_of(run, Wanted(rest=rest_of(job.measurement, job.whole)))
 
 
 def _bridged(posterior: Posterior, run: Run, seed: int) -> EvidenceEstimate:

@@ -112,7 +112,7 @@ class Hypothesis:
             "material": self.material.name,
             "effects": [e.name for e in self.effects],
             "noise": self.noise.name,
-            "extra_noise": getattr(self.noise, "extra", True),
+            "extra_noise": self.noise.inferred,
             "convexity": self.convexity.name,
         }
 
@@ -126,14 +126,10 @@ def hypothesis(
 ) -> Hypothesis:
     """The hypothesis made of components by name; raises `SettingsError` for a name that nobody declared.
 
-    ``extra_noise`` False keeps to the noise that the measurement states; only white noise can do without.
+    ``extra_noise`` False keeps to the noise that the measurement states, where the noise model can do without its own.
     """
     model = component("noise", noise)
-    if not extra_noise and not hasattr(model, "extra"):
-        raise SettingsError(
-            f'the noise model "{noise}" always infers a part of the noise', remedy='use "white" to do without'
-        )
-    instance = model() if extra_noise else model(extra=False)
+    instance = model() if extra_noise else model.stated_only()
     return Hypothesis(
         material(material_name), tuple(component("effects", e)() for e in effects), instance, mode(convexity)
     )

@@ -13,7 +13,7 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import FAILURES
 from bayesmembrane.calibration.predictions import Predictions
-from bayesmembrane.calibration.run import Run, load_run, predictions_of
+from bayesmembrane.calibration.run import Run, load_run, stored_predictions
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
@@ -205,21 +205,40 @@ MOST_TRACED, MOST_REPLICAS = 300, 1000  # draws of an ensemble in a trace, new r
 _SHOWN_APART = ("hypothesis", "sampling", "data", "code", "versions", "seed", "fingerprint")
 
 
-def read(run: Run | Path | str) -> Shown:
-    """A run, or the folder that holds one, as a report shows it.
+def read(run: Run | Path | str, predictions: Predictions | None = None) -> Shown:
+    """A run, or the folder that holds one, as a report shows it; ``predictions`` are those stored with it unless given.
 
-    Of a run that was interrupted before its predictions were stored they are made here, once; of a run that is not
-    stored itself, every time. Raises `StorageError` if the folder holds no run.
+    Raises `StorageError` if the folder holds no run, a damaged one, or one without predictions: none are made here.
     """
     if not isinstance(run, Run):
         folder = Path(run)
         if not folder.is_dir():
             raise StorageError("there is no such run folder", str(folder), "name a folder under chains/")
         run = load_run(folder)
+    try:
+        found = predictions or stored_predictions(run)
+        if found is not None:
+            return _shown(run, found)
+    except (KeyError, AttributeError) as error:
+        raise StorageError(
+            f"another version wrote the run ({type(error).__name__}: {error})", _place(run), "sample again"
+        ) from None
+    raise StorageError(
+        "no predictions are stored with the run, and a report solves no films",
+        _place(run),
+        "ask for the same again (sample, compare or loop), which keeps the draws and predicts from them",
+    )
+
+
+def _place(run: Run) -> str:
+    return run.name if run.path is None else str(run.path)
+
+
+def _shown(run: Run, found: Predictions) -> Shown:
     m, h = run.measurement, run.hypothesis
     p = m.provenance
     return Shown(
-        folder=run.name if run.path is None else str(run.path),
+        folder=_place(run),
         hypothesis=h,
         film=ShownFilm(
             m.specimen.name,
@@ -230,7 +249,7 @@ def read(run: Run | Path | str) -> Shown:
             p.notes,
         ),
         data_hash=m.data_hash,
-        digest=predictions_of(run),
+        digest=found,
         x=run.draws(),
         natural=_stacked(run.data.posterior, h.natural_names),
         prior=_stacked(run.data.prior, h.names) if "prior" in run.data.groups() else np.empty((0, len(h.names))),

@@ -64,7 +64,7 @@ class Search:
 
     def quick(self, asked: Request) -> Curves:
         """The solver without its last resort: films that only shooting resolves cost a hundred times as much."""
-        return self.solve(replace(asked, solver="ritz_alone"))
+        return api.unaided(asked, self.solve)
 
     def material_starts(self, hypothesis: Hypothesis) -> list[Array]:
         """Starts (k,) from draws of the material's prior brought to their best modulus, without any effect.

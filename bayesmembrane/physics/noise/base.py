@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array, Natural, Normal, Parameter
 
 MEDIAN_SHARE, SPREAD = 3e-3, 2.0
@@ -94,6 +95,18 @@ class Noise(ABC):
     @abstractmethod
     def natural(self, x: Array, scale: float) -> Array:
         """The ``natural_parameters`` (B, n) of coordinates x (B, k), with the largest force ``scale`` in N."""
+
+    @property
+    def inferred(self) -> bool:
+        """Whether a part of the noise is inferred, on top of what the measurement states."""
+        return True
+
+    @classmethod
+    def stated_only(cls) -> Noise:
+        """The model with nothing inferred; raises `SettingsError` if it cannot do without, as most cannot."""
+        raise SettingsError(
+            f'the noise model "{cls.name}" always infers a part of the noise', remedy='use "white" to do without'
+        )
 
     @abstractmethod
     def bind(self, measurement: Measurement) -> NoiseLikelihood:

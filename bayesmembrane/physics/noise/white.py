@@ -33,6 +33,14 @@ class White(Noise):
     def natural(self, x: Array, scale: float) -> Array:
         return np.exp(x) * scale
 
+    @property
+    def inferred(self) -> bool:
+        return self.extra
+
+    @classmethod
+    def stated_only(cls) -> White:
+        return cls(extra=False)
+
     def bind(self, measurement: Measurement) -> WhiteLikelihood:
         if not self.extra and measurement.force_sd is None:
             raise SettingsError(

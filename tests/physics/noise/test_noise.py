@@ -148,3 +148,22 @@ def test_a_filter_of_readings_is_found_where_the_speed_changes() -> None:
     values, others = (b.log_likelihood(np.tile(r, (101, 1)), x) for b in (by_reading, by_time))
     assert np.exp(-np.exp(-lengths[np.argmax(values)])) == pytest.approx(0.5, abs=0.1)
     assert values.max() > others.max() + 5
+
+
+@pytest.mark.parametrize("name", sorted(components("noise")))
+def test_a_model_keeps_to_the_stated_noise_or_says_that_it_cannot(name: str) -> None:
+    kind = components("noise")[name]
+    assert kind().inferred == bool(kind().coordinates)
+    if kind.stated_only.__func__ is Noise.stated_only.__func__:
+        with pytest.raises(SettingsError, match=name):
+            kind.stated_only()
+        return
+    without = kind.stated_only()
+    assert not without.inferred
+    assert without.coordinates == without.natural_parameters == ()
+    found = without.bind(measurement("sd")).covariance(np.empty(0))
+    np.testing.assert_allclose(found, measurement("sd").noise_covariance, rtol=1e-14)
+
+
+def test_white_noise_can_do_without_its_own() -> None:
+    assert White.stated_only() == White(extra=False)
