@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.physics.forward import Forward
 
@@ -64,13 +65,28 @@ def form_factors(measurement: Measurement) -> FormFactors:
     )
 
 
+def joint_factors(measurement: Measurement, there: Motion) -> FormFactors:
+    """The processes at the N readings and, after them, at the G points of another way of the disc from rest."""
+    state = [states(measurement), _states(there.deflection, there.across, measurement)]
+    way = [progress(measurement), np.cumsum(there.steps) / measurement.full_range]
+    return FormFactors(
+        smooth_factor(np.concatenate(state), STATE_LENGTHS),
+        smooth_factor(np.concatenate(way)[:, None], PROGRESS_LENGTHS),
+    )
+
+
 def states(measurement: Measurement) -> Array:
     """(N, m) the states in parts of the whole range: deflection, and the stretch across where it was measured."""
-    d = measurement.deflection / measurement.full_range
+    return _states(measurement.deflection, measurement.across, measurement)
+
+
+def _states(deflection: Array, across: Array | None, measurement: Measurement) -> Array:
+    """The states of other points in the parts of ``measurement``; a stretch across that nobody gave is 1."""
+    d = deflection / measurement.full_range
     if measurement.across is None:
         return d[:, None]
-    wide = measurement.across - 1.0
-    return np.column_stack([d, wide / max(float(np.max(np.abs(wide))), 1e-9)])
+    wide = np.zeros_like(d) if across is None else across - 1.0
+    return np.column_stack([d, wide / max(float(np.max(np.abs(measurement.across - 1.0))), 1e-9)])
 
 
 def progress(measurement: Measurement) -> Array:
