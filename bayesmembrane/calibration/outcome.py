@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.calibration.checks import alike
 from bayesmembrane.calibration.crosscheck import crosscheck
 from bayesmembrane.calibration.goodness import dominates, goodness
 from bayesmembrane.calibration.layout import inference_data
@@ -54,10 +55,14 @@ def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) ->
         sample_stats={"lp": lp, "log_prior": evaluation.log_prior.reshape(shape)},
     )
     best = int(np.argmax(lp))
+    square = noise.stated(residual, theta)
     status = {
         **_answer(hypothesis, data, sampled, wanted),
         "prior_mass": {mode: {"value": m.value, "sd": m.sd} for mode, m in masses.items()},
-        **_judgement(posterior, data, evaluation.force[best]),
+        **_judgement(posterior, data, evaluation.force[best], None if square is None else float(square[best])),
+        "checks": {
+            "alike": alike(hypothesis.noise, noise, residual, theta, hypothesis.curve_size, rng).summary(),
+        },
         "crosscheck": crosscheck(posterior.forward, flat, seed).summary(),
         "best": _best(hypothesis, measurement, flat[best]),
     }
@@ -111,9 +116,9 @@ def _answer(hypothesis: Hypothesis, data: Any, sampled: Sampled, wanted: float) 
     }
 
 
-def _judgement(posterior: Posterior, data: Any, best: Array) -> dict[str, Any]:
+def _judgement(posterior: Posterior, data: Any, best: Array, square: float | None) -> dict[str, Any]:
     """Goodness of the best draw's curve, by the measurement's own noise, and what the inferred noise says."""
-    found = goodness(posterior.measurement, best, posterior.hypothesis.curve_size)
+    found = goodness(posterior.measurement, best, posterior.hypothesis.curve_size, square)
     sd = data.posterior["noise.sd"].values.ravel() if "noise.sd" in data.posterior else np.empty(0)
     return {
         "goodness": found.summary(),

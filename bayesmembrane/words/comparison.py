@@ -11,7 +11,9 @@ from bayesmembrane.comparison.convexity_modes import ByMode, Missing
 from bayesmembrane.comparison.evidence.estimate import WIDEST, Disagreement, Evidence
 from bayesmembrane.comparison.prior_widths import Unknown, Widened
 from bayesmembrane.comparison.result import Comparison, Row
+from bayesmembrane.words import noises
 from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.noises import best_noise
 from bayesmembrane.words.sampling import sentences as quality_sentences
 
 DECIDED = 2.0  # standard errors of a difference, below which it is none
@@ -24,8 +26,9 @@ def document(found: Comparison) -> dict[str, Any]:
         **answer,
         "table": [_row(row, r) for row, r in zip(answer["table"], found.rows, strict=True)],
         "reason": no_ranking(found),
-        "sentence": preferred(found),
-        "prior_sensitivity": survival(found),
+        "sentence": preferred(best_noise(found)),
+        "prior_sensitivity": survival(best_noise(found)),
+        **noises.document(found),
     }
 
 
@@ -48,8 +51,12 @@ def _row(answer: Mapping[str, Any], row: Row) -> dict[str, Any]:
 
 
 def sentences(found: Comparison) -> list[str]:
-    """All that is to be said of one range: why there is no ranking, what is preferred, whether that survives."""
-    return [s for s in (no_ranking(found), preferred(found), survival(found)) if s]
+    """All that is to be said of one range: why there is no ranking, what is preferred, whether that survives.
+
+    Judged under several noise models, what is preferred and whether it survives is said of the most probable one.
+    """
+    best = best_noise(found)
+    return [s for s in (no_ranking(found), preferred(best), survival(best), noises.of_noise(found)) if s]
 
 
 def called(row: Row) -> str:

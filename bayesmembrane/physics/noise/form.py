@@ -57,8 +57,8 @@ class FormLikelihood(NoiseLikelihood):
     """O(N r^2) a draw, with r columns of all factors: Sigma = Lambda + U U^T, and M = 1 + U^T Lambda^-1 U is r x r.
 
     r^T Sigma^-1 r = (r - U a)^T Lambda^-1 (r - U a) + a^T a with a = M^-1 U^T Lambda^-1 r, the most probable errors,
-    and |Sigma| = |Lambda| |M| (M. A. Woodbury, Princeton SRG Memo 42, 1950). A covariance that the measurement states is
-    turned to its axes first, O(N^2 r).
+    and |Sigma| = |Lambda| |M| (M. A. Woodbury, Princeton SRG Memo 42, 1950). A covariance that the measurement states
+    is turned to its axes first, O(N^2 r).
 
     Until it is told of curves (`at`), those measured stand for them, and effects have no trace.
     """
