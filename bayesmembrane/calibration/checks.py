@@ -44,9 +44,9 @@ def alike(
     free : parameters of the curve
 
     What those can do, the ``free`` first principal directions of the draws' curves, is taken out of both, so that
-    y - F(x) is left with what the noise leaves of itself whatever x is. Each p-value is then uniform where model and prior are
-    right (V. E. Johnson, Bayesian Anal. 2 (2007) 719, of pivotal quantities), and their mean over the draws below any p
-    at most twice as often as p (X.-L. Meng, Ann. Stat. 22 (1994) 1142).
+    y - F(x) is left with what the noise leaves of itself whatever x is. Each p-value is then uniform where model and
+    prior are right (V. E. Johnson, Bayesian Anal. 2 (2007) 719, of pivotal quantities), and their mean over the draws
+    below any p at most twice as often as p (X.-L. Meng, Ann. Stat. 22 (1994) 1142).
     """
     some = residual[np.linspace(0, len(residual) - 1, min(len(residual), CURVES)).astype(int)]
     known = np.linalg.svd(some - np.mean(some, axis=0), full_matrices=False)[2][: min(free, residual.shape[1] - 1)]

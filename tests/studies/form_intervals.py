@@ -1,7 +1,7 @@
 """How often 90 % intervals hold with the right effect named, by white noise and with a form error.
 
-Parameters and the force of the film itself, without faults, at half and at the end of the range. Posteriors are weighted
-draws: Laplace's approximation, then mixtures fitted to what it found. One line of JSON a case.
+Parameters and the force of the film itself, without faults, at half and at the end of the range. Posteriors are
+weighted draws: Laplace's approximation, then mixtures fitted to what it found. One line of JSON a case.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from bayesmembrane.calibration.objective import Objective
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
-from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.ground.errors import BayesmembraneError
@@ -108,9 +107,7 @@ def laplace(posterior: Posterior, start: Array, rng: np.random.Generator) -> tup
     k = h.curve_size
     x = np.repeat(start, STARTS, axis=0)
     drawn = posterior.prior.draw(rng, STARTS)
-    x[:, h.material_size :] = np.where(
-        rng.random((STARTS, 1)) < 0.9, drawn[:, h.material_size : k], x[:, h.material_size :]
-    )
+    x[1:, h.material_size :] = drawn[1:, h.material_size : k]
     theta = np.array([p.prior.quantile(0.5) for p in h.parameters[k:]], dtype=float)
     sigma, best = 0.01 * np.max(np.abs(m.force)) * np.ones((1, 1)), x
     for turn in range(TURNS):
@@ -198,9 +195,8 @@ def main(arguments: list[str] | None = None) -> int:
     asked = parser.parse_args(arguments)
     asked.results.parent.mkdir(parents=True, exist_ok=True)
     done, end = stored(asked.results), time.monotonic() + asked.seconds
-    chosen = [
-        c for c in islice(cases(asked.seed), asked.limit) if asked.half in ("all", "even odd".split()[c.seed % 2])
-    ]
+    halves = {"all": (0, 1), "even": (0,), "odd": (1,)}[asked.half]
+    chosen = [c for c in islice(cases(asked.seed), asked.limit) if c.seed % 2 in halves]
     for case in chosen:
         for noise in asked.noise.split(","):
             key = f"{case.key}|{noise}"
@@ -221,27 +217,36 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
+FORCES = ("half", "end")
+
+
 def table(rows: list[dict[str, Any]]) -> str:
-    """Coverage and width, of parameters and of forces."""
-    out, widths = [], {}
-    for noise in dict.fromkeys(r["by"] for r in rows):
-        own = [r for r in rows if r["by"] == noise and "skipped" not in r]
-        for group, member in (("forces", True), ("parameters", False)):
-            cells = {
-                (r["case"], n): v
-                for r in own
-                for n, v in r.items()
-                if isinstance(v, list) and n != "noise" and (n in ("half", "end")) == member
-            }
-            held = [v[0] for v in cells.values()]
-            widths[noise, group] = {k: v[1] for k, v in cells.items()}
-            before = widths.get(("white", group), {})
-            ratio = [v[1] / before[k] for k, v in cells.items() if k in before]
-            wide = f"{np.median(ratio):.2f} (geometric mean {np.exp(np.mean(np.log(ratio))):.2f})" if ratio else "-"
-            out.append(
-                f"{noise}, {group}: {np.mean(held):.3f} of {len(held)} in {len(own)} cases; width over white's {wide}"
-            )
+    """Coverage and width, of parameters and of forces, with an effect and without."""
+    out = []
+    for kind, null in (("with effects", False), ("without", True)):
+        some = [r for r in rows if "skipped" not in r and r["case"].startswith("null|") == null]
+        for group, forces in (("forces", True), ("parameters", False)):
+            widths: dict[tuple[str, str], float] = {}
+            for noise in dict.fromkeys(r["by"] for r in some):
+                cells = _cells([r for r in some if r["by"] == noise], forces)
+                widths = widths or {k: v[1] for k, v in cells.items()}
+                ratio = [v[1] / widths[k] for k, v in cells.items() if k in widths]
+                held = np.mean([v[0] for v in cells.values()])
+                out.append(
+                    f"{kind}, {group}, {noise}: {held:.3f} of {len(cells)} hold; times as wide: median "
+                    f"{np.median(ratio):.2f}, geometric mean {np.exp(np.mean(np.log(ratio))):.2f}"
+                )
     return "\n".join(out)
+
+
+def _cells(rows: list[dict[str, Any]], forces: bool) -> dict[tuple[str, str], list[Any]]:
+    """(case, name) -> held, width, error."""
+    return {
+        (r["case"], n): v
+        for r in rows
+        for n, v in r.items()
+        if isinstance(v, list) and n != "noise" and (n in FORCES) == forces
+    }
 
 
 if __name__ == "__main__":
