@@ -125,7 +125,7 @@ class FormLikelihood(NoiseLikelihood):
     def pointwise(self, residual: Array, x: Array) -> Array:
         out = np.empty_like(residual)
         for b, (u, variance, root) in enumerate(self._each(x)):
-            r, w = residual[b], solve_triangular(root, (u / variance[:, None]).T, lower=True)
+            r, w = residual[b], solve_triangular(root, (u / variance[:, None]).T, lower=True, check_finite=False)
             a = _mean(u, variance, root, self._turned(r))
             pull, share = (self._turned(r) - u @ a) / variance, np.sum(w * w, axis=0) * variance
             precision = np.maximum(1 - share, TINY) / variance
@@ -162,7 +162,7 @@ class FormLikelihood(NoiseLikelihood):
         out = np.empty(force.shape)
         for b, (u, variance, root) in enumerate(self._each(x, here)):
             a = _mean(u, variance, root, self._turned(residual[b]))
-            a += solve_triangular(root, rng.standard_normal(len(a)), lower=True, trans="T")
+            a += solve_triangular(root, rng.standard_normal(len(a)), lower=True, trans="T", check_finite=False)
             out[b] = self._columns(away, force[b], traces[b], eta[b], law[b]) @ a
         return out
 
@@ -211,8 +211,8 @@ class FormLikelihood(NoiseLikelihood):
 
 def _mean(u: Array, variance: Array, root: Array, r: Array) -> Array:
     """a = M^-1 U^T Lambda^-1 r."""
-    half = solve_triangular(root, u.T @ (r / variance), lower=True)
-    return np.asarray(solve_triangular(root, half, lower=True, trans="T"))
+    half = solve_triangular(root, u.T @ (r / variance), lower=True, check_finite=False)
+    return np.asarray(solve_triangular(root, half, lower=True, trans="T", check_finite=False))
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
