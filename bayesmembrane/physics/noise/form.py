@@ -47,7 +47,7 @@ class Form(Noise):
         return (*found, Natural("eta_law", "-", LAW.meaning.removeprefix("log of the "))) if self.laws else found
 
     def natural(self, x: Array, scale: float) -> Array:
-        return np.exp(x) * np.array([scale, *(1.0,) * (x.shape[1] - 1)])
+        return np.asarray(np.exp(x) * np.array([scale, *(1.0,) * (x.shape[1] - 1)]))
 
     def bind(self, measurement: Measurement) -> FormLikelihood:
         return FormLikelihood(measurement, self.laws)
@@ -120,7 +120,7 @@ class FormLikelihood(NoiseLikelihood):
         force, traces = self._curves(len(x))
         own = self.own if self.axes is None else (self.axes**2) @ self.own
         smooth = (eta[:, None] * force) ** 2 + law[:, None] ** 2 * np.sum(traces**2, axis=1)
-        return np.sqrt(own + power[:, None] + smooth)
+        return np.asarray(np.sqrt(own + power[:, None] + smooth))
 
     def pointwise(self, residual: Array, x: Array) -> Array:
         out = np.empty_like(residual)
@@ -216,7 +216,7 @@ def _mean(u: Array, variance: Array, root: Array, r: Array) -> Array:
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _root(w):  # type: ignore[no-untyped-call,no-untyped-def]
+def _root(w):  # type: ignore[no-untyped-def]
     """Lower triangular root of 1 + w^T w, whose pivots are at least 1 however large w is."""
     size = w.shape[1]
     m = np.dot(np.ascontiguousarray(w.T), w)
