@@ -14,6 +14,7 @@ M. C. Kennedy, A. O'Hagan, J. R. Stat. Soc. B 63 (2001) 425; J. Brynjarsdottir, 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +22,9 @@ from numpy.typing import ArrayLike
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
-from bayesmembrane.physics.forward import Forward
+
+if TYPE_CHECKING:
+    from bayesmembrane.physics.forward import Forward
 
 ENERGY = Parameter(
     "ln_eta", "-", "log of the relative error of the energy's form", Normal(float(np.log(3e-3)), 1.5), (-12.0, 0.0)

@@ -30,7 +30,7 @@ from bayesmembrane.ground.parameters import Normal
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.noise import form
-from bayesmembrane.physics.noise.base import Elsewhere
+from bayesmembrane.physics.noise.base import Elsewhere, force_scale
 from tests.generator.datasets import Dataset, generate
 from tests.generator.distortions import LIBRARY
 from tests.generator.film import NoSolutionError
@@ -143,16 +143,16 @@ def _line(posterior: Posterior, objective: Objective, x: Array) -> Line:
     h, m = posterior.hypothesis, posterior.measurement
     r, j = objective.batch(x)
     residual, slopes, force = -r[0], j[0], m.force + r
-    noise = posterior.noise_at(x, force)
+    noise, scale = posterior.noise_at(x, force), force_scale(m)
     columns, sizes = _columns(noise)
     gram = np.concatenate([columns, slopes, residual[:, None]], axis=1)
     gram = gram.T @ gram
     c = columns.shape[1]
-    nodes, prior = _nodes(h, residual / noise.scale)
+    nodes, prior = _nodes(h, residual / scale)
     pull, offset = np.diag(objective.spread**-2), objective.centre - x[0]
     log_weights, means, covariances = [], [], []
     for theta, log_prior in zip(nodes, prior, strict=True):
-        power = np.exp(2 * theta[0]) * noise.scale**2
+        power = np.exp(2 * theta[0]) * scale**2
         s = np.exp(theta[sizes]) if c else np.empty(0)
         inner = np.eye(c) + gram[:c, :c] * s[:, None] * s / power
         across = gram[:c, c:] * s[:, None] / power
@@ -181,7 +181,7 @@ def _nodes(h: Hypothesis, share: Array) -> tuple[Array, Array]:
     """Coordinates of the noise (M, m) on a grid, and ln of their prior (M,)."""
     own = h.parameters[h.curve_size :]
     near = np.log(np.std(share)) + np.linspace(-8, 3, 23) / np.sqrt(2 * share.size)
-    wide = [np.linspace(*p.prior.quantile(np.array([0.003, 0.997])), NODES) for p in own[1:]]
+    wide = [np.linspace(float(p.prior.quantile(0.003)), float(p.prior.quantile(0.997)), NODES) for p in own[1:]]
     nodes = np.stack([g.ravel() for g in np.meshgrid(near, *wide, indexing="ij")], axis=1)
     return nodes, np.sum([p.prior.log_density(nodes[:, i]) for i, p in enumerate(own)], axis=0)
 
