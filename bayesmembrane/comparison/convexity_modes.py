@@ -145,7 +145,8 @@ def _weigh(target: _Target, g: Mixture, count: int, rng: np.random.Generator) ->
     if np.any(ok):
         noise = free.hypothesis.noise_coordinates(x[ok])
         with np.errstate(over="ignore", invalid="ignore"):
-            log_likelihood[ok] = free.noise.log_likelihood(free.measurement.force - prediction.force[ok], noise)
+            bound = free.noise_at(x[ok], prediction.force[ok])
+            log_likelihood[ok] = bound.log_likelihood(free.measurement.force - prediction.force[ok], noise)
     log_weight = free.prior.log_density(x) + log_likelihood - g.log_density(x)
     inside = {n: free.prior.inside(prediction, m) for n, m in MODES.items()}
     if target.within is not None:

@@ -32,7 +32,7 @@ class Hypothesis:
 
     The vector x holds the material's coordinates, those of the effects, and those of the noise, in this order. Their
     names carry the component: ``yeoh.ln_gd``, ``clamp_slip.length``, ``noise.ln_sd``. Raises `SettingsError` for
-    an effect that is named twice.
+    an effect that is named twice. A noise that infers something about effects suits itself to those that there are.
     """
 
     material: type[Material]
@@ -44,6 +44,7 @@ class Hypothesis:
         names = [e.name for e in self.effects]
         if repeated := sorted({n for n in names if names.count(n) > 1}):
             raise SettingsError(f'the effect "{repeated[0]}" is named twice', remedy="name every effect once")
+        object.__setattr__(self, "noise", self.noise.beside(self.effects))
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -13,16 +13,20 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import FAILURES
 from bayesmembrane.calibration.predictions import Predictions
+from bayesmembrane.calibration.quality import Quality
 from bayesmembrane.calibration.run import Run, load_run, stored_predictions
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.noise.white import White
 from bayesmembrane.report.canvas import Measured
 from bayesmembrane.words.calibration import LOOSE, Case
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import millimetres, spoken_parameter
+
+USUAL = White.name
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +96,7 @@ class Shown:
     cache, crosscheck : tally of the curve cache; what the second solver found
     facts : settings, versions and the like
     replicas : new readings, None where the run stored none
+    quality : how far the draws can be trusted
     """
 
     folder: str
@@ -111,6 +116,7 @@ class Shown:
     crosscheck: Mapping[str, Any]
     facts: Mapping[str, Any]
     replicas: Replicas | None = None
+    quality: Quality | None = None
 
     @property
     def material(self) -> str:
@@ -124,13 +130,18 @@ class Shown:
 
     @property
     def name(self) -> str:
-        """Material and effects, for people."""
-        return spoken(self.hypothesis)
+        """Material and effects, for people; with the noise model where it is not the usual one."""
+        return spoken(self.hypothesis) + ("" if self._noise == USUAL else f" ({self._noise})")
 
     @property
     def key(self) -> str:
-        """A word for anchors and JSON: material, effects, range."""
-        return f"{self.hypothesis.label()}-{1e3 * self.digest.end:.4g}mm".replace("+", "-").replace(".", "_")
+        """A word for anchors and JSON: material, effects, noise unless it is the usual one, range."""
+        words = [self.hypothesis.label(), *([] if self._noise == USUAL else [self._noise])]
+        return "-".join([*words, f"{1e3 * self.digest.end:.4g}mm"]).replace("+", "-").replace(".", "_")
+
+    @property
+    def _noise(self) -> str:
+        return self.hypothesis.noise.name
 
     @cached_property
     def case(self) -> Case:
@@ -262,6 +273,7 @@ def _shown(run: Run, found: Predictions) -> Shown:
         crosscheck=run.status["crosscheck"],
         facts=_facts(run),
         replicas=_replicas(run.data),
+        quality=run.quality,
     )
 
 

@@ -11,7 +11,9 @@ from bayesmembrane.comparison.convexity_modes import WITHIN, ByMode, Missing
 from bayesmembrane.comparison.evidence.estimate import WIDEST, Disagreement, Evidence
 from bayesmembrane.comparison.prior_widths import Unknown, Widened
 from bayesmembrane.comparison.result import Comparison, Row
+from bayesmembrane.words import noises
 from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.noises import best_noise
 from bayesmembrane.words.sampling import sentences as quality_sentences
 
 SEEN = 0.05  # of ln Z, below which a change is not named
@@ -25,11 +27,12 @@ def document(found: Comparison) -> dict[str, Any]:
         **answer,
         "table": [_row(row, r) for row, r in zip(answer["table"], found.rows, strict=True)],
         "reason": no_ranking(found),
-        "sentence": preferred(found),
-        "prior_sensitivity": survival(found),
+        "sentence": preferred(best_noise(found)),
+        "prior_sensitivity": survival(best_noise(found)),
         "out_of_reach": left_out(found),
         "beyond_the_range": beyond_range(found),
         "covered": covered(found),
+        **noises.document(found),
     }
 
 
@@ -54,10 +57,12 @@ def _row(answer: Mapping[str, Any], row: Row) -> dict[str, Any]:
 def sentences(found: Comparison) -> list[str]:
     """All that is to be said of one range: why there is no ranking, what is preferred, whether that survives.
 
-    Then what the convexity prior asks beyond the range fitted, and what the search for modes has covered.
+    Then what the convexity prior asks beyond the range fitted, and what the search for modes has covered. Judged under
+    several noise models, what is preferred and whether it survives is said of the most probable one.
     """
-    told = (no_ranking(found), preferred(found), left_out(found), survival(found), beyond_range(found), covered(found))
-    return [s for s in told if s]
+    best = best_noise(found)
+    told = (no_ranking(found), preferred(best), left_out(found), survival(best), beyond_range(found), covered(found))
+    return [s for s in (*told, noises.of_noise(found)) if s]
 
 
 def called(row: Row) -> str:

@@ -252,3 +252,10 @@ def test_ranges_are_parts_of_the_whole():
     assert found["up to 30 mm"].whole is whole
     assert found["up to 60 mm"].whole is None
     assert len(found["up to 30 mm"].measurement) == 5
+
+
+def test_auto_judges_each_hypothesis_under_every_noise() -> None:
+    found = claimed("yeoh,gent", "friction", "auto", "reached")
+    assert [(h.label(), h.noise.name) for h in found] == [
+        (f"{m}+friction", n) for m in ("yeoh", "gent") for n in ("white", "ar1", "form")
+    ]

@@ -85,6 +85,10 @@ class WhiteLikelihood(NoiseLikelihood):
         z = rng.standard_normal((len(x), self.variance.size)) * np.sqrt(self._total(x))
         return z if self.axes is None else np.asarray(z @ self.axes.T)
 
+    def sd(self, x: Array) -> Array:
+        variance = self._total(x)
+        return np.sqrt(variance if self.axes is None else variance @ (self.axes**2).T)
+
     def _total(self, x: Array) -> Array:
         """Variances (B, N) along the axes; never below what a double can hold."""
         tau = np.exp(x[:, :1]) * self.scale if self.extra else np.zeros((len(x), 1))

@@ -7,12 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED
+from bayesmembrane.comparison.noises import noises_of, over_noises, several
 from bayesmembrane.comparison.result import Comparison, Row
 from bayesmembrane.physics.convexity import MODES
 from bayesmembrane.report.blocks import Column, Table, Value
 from bayesmembrane.words.beside_paper import PaperLosses
 from bayesmembrane.words.comparison import called, remark
-from bayesmembrane.words.hypothesis import material_title
+from bayesmembrane.words.hypothesis import material_title, spoken
 
 _EVIDENCE = (
     Column("range", "range"),
@@ -63,6 +64,37 @@ def _evidence(name: str, row: Row) -> tuple[Value, ...]:
         row.prior_mass.sd if row.prior_mass else None,
         remark(row) or "-",
     )
+
+
+def noises_table(found: Mapping[str, Comparison]) -> Table | None:
+    """What each hypothesis is worth whatever the noise, and under each; None if there is one noise model alone."""
+    some = {name: c for name, c in found.items() if several(c)}
+    models = list(dict.fromkeys(n for c in some.values() for n in noises_of(c)))
+    columns = (
+        Column("range", "range"),
+        Column("hypothesis", "hypothesis"),
+        Column("probability", "posterior probability", "p"),
+        Column("log_evidence", "ln Z", ".2f"),
+        Column("sd", "+-", ".2f"),
+        *(Column(n, f"ln Z, {n}", ".2f") for n in models),
+    )
+    rows: list[tuple[Value, ...]] = [
+        (
+            name,
+            spoken(s.hypothesis),
+            s.posterior_probability,
+            s.log_evidence,
+            s.sd,
+            *(s.by_noise.get(n) for n in models),
+        )
+        for name, c in some.items()
+        for s in over_noises(c)
+    ]
+    caption = (
+        "Each hypothesis whatever the noise: ln of the mean evidence over the noise models, which are equally probable "
+        "before, and the posterior probability that all of them give it together; then ln Z under each."
+    )
+    return Table("evidence whatever the noise", caption, columns, tuple(rows)) if rows else None
 
 
 def modes_table(found: Mapping[str, Comparison]) -> Table | None:
