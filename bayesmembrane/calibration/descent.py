@@ -33,9 +33,9 @@ def descend(
 
     with coordinates at a bound left out while the step would leave it, and those in ``held`` (M, k) left out always.
     A row whose |r|^2 is more than ``behind`` times the least is given up when it crawls: films at the edge of what can
-    be solved cost most. One whose |r|^2 falls by less than its part ``slow_below`` a few times in a row is done. Returns
-    x (M, k) and |r| (M,), inf where a start has no residuals or no slopes: neither a
-    start nor a step goes where one of them is not a number.
+    be solved cost most. One whose |r|^2 falls by less than its part ``slow_below`` a few times in a row is done.
+    Returns x (M, k) and |r| (M,), inf where a start has no residuals or no slopes: neither a start nor a step goes
+    where one of them is not a number.
 
     D. W. Marquardt, J. SIAM 11 (1963) 431; a row that finds no better point with any damping is done.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from bayesmembrane.data.measurement import Measurement
@@ -11,7 +12,7 @@ from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
 from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, Tell, opened
 from bayesmembrane.diagnosis.explanation.growth import grown
-from bayesmembrane.diagnosis.explanation.total import summed
+from bayesmembrane.diagnosis.explanation.total import Judged, summed
 from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, decided
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
 from bayesmembrane.diagnosis.left.remaining import remaining
@@ -57,6 +58,7 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
     validation = _validated(case, search, found)
     found = _predicting(found, validation)
     known = found.verdict in ("named", "ambiguous", "material")
+    found = replace(found, members=_adapted(search, found.members), ranking=_adapted(search, found.ranking))
     null = _null(case, found)
     best = found.members[0].candidate if known else null
     sd = search.noise.each
@@ -81,12 +83,17 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
         noise=search.noise,
         power=smallest_sizes(case.signatures, case.detection.score.critical),
         absorbed=tuple(e.name for e in absorbed(case.measurement, null.hypothesis)),
-        before=misfit_of(search.adapted(null), sd, null.x.size),
-        after=misfit_of(search.adapted(best), sd, best.x.size),
-        shape=residual_shape(case.measurement, search.adapted(null)),
+        before=misfit_of(null.residual, sd, null.x.size),
+        after=misfit_of(best.residual, sd, best.x.size),
+        shape=residual_shape(case.measurement, null.residual),
         validation=validation,
         experiments=_experiments(search, found),
     )
+
+
+def _adapted(search: Search, every: Sequence[Judged]) -> tuple[Judged, ...]:
+    """The same with the residuals of their best fits, which is what people call a residual."""
+    return tuple(replace(j, candidate=replace(j.candidate, residual=search.adapted(j.candidate))) for j in every)
 
 
 def _null(case: OpenCase, found: Verdict) -> Candidate:

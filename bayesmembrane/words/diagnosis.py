@@ -252,7 +252,13 @@ def _ambiguous(found: Diagnosis) -> str:
     names = "; or ".join(_member(j, found) for j in found.members)
     nexts = found.experiments
     advice = f" To tell them apart: {experiment_sentence(nexts[0])}." if nexts else ""
-    return f"{_misses(found)}this measurement cannot tell which of these it is: {names}. {_error(found)}{advice}"
+    units = _units(found)
+    foreign = "" if found.foreign is None else f" {foreign_sentence(found.foreign, units)}"
+    other = "; or something foreign" if foreign else ""
+    return (
+        f"{_misses(found)}this measurement cannot tell which of these it is: {names}{other}. {_error(found)}{advice}"
+        f"{foreign}"
+    )
 
 
 def _member(j: Judged, found: Diagnosis) -> str:

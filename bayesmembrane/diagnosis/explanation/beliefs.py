@@ -20,6 +20,9 @@ class Beliefs:
     supported: float = 1.0
     """ln of the Bayes factor that a further effect needs to count as seen: below it, the set counts as the one without
     it."""
+    takes: float = 15.0
+    """Squares, in those of the noise, that it must take away to count all the same, where it is only that the form
+    error could take them too."""
     declared: float = 0.5
     """Of the energy that was declared; the others share the rest. Without one, all are equally probable."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from bayesmembrane.diagnosis.explanation.foreign import Foreign, foreign, kinds_
 from bayesmembrane.diagnosis.explanation.growth import Grown
 from bayesmembrane.diagnosis.thresholds import FOREIGN
 from bayesmembrane.ground.parameters import Array
+
+Key = TypeVar("Key")
 
 NOTHING = "none"
 """No effect; nothing foreign."""
@@ -64,11 +67,13 @@ class Total:
 
     ranking : every hypothesis, the most probable first
     probabilities : summed
+    joint : by (set of effects, kind of what is foreign), the most probable first
     foreign : what was found of each kind beside the models where it was looked for, the most probable first
     """
 
     ranking: tuple[Judged, ...]
     probabilities: Probabilities
+    joint: Mapping[tuple[str, str], float]
     foreign: tuple[Foreign, ...]
 
 
@@ -96,7 +101,14 @@ def summed(grown: Grown) -> Total:
     terms += [(f.base, f.kind, weight(f.base) + f.gain + BELIEFS.log_foreign(kinds)) for f in found]
     p = _normalised(np.array([w for _, _, w in terms]))
     judged = [_judged(grown, c, float(q)) for (c, kind, _), q in zip(terms, p, strict=True) if kind == NOTHING]
-    return Total(tuple(judged), _added_up(terms, p, given), tuple(found))
+    owners = _owners(grown, [c for c, kind, _ in terms if kind == NOTHING])
+    joint, energies = defaultdict[tuple[str, str], float](float), defaultdict[str, float](float)
+    for (c, kind, _), q in zip(terms, p, strict=True):
+        joint[owners[set_name(c, given)], kind] += float(q)
+        energies[c.hypothesis.material.name] += float(q)
+    both = _falling(joint)
+    marginal = Probabilities(_summed_out(both, 0), _falling(energies), _summed_out(both, 1))
+    return Total(tuple(judged), marginal, both, tuple(found))
 
 
 def _foreign(grown: Grown, every: Sequence[Candidate], given: Sequence[str]) -> list[Foreign]:
@@ -116,32 +128,40 @@ def _normalised(log_weights: Array) -> Array:
     return np.asarray(p / np.sum(p))
 
 
-def _added_up(terms: Sequence[tuple[Candidate, str, float]], p: Array, given: Sequence[str]) -> Probabilities:
-    effects, energies, kinds = (defaultdict[str, float](float) for _ in range(3))
-    owners = _owners([c for c, kind, _ in terms if kind == NOTHING], given)
-    for (c, kind, _), q in zip(terms, p, strict=True):
-        effects[owners[set_name(c, given)]] += float(q)
-        energies[c.hypothesis.material.name] += float(q)
-        kinds[kind] += float(q)
-    return Probabilities(*(dict(sorted(d.items(), key=lambda i: -i[1])) for d in (effects, energies, kinds)))
+def _falling(p: Mapping[Key, float]) -> dict[Key, float]:
+    return dict(sorted(p.items(), key=lambda i: -i[1]))
 
 
-def _owners(every: Sequence[Candidate], given: Sequence[str]) -> dict[str, str]:
+def _summed_out(joint: Mapping[tuple[str, str], float], kept: int) -> dict[str, float]:
+    """The probabilities of one part of a pair, summed over the other."""
+    out = defaultdict[str, float](float)
+    for key, q in joint.items():
+        out[key[kept]] += q
+    return _falling(out)
+
+
+def _owners(grown: Grown, every: Sequence[Candidate]) -> dict[str, str]:
     """{set of effects: the part of it that the data speak for}.
 
-    A further effect that the data do not support is not seen to be there, nor seen to be absent: such a set says no
-    more than the set without it.
+    A further effect that the data do not support, and that takes nothing away, is not seen to be there, nor seen to be
+    absent: such a set says no more than the set without it.
     """
-    support: dict[frozenset[str], float] = {}
+    given = set(grown.case.null.names)
+    best: dict[frozenset[str], Candidate] = {}
     for c in every:
-        own = frozenset(c.names) - set(given)
-        support[own] = max(support.get(own, -np.inf), c.log_evidence)
+        own = frozenset(c.names) - given
+        if own not in best or c.log_evidence > best[own].log_evidence:
+            best[own] = c
+    squares = {own: _excess(grown, c) for own, c in best.items()}
     out: dict[frozenset[str], frozenset[str]] = {}
-    for own in sorted(support, key=len):
-        smaller = [own - {e} for e in own if own - {e} in support]
-        best = max(smaller, key=lambda s: support[s], default=None)
-        idle = best is not None and support[best] > support[own] - BELIEFS.supported
-        out[own] = out[best] if idle and best is not None else own
+    for own in sorted(best, key=len):
+        smaller = [own - {e} for e in own if own - {e} in best]
+        out[own] = own
+        if smaller:
+            less = max(smaller, key=lambda s: best[s].log_evidence)
+            idle = best[less].log_evidence > best[own].log_evidence - BELIEFS.supported
+            if idle and squares[less] - squares[own] < BELIEFS.takes:
+                out[own] = out[less]
     return {_joined(own): _joined(owner) for own, owner in out.items()}
 
 
