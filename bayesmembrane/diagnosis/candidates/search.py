@@ -109,7 +109,7 @@ class Search:
         """The linear model of a candidate in the coordinates of `standard`, each over the sd of its local prior."""
         axes = standard(candidate.hypothesis, self.measurement)
         u = axes.to_u(candidate.x)
-        spread, _ = axes.local(u)
+        spread = axes.local(u)
         own = self.noise.white(candidate.slopes * (axes.slope(u) * spread))
         data = self.noise.white(candidate.residual) + own @ (u / spread)
         return Linear(data, (Block(own), *self._forms(candidate)), self.scale_sd)
@@ -127,7 +127,7 @@ class Search:
         """(k,) dx over the coefficients of `linear`."""
         axes = standard(candidate.hypothesis, self.measurement)
         u = axes.to_u(candidate.x)
-        return np.asarray(axes.slope(u) * axes.local(u)[0])
+        return np.asarray(axes.slope(u) * axes.local(u))
 
     @property
     def scale_sd(self) -> float:
@@ -198,13 +198,15 @@ class Search:
     def _weighed(self, found: Candidate, axes: Standard, u: Array) -> Candidate:
         model = self.linear(found)
         z = weighed(model, found.theta)
-        spread, larger = axes.local(u)
+        spread = axes.local(u)
         mean, covariance = model.coefficients(z.theta)
         low, high = (b / spread for b in axes.bounds)
         k = u.size
         inside = log_inside(mean[:k], covariance[:k, :k], np.where(axes.one_sided, 0.0, low), high)
+        own = mean[:k] * spread, np.diag(covariance)[:k] * spread**2
+        replaced = axes.log_replaced(u, *own)
         form = self._coloured(found, mean[k:])
-        return replace(found, log_evidence=z.log_evidence + larger + inside, theta=z.theta, theta_sd=z.sd, form=form)
+        return replace(found, log_evidence=z.log_evidence + replaced + inside, theta=z.theta, theta_sd=z.sd, form=form)
 
     def _coloured(self, found: Candidate, coefficients: Array) -> Array:
         """(N,) N: the form error with these coefficients."""

@@ -59,7 +59,7 @@ def test_an_effect_that_leaves_no_trace_gains_and_loses_nothing(single, name) ->
 
 def test_softening_on_a_single_loading_has_the_evidence_of_none(single) -> None:
     search, plain = single
-    assert beside(search, plain, "mullins").log_evidence == pytest.approx(plain.log_evidence, abs=0.02)
+    assert beside(search, plain, "mullins").log_evidence == pytest.approx(plain.log_evidence, abs=0.05)
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ def test_evidence_equals_importance_sampling(cyclic, name) -> None:
     found = beside(search, plain, name)
     axes = standard(found.hypothesis, search.measurement)
     u = axes.to_u(found.x)
-    spread, larger = axes.local(u)
+    spread = axes.local(u)
     model = search.linear(found)
     mean, covariance = model.coefficients(found.theta)
     k = u.size
@@ -88,7 +88,8 @@ def test_evidence_equals_importance_sampling(cyclic, name) -> None:
     low = np.where(axes.one_sided, 0.0, low)
     own = covariance[:k, :k]
     inside = log_inside(mean[:k], own, low / spread, high / spread)
-    linear = model.log_density(found.theta)[0] + larger + inside
+    replaced = axes.log_replaced(u, mean[:k] * spread, np.diag(own) * spread**2)
+    linear = model.log_density(found.theta)[0] + replaced + inside
     prior_of_sizes = norm.logpdf(found.theta, model.priors[:, 0], model.priors[:, 1]).sum()
 
     law = multivariate_t(mean[:k] * spread, 1.5 * own * np.outer(spread, spread), df=4, seed=8, allow_singular=True)
@@ -101,7 +102,8 @@ def test_evidence_equals_importance_sampling(cyclic, name) -> None:
     log_likelihood = -0.5 * np.sum(r * (freed @ r), axis=0) + 0.5 * np.linalg.slogdet(freed)[1]
     log_likelihood -= 0.5 * N * np.log(2 * np.pi)
     log_prior = np.where(axes.heavy, cauchy.logpdf(draws[kept]), norm.logpdf(draws[kept]))
-    log_prior = log_prior.sum(axis=1) + np.log(2.0) * np.sum(axes.one_sided)
+    within = np.where(axes.heavy, (np.arctan(high) - np.arctan(low)) / np.pi, np.where(axes.one_sided, 0.5, 1.0))
+    log_prior = log_prior.sum(axis=1) - np.log(within).sum()
     weights = np.full(4000, -np.inf)
     weights[kept] = log_likelihood + log_prior - law.logpdf(draws[kept])
     sampled = logsumexp(weights) - np.log(4000) + prior_of_sizes
