@@ -17,8 +17,10 @@ from bayesmembrane.comparison.compare import Range
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.reading import read_measurement
+from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics import hypothesis as hypotheses
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.reconstruction.result import Reconstruction
@@ -113,15 +115,18 @@ def valleys(
 
 
 def diagnose(
-    measurement: Measurement, hypothesis: Hypothesis, *, seed: int = 0, out: Folder | None = None
+    measurement: Measurement, hypothesis: Hypothesis | None = None, *, seed: int = 0, out: Folder | None = None
 ) -> Diagnosis:
-    """Whether the hypothesis leaves structure in the residual, and which effect or energy explains it."""
-    return analyses.diagnose(measurement, hypothesis, _work(seed, out)).result
+    """How probable it is that nothing, an effect, another energy or something foreign is behind the curve.
+
+    ``hypothesis`` has the energy that is preferred beforehand; without one all are as probable.
+    """
+    return analyses.diagnose(measurement, _asked(hypothesis), _work(seed, out)).result
 
 
 def loop(
     measurement: Measurement,
-    hypothesis: Hypothesis,
+    hypothesis: Hypothesis | None = None,
     *,
     ess: float = 1000.0,
     seed: int = 0,
@@ -130,9 +135,17 @@ def loop(
 ) -> Loop:
     """Diagnose, sample, add what is missing, and again, until adequate or abstaining.
 
-    ``adapt_noise`` samples with correlated noise where neighbouring readings turn out to be correlated.
+    Without a ``hypothesis`` it begins with the most probable energy. ``adapt_noise`` samples with correlated noise where
+    neighbouring readings turn out to be correlated.
     """
-    return analyses.loop(measurement, hypothesis, _work(seed, out, ess), adapt_noise=adapt_noise).result
+    return analyses.loop(measurement, _asked(hypothesis), _work(seed, out, ess), adapt_noise=adapt_noise).result
+
+
+def _asked(hypothesis: Hypothesis | None) -> Question:
+    """The question of a diagnosis, about an energy that is preferred or about none."""
+    if hypothesis is not None:
+        return Question(hypothesis)
+    return Question(hypotheses.hypothesis(min(materials())), declared=False)
 
 
 def reconstruct(*, seed: int = 0, out: Folder | None = None) -> Reconstruction:

@@ -83,8 +83,8 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
         noise=search.noise,
         power=smallest_sizes(case.signatures, case.detection.score.critical),
         absorbed=tuple(e.name for e in absorbed(case.measurement, null.hypothesis)),
-        before=misfit_of(null.residual, sd, null.x.size),
-        after=misfit_of(best.residual, sd, best.x.size),
+        before=misfit_of(null.residual, sd, null.x.size, search.noise.white(null.residual)),
+        after=misfit_of(best.residual, sd, best.x.size, search.noise.white(best.residual)),
         shape=residual_shape(case.measurement, null.residual),
         validation=validation,
         experiments=_experiments(search, found),
@@ -120,7 +120,8 @@ def _validated(case: OpenCase, search: Search, found: Verdict) -> HeldOut | None
     null = _null(case, found)
     if found.verdict not in ("named", "ambiguous", "material"):
         return validate(search, null, null, [])
-    return validate(search, null, found.members[0].candidate, [j.candidate for j in found.ranking[:3]])
+    nulls = [j for j in found.ranking[3:] if j.candidate.label == null.label]
+    return validate(search, null, found.members[0].candidate, [*found.ranking[:3], *nulls])
 
 
 def _experiments(search: Search, found: Verdict) -> tuple[Experiment, ...]:

@@ -286,7 +286,7 @@ def _unknown(found: Diagnosis) -> str:
         )
     if found.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{_misses(found)}no effect is needed, and none of the energies has this form. {shape}"
-    return f"{_misses(found)}no few explanations stand out: too many are about as probable. {shape}"
+    return f"{_misses(found)}more explanations are about as probable than this measurement can part. {shape}"
 
 
 _ANSWERS = {

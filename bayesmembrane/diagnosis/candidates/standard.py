@@ -156,8 +156,8 @@ class Standard:
         """ln Z with the priors less ln Z with the normal ones of `local`, posterior ``mean`` and ``variance`` (k,).
 
         Of a Cauchy prior p, the integral of p L over that of N(0, s^2) L along its coordinate, with the likelihood
-        L ~ N(mean, variance) / N(0, s^2), and p normalised within its bounds; of a half-normal one 2, for it is normal on
-        its side.
+        L ~ N(mean, variance) / N(0, s^2), and p normalised within its bounds; of a half-normal one 2, for it is normal
+        on its side.
         """
         s = self.local(u)
         out = np.log(2.0) * float(np.sum(self.one_sided))
