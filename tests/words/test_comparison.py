@@ -61,9 +61,7 @@ def test_a_missed_mode_is_said_with_what_it_holds():
 def test_one_out_of_reach_is_named_beside_the_ranking():
     found = ranked([row("one", -10, 5), row("other", -12, 3), row("far", -50, 1, off=5.0)])
     assert no_ranking(found) == ""
-    assert left_out(found).startswith(
-        "Too far behind for its ln Z to matter, and without a place in the ranking: far"
-    )
+    assert left_out(found).startswith("Too far behind for its ln Z to matter, and without a place in the ranking: far")
     assert preferred(found).startswith("The evidence prefers one to other by 2.0")
     assert left_out(found) in sentences(found)
     assert document(found)["out_of_reach"] == left_out(found)
