@@ -135,8 +135,8 @@ def loop(
 ) -> Loop:
     """Diagnose, sample, add what is missing, and again, until adequate or abstaining.
 
-    Without a ``hypothesis`` it begins with the most probable energy. ``adapt_noise`` samples with correlated noise where
-    neighbouring readings turn out to be correlated.
+    Without a ``hypothesis`` it begins with the most probable energy. ``adapt_noise`` samples with correlated noise
+    where neighbouring readings turn out to be correlated.
     """
     return analyses.loop(measurement, _asked(hypothesis), _work(seed, out, ess), adapt_noise=adapt_noise).result
 

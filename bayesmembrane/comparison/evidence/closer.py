@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
-from bayesmembrane.comparison.evidence.search import Modes
+from bayesmembrane.comparison.evidence.search import Modes, joined
 from bayesmembrane.comparison.evidence.target import Problem
 from bayesmembrane.ground.parameters import Array
 
@@ -37,13 +37,6 @@ class Closer(Problem):
     def from_cube(self, u: Array) -> tuple[Array, Array]:
         x = from_cube(self.q, u)
         return x, self.problem.log_posterior(x) - self.q.log_density(x)
-
-
-def joined(fitted: Sequence[Mixture], share: Array) -> Mixture:
-    """One mixture of several, each with its ``share`` (M,); the least of their degrees of freedom for all."""
-    weights = [g.log_weights + np.log(s / np.sum(share)) for g, s in zip(fitted, share, strict=True)]
-    means, roots = (np.concatenate([getattr(g, n) for g in fitted]) for n in ("means", "roots"))
-    return Mixture(np.concatenate(weights), means, roots, min(g.degrees for g in fitted))
 
 
 def from_cube(q: Mixture, u: Array) -> Array:

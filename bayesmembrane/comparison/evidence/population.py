@@ -9,8 +9,7 @@ import numpy as np
 
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
-from bayesmembrane.comparison.evidence.closer import joined
-from bayesmembrane.comparison.evidence.search import Modes
+from bayesmembrane.comparison.evidence.search import Modes, joined
 from bayesmembrane.comparison.evidence.target import Problem
 from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array

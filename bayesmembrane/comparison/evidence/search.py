@@ -6,6 +6,7 @@ there is L(x(v)) N(v), so that nothing but the prior transform and the likelihoo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,15 +19,16 @@ from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.comparison.evidence.target import Coverage, Problem, smallest
 from bayesmembrane.ground.parameters import Array
 
-ASCENTS, NEIGHBOURS = 32, 17  # starts, each higher than its nearest points
+NEIGHBOURS = 17  # than all of which a start is higher
 FEW, LOOKED_AT = 4, 8192  # dimensions up to which all points are looked at, and how many beyond
 STEPS = (1.5, 1.0, 0.3, 0.05, 5e-3, 2e-4)  # tried side by side along each direction
-ITERATIONS, DIFFERENCE, LONGEST = 40, 1e-4, 1.0
+ITERATIONS, DIFFERENCE, LONGEST = 25, 1e-4, 1.0
 FARTHEST = 7.5  # of v: Phi has digits there
-ROUNDS, EACH, LAST = 3, 256, 1024  # of importance sampling around each mode, and around all, for each
+ROUNDS = 3  # of importance sampling around each mode
 CLOUD = 512  # draws that tell others where a mode is
 DEGREES, WIDER = 4.0, 1.2
-MODES, LEAST = 6, 16.0  # most modes that are kept, and how much less in ln mass than the first they may hold
+MODES, LEAST = 5, 16.0  # most modes that are kept, and how much less in ln mass than the first they may hold
+SHARES = ((128, 8, 32), (16, 128, 256), (4, 256, 1024))  # points for one ascent or draw; least and most of them
 SIGMAS, LEAST_GAP, LARGEST_SHARE = 4.0, 0.2, 0.05  # for a mode to count as missed: of ln Z, and of the largest weight
 
 
@@ -67,6 +69,20 @@ class Modes:
         return gap if sure else 0.0
 
 
+@dataclass(frozen=True)
+class Effort:
+    """What a search spends beside its points: most ``ascents``, draws at ``each`` mode in a round and in the last."""
+
+    ascents: int
+    each: int
+    last: int
+
+    @staticmethod
+    def of(points: int) -> Effort:
+        """In proportion to the points, within limits."""
+        return Effort(*(int(np.clip(points // n, low, high)) for n, low, high in SHARES))
+
+
 def search(problem: Problem, rng: np.random.Generator) -> Modes:
     """The modes that are found from as many scrambled Sobol points of the prior as the problem asks for.
 
@@ -74,23 +90,24 @@ def search(problem: Problem, rng: np.random.Generator) -> Modes:
     ends, adapted importance sampling (O. Cappé et al., Stat. Comput. 18 (2008) 447) tells how much of Z it holds.
     """
     points = problem.points
+    effort = Effort.of(points)
     v = ndtri(qmc.Sobol(problem.size, rng=rng).random(points) + 2.0**-31)
     value = density(problem, v)
-    starts = _standing_out(v[np.isfinite(value)], value[np.isfinite(value)])
+    starts = _standing_out(v[np.isfinite(value)], value[np.isfinite(value)], effort.ascents)
     volume = smallest(points)
     if not len(starts):
         return Modes((), (), -np.inf, np.inf, Coverage(points, 0, 0, volume))
     peaks = _ascend(problem, starts)
-    fitted = _all_fitted(problem, peaks, rng)
+    fitted = _all_fitted(problem, peaks, effort.each, rng)
     if fitted:
         # A spike within a mode is out of sight from the prior, and not from within.
-        v = _joined(fitted).draw(rng, points // 4)
+        v = joined(fitted, np.ones(len(fitted))).draw(rng, points // 4)
         value = density(problem, v)
-        more = _standing_out(v[np.isfinite(value)], value[np.isfinite(value)])
+        more = _standing_out(v[np.isfinite(value)], value[np.isfinite(value)], effort.ascents)
         starts = np.concatenate([starts, more])
         peaks = tuple(np.concatenate(both) for both in zip(peaks, _ascend(problem, more), strict=True))
-        fitted = _all_fitted(problem, peaks, rng)
-    return _weighed(problem, fitted, rng, Coverage(points, len(starts), len(fitted), volume))
+        fitted = _all_fitted(problem, peaks, effort.each, rng)
+    return _weighed(problem, fitted, effort.last, rng, Coverage(points, len(starts), len(fitted), volume))
 
 
 def density(problem: Problem, v: Array) -> Array:
@@ -104,8 +121,8 @@ def density(problem: Problem, v: Array) -> Array:
 # ---- the way up ------------------------------------------------------------------------------------------------------
 
 
-def _standing_out(v: Array, value: Array) -> Array:
-    """Up to `ASCENTS` of v (n, k) that are higher than their neighbours: half the highest, half from the rest."""
+def _standing_out(v: Array, value: Array, most: int) -> Array:
+    """Up to ``most`` of v (n, k) that are higher than their neighbours: half the highest, half from the rest."""
     order = np.argsort(-value)
     if v.shape[1] > FEW and order.size > LOOKED_AT:
         # Neighbours are dear in many dimensions: of the lower half of those looked at, only some.
@@ -113,9 +130,9 @@ def _standing_out(v: Array, value: Array) -> Array:
         order = np.concatenate([best, others[:: max(1, 2 * len(others) // LOOKED_AT)]])
     _, near = cKDTree(v).query(v[order], k=min(len(v), NEIGHBOURS))
     peaks = order[value[order] >= np.max(value[np.reshape(near, (len(order), -1))], axis=1)]
-    first, others = np.split(peaks, [ASCENTS // 2])
-    if len(others) > ASCENTS // 2:
-        others = others[np.linspace(0, len(others) - 1, ASCENTS // 2).astype(int)]
+    first, others = np.split(peaks, [most // 2])
+    if len(others) > most // 2:
+        others = others[np.linspace(0, len(others) - 1, most // 2).astype(int)]
     return v[np.concatenate([first, others])]
 
 
@@ -211,16 +228,16 @@ def _distinct(v: Array, value: Array, covariance: Array) -> list[tuple[Array, Ar
 # ---- how much of Z is there ------------------------------------------------------------------------------------------
 
 
-def _fitted(problem: Problem, centre: Array, covariance: Array, rng: np.random.Generator) -> Mixture | None:
-    """A t-distribution fitted to the mode around ``centre``; None if next to nothing is found there."""
-    g = _single(centre, covariance)
+def _fitted(problem: Problem, peak: tuple[Array, Array], each: int, rng: np.random.Generator) -> Mixture | None:
+    """A t-distribution fitted to the mode around a ``peak``; None if next to nothing is found there."""
+    g = _single(*peak)
     for _ in range(ROUNDS):
-        v = g.draw(rng, EACH)
+        v = g.draw(rng, each)
         log_weight = density(problem, v) - g.log_density(v)
         if not np.any(np.isfinite(log_weight)):
             return None
         w = np.exp(log_weight - np.max(log_weight))
-        w = np.minimum(w, np.sqrt(EACH) * np.mean(w))
+        w = np.minimum(w, np.sqrt(each) * np.mean(w))
         w /= np.sum(w)
         mean = w @ v
         spread = (w[:, None] * (v - mean)).T @ (v - mean)
@@ -231,14 +248,18 @@ def _fitted(problem: Problem, centre: Array, covariance: Array, rng: np.random.G
     return g
 
 
-def _all_fitted(problem: Problem, peaks: tuple[Array, Array, Array], rng: np.random.Generator) -> list[Mixture]:
-    fitted = [_fitted(problem, *peak, rng) for peak in _distinct(*peaks)]
+def _all_fitted(
+    problem: Problem, peaks: tuple[Array, Array, Array], each: int, rng: np.random.Generator
+) -> list[Mixture]:
+    fitted = [_fitted(problem, peak, each, rng) for peak in _distinct(*peaks)]
     return [g for g in fitted if g is not None]
 
 
-def _joined(fitted: list[Mixture]) -> Mixture:
-    parts = (np.concatenate([getattr(g, n) for g in fitted]) for n in ("means", "roots"))
-    return Mixture(np.full(len(fitted), -np.log(len(fitted))), *parts, DEGREES)
+def joined(fitted: Sequence[Mixture], share: Array) -> Mixture:
+    """One mixture of several, each with its ``share`` (M,); the least of their degrees of freedom for all."""
+    weights = [g.log_weights + np.log(s / np.sum(share)) for g, s in zip(fitted, share, strict=True)]
+    means, roots = (np.concatenate([getattr(g, n) for g in fitted]) for n in ("means", "roots"))
+    return Mixture(np.concatenate(weights), means, roots, min(g.degrees for g in fitted))
 
 
 def _single(centre: Array, covariance: Array) -> Mixture:
@@ -248,12 +269,12 @@ def _single(centre: Array, covariance: Array) -> Mixture:
     return Mixture(np.zeros(1), centre[None], WIDER * root[None], DEGREES)
 
 
-def _weighed(problem: Problem, fitted: list[Mixture], rng: np.random.Generator, coverage: Coverage) -> Modes:
+def _weighed(problem: Problem, fitted: list[Mixture], each: int, rng: np.random.Generator, coverage: Coverage) -> Modes:
     """Masses and draws of all modes, from one mixture of them."""
     if not fitted:
         return Modes((), (), -np.inf, np.inf, coverage)
-    count, g = len(fitted), _joined(fitted)
-    v = g.draw(rng, LAST * count)
+    count, g = len(fitted), joined(fitted, np.ones(len(fitted)))
+    v = g.draw(rng, each * count)
     log_weight = density(problem, v) - g.log_density(v)
     if not np.any(np.isfinite(log_weight)):
         return Modes((), (), -np.inf, np.inf, coverage)
