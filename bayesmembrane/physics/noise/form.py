@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -83,8 +84,8 @@ class FormLikelihood(NoiseLikelihood):
 
     def at(self, force: Array, traces: Array | None = None) -> FormLikelihood:
         """The same for these curves; `covariance` is then that of the first."""
-        told = object.__new__(FormLikelihood)
-        told.__dict__ = {**self.__dict__, "force": force, "traces": self.traces}
+        told = copy(self)
+        told.force = force
         if traces is not None:
             told.kept = np.flatnonzero(np.any(traces != 0, axis=(0, 2)))
             told.traces = traces[:, told.kept]
