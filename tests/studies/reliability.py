@@ -33,6 +33,7 @@ from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.words.diagnosis import document
 from tests.generator.datasets import Dataset, generate
 from tests.generator.film import NoSolutionError
+from tests.generator.protocols import Protocol
 from tests.generator_two.datasets import Dataset as SecondDataset
 from tests.generator_two.membrane import LockedError
 from tests.studies import reliability_plan, second_plan
@@ -121,7 +122,8 @@ def key(case: Case, energy: str) -> str:
 
 def warmed() -> None:
     """What is compiled on first use is no part of a case's time."""
-    data = generate("friction+clamp_slip", "neo_hookean", "two_speeds", seed=1)
+    short = Protocol("short", (0.015, 0.030), (1e-3,) * 2, 80)
+    data = generate("friction", "neo_hookean", short, "white", 2.0, seed=11)
     with tempfile.TemporaryDirectory() as folder:
         diagnosed(read_measurement(*data.write(Path(folder))), "neo_hookean")
 
