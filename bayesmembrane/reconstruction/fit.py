@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import expit, logit
 
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.reconstruction.model import Knobs, LossModel
+from bayesmembrane.reconstruction.model import CurveState, Knobs, LossModel
 
 LOOSEN = (64.0, 16.0, 4.0, 1.0)  # errors are first taken as larger than they are: the way to the mode is then smooth
 ROUNDS = 8
@@ -168,18 +168,23 @@ class _Look(NamedTuple):
             mine[index] = theirs
 
 
+def curvature(model: LossModel, theta: Array, state: CurveState, knobs: Knobs, loosen: float) -> Array:
+    """(B, P, P) Gauss-Newton curvature of -ln p(losses, theta), with the weights of the Student t."""
+    scale = model.error_scale(knobs, len(theta)) * loosen
+    weight = model.weights(state.residual / scale)[0] / scale**2
+    share = expit(theta[:, -len(model.ranges) :])
+    prior = np.concatenate([np.ones((len(theta), theta.shape[1] - share.shape[1])), 2 * share * (1 - share)], axis=1)
+    jacobian = np.swapaxes(state.jacobian * weight[:, :, None], 1, 2) @ state.jacobian
+    return np.asarray(jacobian + prior[:, :, None] * np.eye(theta.shape[1]))
+
+
 def _look(model: LossModel, theta: Array, knobs: Knobs, loosen: float) -> _Look:
     with np.errstate(all="ignore"):
         state = model.evaluate(theta, knobs)
         value, gradient = model.log_density(theta, state, knobs, loosen)
     good = np.isfinite(value) & np.all(np.isfinite(gradient), axis=1)
-    scale = model.error_scale(knobs, len(theta)) * loosen
-    residual, jacobian = np.where(good[:, None], state.residual, 0.0), state.jacobian
-    jacobian = np.where(good[:, None, None], jacobian, 0.0)
-    weight = model.weights(residual / scale)[0] / scale**2
-    share = expit(theta[:, -len(model.ranges) :])
-    prior = np.concatenate([np.ones((len(theta), theta.shape[1] - share.shape[1])), 2 * share * (1 - share)], axis=1)
-    precision = np.swapaxes(jacobian * weight[:, :, None], 1, 2) @ jacobian + prior[:, :, None] * np.eye(theta.shape[1])
+    precision = curvature(model, theta, state, knobs, loosen)
+    precision = np.where(good[:, None, None], precision, np.eye(theta.shape[1]))
     return _Look(theta.copy(), np.where(good, value, -np.inf), np.where(good[:, None], gradient, 0.0), precision)
 
 
@@ -188,13 +193,13 @@ def _look(model: LossModel, theta: Array, knobs: Knobs, loosen: float) -> _Look:
 
 def scan(model: LossModel, grid: list[Knobs], start: Mode, least: float = LEAST_GAIN) -> list[Mode]:
     """The modes at all settings of the scales, each from ``start``."""
-    return climb(model, np.array([_restart(model, start, k) for k in grid]), together(grid), least=least)
+    return climb(model, np.array([restart(model, start, k) for k in grid]), together(grid), least=least)
 
 
 def again(model: LossModel, mode: Mode, knobs: Knobs | None = None) -> Mode:
     """The mode of a model that differs a little from the one that ``mode`` belongs to, or at other scales."""
     knobs = mode.knobs if knobs is None else knobs
-    return climb(model, _restart(model, mode, knobs)[None], knobs)[0]
+    return climb(model, restart(model, mode, knobs)[None], knobs)[0]
 
 
 def together(knobs: Sequence[Knobs]) -> Knobs:
@@ -202,7 +207,7 @@ def together(knobs: Sequence[Knobs]) -> Knobs:
     return Knobs(*(np.concatenate([np.atleast_1d(k[i]) for k in knobs]) for i in range(4)))
 
 
-def _restart(model: LossModel, mode: Mode, knobs: Knobs) -> Array:
+def restart(model: LossModel, mode: Mode, knobs: Knobs) -> Array:
     """The unknowns of a mode in the units of other scales, so that the smooth curve stays where it is."""
     theta = mode.theta.copy()
     theta[model.curve.free] *= np.ravel(mode.knobs.roughness)[0] / np.ravel(knobs.roughness)[0]

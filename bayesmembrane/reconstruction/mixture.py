@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logit, logsumexp, softmax
+from scipy.special import expit, logit, logsumexp, softmax
 from scipy.stats import norm, qmc
 
 from bayesmembrane.data.published import PublishedTable
@@ -17,8 +17,7 @@ from bayesmembrane.reconstruction.families.displaced import Displaced
 from bayesmembrane.reconstruction.families.energy import EnergyCurve, standard
 from bayesmembrane.reconstruction.families.smooth_force import SmoothForce
 from bayesmembrane.reconstruction.families.smooth_logarithm import SmoothLogarithm
-from bayesmembrane.reconstruction.draws import sample
-from bayesmembrane.reconstruction.fit import ROUGH_GAIN, Mode, climb, scan, together
+from bayesmembrane.reconstruction.fit import ROUGH_GAIN, Mode, climb, find_mode, scan, together
 from bayesmembrane.reconstruction.model import CurveState, Knobs, LossModel
 from bayesmembrane.reconstruction.scales import all_scales, middle, solver_scales
 from bayesmembrane.reconstruction.simulations import Simulate, Simulations
@@ -27,10 +26,11 @@ from bayesmembrane.reconstruction.simulations import Simulate, Simulations
 # Laplace's error, is this much in its logarithm.
 EVIDENCE_SD = 2.0
 HOPELESS = 25.0  # ln evidence below the best at which a family is out, whatever its scales
+BEHIND = 2.0  # ... at which it looks again
 UNLIKELY = 12.0  # the same for a size of its smooth part
 LOOSEN = (4.0, 1.0)
 ROUNDS = 8
-TRIALS = 12  # log2 of the number of evidences that could as well have come out
+TRIALS = 14  # log2 of the number of evidences that could as well have come out
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,31 @@ def families(table: PublishedTable, simulations: Simulations, simulate: Simulate
     return found
 
 
+def place_all(model: LossModel, candidates: Sequence[CurveFamily], start: Mode) -> list[Placed]:
+    """The modes of all families, each from the curve that ``start``, a mode of ``model``, has found, and from others.
+
+    Curves that meet the losses may lie in different places: a smooth family also looks for its own, and one that is
+    behind looks again from where the best one is.
+    """
+    found = []
+    for family in candidates:
+        placed = place(model, family, start)
+        if family.ready:
+            own = replace(model, curve=family)
+            mode = find_mode(own, middle(family, len(model.ranges)))
+            placed = max(placed, place(own, family, mode), key=lambda p: p.log_evidence)
+        found.append(placed)
+    best = max(found, key=lambda p: p.log_evidence)
+    return [
+        max(p, place(best.model, p.family, best.best), key=lambda q: q.log_evidence)
+        if best.log_evidence - HOPELESS < p.log_evidence < best.log_evidence - BEHIND
+        else p
+        for p in found
+    ]
+
+
 def place(model: LossModel, family: CurveFamily, start: Mode) -> Placed:
-    """The mode of a family in the middle of the scales, from the curve that ``start``, a mode of ``model``, has found."""
+    """The modes of a family at all its sizes, other scales in the middle; ``start`` is a mode of ``model``."""
     state = model.evaluate(start.theta[None], start.knobs)
     knobs, firsts = middle(family, len(model.ranges)), start.theta[-len(model.ranges) :]
     family, c = family.placed(state.x[0], state.smooth[0])
@@ -159,25 +182,49 @@ def probabilities(log_evidence: Sequence[float]) -> Array:
 
 @dataclass(frozen=True)
 class Told:
-    """What draws of one family say: forces (M, N) at the same deflections, first positions (M, R), acceptance."""
+    """What one family says.
 
-    forces: Array
-    firsts: Array
-    acceptance: float
-
-
-def tell(placed: Placed, x: Array, chains: int, steps: int, seed: int) -> Told:
-    """Draws of a family at deflections x (N,), in m.
-
-    A draw whose positions differ is moved along its own smooth curve: what is asked is the force at one deflection.
+    Attributes
+    ----------
+    force, covariance : (N,) N and (N, N) N^2, of the forces at given deflections
+    first, first_covariance : (R,) m and (R, R) m^2, of the first positions
     """
-    model = placed.model
-    draws = sample(model, list(placed.modes), chains, steps, seed)
-    forces, firsts = [], []
-    for theta, state in zip(draws.theta, draws.states(model), strict=True):
-        forces.append(moved(model, theta, draws.knobs, state, x))
-        firsts.append(state.first)
-    return Told(np.concatenate(forces), np.concatenate(firsts), draws.acceptance)
+
+    force: Array
+    covariance: Array
+    first: Array
+    first_covariance: Array
+
+
+def tell(placed: Placed, x: Array) -> Told:
+    """Moments of the forces at deflections x (N,) in m and of the first positions: those of all modes together.
+
+    Each mode is a Gaussian. Forces move along their own smooth curve to x: what is asked is the force at one
+    deflection, so what is not known of the positions is not part of it.
+    """
+    model, evidence = placed.model, np.array([m.evidence for m in placed.modes])
+    share, parts = np.exp(evidence - logsumexp(evidence)), []
+    for mode in placed.modes:
+        theta, covariance = mode.theta[None], mode.covariance()
+        state = model.evaluate(theta, mode.knobs)
+        force = moved(model, theta, mode.knobs, state, x)[0]
+        rates = state.force_jacobian[0].copy()
+        rates[:, -len(model.ranges) :] = 0.0
+        size = model.curve.size
+        rates[:, :size] = model.smooth(theta, mode.knobs, x[None])[2][0]
+        parts.append((force, rates @ covariance @ rates.T, *_firsts(model, mode, covariance)))
+    columns = [np.array(c) for c in zip(*parts, strict=True)]
+    return Told(*mixture(columns[0], columns[1], share), *mixture(columns[2], columns[3], share))
+
+
+def _firsts(model: LossModel, mode: Mode, covariance: Array) -> tuple[Array, Array]:
+    """Mean (R,) and covariance (R, R) of the first positions, m: their logits are normal; independent."""
+    ranges = len(model.ranges)
+    nodes, weight = np.polynomial.hermite_e.hermegauss(31)
+    spread = np.sqrt(np.diag(covariance)[-ranges:])
+    first = model.reach * expit(mode.theta[-ranges:] + nodes[:, None] * spread)
+    mean = weight @ first / np.sum(weight)
+    return mean, np.diag(weight @ (first - mean) ** 2 / np.sum(weight))
 
 
 def moved(model: LossModel, theta: Array, knobs: Knobs, state: CurveState, x: Array) -> Array:
@@ -186,10 +233,11 @@ def moved(model: LossModel, theta: Array, knobs: Knobs, state: CurveState, x: Ar
     return np.asarray(state.force + there - state.smooth)
 
 
-def together_told(told: Sequence[Array], probability: Array) -> tuple[Array, Array]:
-    """Mean (N,) and covariance (N, N) of a mixture of draws (M_k, N) with probabilities (K,) that add up to 1."""
-    means = np.array([np.mean(d, axis=0) for d in told])
-    mean = probability @ means
-    within = sum(p * np.cov(d.T, bias=True) for p, d in zip(probability, told, strict=True))
-    between = (means - mean).T @ ((means - mean) * probability[:, None])
-    return mean, np.asarray(within + between)
+def mixture(means: Array, covariances: Array, share: Array) -> tuple[Array, Array]:
+    """Mean (N,) and covariance (N, N) of a mixture: means (K, N), covariances (K, N, N), shares (K,) that add up to 1.
+
+    Within and between: sum_k p_k (C_k + (m_k - m)(m_k - m)^T).
+    """
+    mean = share @ means
+    off = means - mean
+    return np.asarray(mean), np.asarray(np.tensordot(share, covariances, axes=1) + (off.T * share) @ off)

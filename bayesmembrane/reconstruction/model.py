@@ -3,13 +3,13 @@
     L_kr = | y_r - F_k(x_r) (1 + error_k) | + error_kr,   y = g(x) + nugget,   x_r evenly spaced
 
 k counts the rows of the published table, r its ranges. g is one curve for all ranges, of a family that says what is
-believed of it before the losses are seen (`families`). error_k is the numerical error of the published simulations: shared by
-rows whose curves are equal up to a factor (neo-Hookean rows), since it does not depend on the factor. error_kr, what
-else is wrong with a simulation or a print, has heavy tails: a Student t vector for each material and range, since what
-makes a material hard to simulate is common to its rows. Everything unknown is one vector of numbers with independent
-standard normal priors: the mode is that of a robust least-squares problem. Only the first positions a_r differ:
-they follow one recipe, uniform between zero and a largest one that is common to the ranges and unknown (ln uniform,
-not below the recording step s), in the smooth form p(a) ~ (s^4 + sum_r a_r^4)^(-R/4), and at most one spacing.
+believed of it before the losses are seen (`families`). error_k is the numerical error of the published simulations:
+shared by rows whose curves are equal up to a factor (neo-Hookean rows), since it does not depend on the factor.
+error_kr, what else is wrong with a simulation or a print, has heavy tails: a Student t vector for each material and
+range, since what makes a material hard to simulate is common to its rows. Everything unknown is one vector of numbers
+with independent standard normal priors: the mode is that of a robust least-squares problem. Only the first positions
+a_r differ: they follow one recipe, uniform between zero and a largest one that is common to the ranges and unknown (ln
+uniform, not below the recording step s), in the smooth form p(a) ~ (s^4 + sum_r a_r^4)^(-R/4), and at most one spacing.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ class LossModel:
         use[row] = False
         return replace(self, use=use)
 
-    # ---- layout of the unknowns: curve | nugget | family errors | first positions ----------------------------------------
+    # ---- layout of the unknowns: curve | nugget | family errors | first positions ------------------------------------
 
     @property
     def points(self) -> int:
@@ -211,12 +211,17 @@ class LossModel:
         """As `log_posterior`, from what the unknowns mean; ``loosen`` multiplies the errors."""
         scale = self.error_scale(knobs, theta.shape[0]) * loosen
         z = state.residual / scale
-        weight, size, total = self.weights(z)
-        constant = gammaln((self.tail + size) / 2) - gammaln(self.tail / 2) - 0.5 * size * np.log(self.tail * np.pi)
         value, gradient = self.log_prior(theta)
-        value = value + np.sum(constant - 0.5 * (self.tail + size) * np.log1p(total / self.tail), axis=1)
-        value = value - np.sum(np.where(self.believed, np.log(scale), 0.0), axis=1)
-        return value, gradient - np.einsum("bm,bmp->bp", weight * z / scale, state.jacobian)
+        slope = np.einsum("bm,bmp->bp", self.weights(z)[0] * z / scale, state.jacobian)
+        return value + self.log_likelihood(state.residual, knobs, loosen), gradient - slope
+
+    def log_likelihood(self, residual: Array, knobs: Knobs, loosen: float) -> Array:
+        """ln p(losses | theta) (B,) from residuals (B, R K); ``loosen`` multiplies the errors."""
+        scale = self.error_scale(knobs, residual.shape[0]) * loosen
+        _, size, total = self.weights(residual / scale)
+        constant = gammaln((self.tail + size) / 2) - gammaln(self.tail / 2) - 0.5 * size * np.log(self.tail * np.pi)
+        value = np.sum(constant - 0.5 * (self.tail + size) * np.log1p(total / self.tail), axis=1)
+        return np.asarray(value - np.sum(np.where(self.believed, np.log(scale), 0.0), axis=1))
 
     @property
     def believed(self) -> NDArray[np.bool_]:

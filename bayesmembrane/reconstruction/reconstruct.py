@@ -3,8 +3,9 @@
 A paper that prints the Euclidean distance between a measured force curve and K simulated ones, but not the curve, has
 printed the curve all the same: K distances to K known points locate it, as a position follows from ranges. The unknown
 number and first position of the training deflections, errors of the published simulations and misprints are part of
-the question. `model` has the posterior, `fit` its mode, evidence and draws, `counts` the numbers of points, `rows` the
-rows that contradict the others.
+the question. `families` has what is believed of the curve beforehand, `model` the posterior, `fit` its modes and their
+evidence, `counts` the numbers of points, `rows` the rows that contradict the others, and `mixture` what all families
+say together.
 """
 
 from __future__ import annotations
@@ -34,12 +35,12 @@ from bayesmembrane.reconstruction.mixture import (
     Placed,
     Told,
     families,
+    mixture,
     moved,
-    place,
+    place_all,
     probabilities,
     relative_evidence,
     tell,
-    together_told,
     weigh,
 )
 from bayesmembrane.reconstruction.model import Knobs, LossModel
@@ -48,8 +49,7 @@ from bayesmembrane.reconstruction.rows import RowCheck, check_row, set_aside, su
 from bayesmembrane.reconstruction.scales import NUGGET, all_scales, middle, solver_scales
 from bayesmembrane.reconstruction.simulations import Simulate, tabulate
 
-CHAINS, LEAST_CHAINS, DRAWS = 72, 8, 60  # chains of all families together, of each of them at least, draws of each
-NEGLIGIBLE = 2e-3  # probability of a family below which it is not drawn from
+NEGLIGIBLE = 2e-3  # probability of a family below which it does not join the mixture
 
 
 def simulate_on(table: PublishedTable) -> Simulate:
@@ -62,14 +62,13 @@ def simulate_on(table: PublishedTable) -> Simulate:
     return simulate
 
 
-def reconstruct(table: PublishedTable | None = None, simulate: Simulate | None = None, seed: int = 0) -> Reconstruction:
+def reconstruct(table: PublishedTable | None = None, simulate: Simulate | None = None) -> Reconstruction:
     """Measured forces y, their positions, and misprints, from losses |y - F_k| and the forward model alone.
 
     Parameters
     ----------
     table : the published table; the source paper's unless given
     simulate : forces (N,) in N of (material, parameters, deflections in m), nan where there is none
-    seed : of the draws; the same seed gives the same answer
 
     Raises `DataError` if the table holds too little or the forward model has no curve for its first row.
     """
@@ -79,14 +78,18 @@ def reconstruct(table: PublishedTable | None = None, simulate: Simulate | None =
     family = SmoothLogarithm(simulations)
     model = LossModel(simulations, family, table.losses, simulations.usable, _all(table), (), table.step)
     model, searched, compared = _counted(model)
-    start = find_mode(model, middle(family, len(model.ranges)))
-    mode = max(scan(model, all_scales(family, len(model.ranges)), start), key=lambda m: m.evidence)
-    state = model.evaluate(mode.theta[None], mode.knobs)
-    candidates = families(table, simulations, simulate, np.array([state.x[0], state.force[0]]))
-    placed = weigh([place(model, c, start) for c in candidates])
-    mixed = _mixed(placed, seed)
+    mixed = curve_of_all_families(model, table, simulate)
     counted = _Counted(searched, _under_all(mixed, compared))
     return _answer(table, simulate, mixed, counted)
+
+
+def curve_of_all_families(model: LossModel, table: PublishedTable, simulate: Simulate) -> Mixed:
+    """What all families say together, at given numbers of points and with the rows that are believed."""
+    start = find_mode(model, middle(model.curve, len(model.ranges)))
+    mode = max(scan(model, all_scales(model.curve, len(model.ranges)), start), key=lambda m: m.evidence)
+    state = model.evaluate(mode.theta[None], mode.knobs)
+    near = np.array([state.x[0], state.force[0]])
+    return _mixed(weigh(place_all(model, families(table, model.simulations, simulate, near), start)))
 
 
 def _all(table: PublishedTable) -> tuple[int, ...]:
@@ -112,8 +115,8 @@ class _Counted(NamedTuple):
     compared: Compared
 
 
-class _Mixed(NamedTuple):
-    """All families, their probabilities (K,), and draws of those that are likely, at deflections x (N,)."""
+class Mixed(NamedTuple):
+    """All families, their probabilities (K,), and what those say that are likely, of forces at deflections x (N,)."""
 
     placed: list[Placed]
     probability: Array
@@ -122,9 +125,21 @@ class _Mixed(NamedTuple):
 
     @property
     def share(self) -> Array:
-        """Probabilities of the families that are drawn from, in their order; they add up to 1."""
+        """Probabilities of the families that are mixed, in their order; they add up to 1."""
         share = self.probability[list(self.told)]
         return np.asarray(share / np.sum(share))
+
+    @property
+    def forces(self) -> tuple[Array, Array]:
+        """Mean (N,) in N and covariance (N, N) in N^2 of the forces."""
+        told = self.told.values()
+        return mixture(np.array([t.force for t in told]), np.array([t.covariance for t in told]), self.share)
+
+    @property
+    def firsts(self) -> tuple[Array, Array]:
+        """Mean (R,) in m and covariance (R, R) in m^2 of the first positions."""
+        told = self.told.values()
+        return mixture(np.array([t.first for t in told]), np.array([t.first_covariance for t in told]), self.share)
 
     @property
     def working(self) -> Placed:
@@ -132,19 +147,15 @@ class _Mixed(NamedTuple):
         return self.placed[0]
 
 
-def _mixed(placed: list[Placed], seed: int) -> _Mixed:
+def _mixed(placed: list[Placed]) -> Mixed:
     probability = probabilities([p.log_evidence for p in placed])
     first = placed[int(np.argmax(probability))]
     x = first.model.evaluate(first.best.theta[None], first.best.knobs).x[0]
-    told = {
-        k: tell(p, x, max(LEAST_CHAINS, round(CHAINS * probability[k])), DRAWS, seed)
-        for k, p in enumerate(placed)
-        if probability[k] > NEGLIGIBLE
-    }
-    return _Mixed(placed, probability, told, x)
+    told = {k: tell(p, x) for k, p in enumerate(placed) if probability[k] > NEGLIGIBLE}
+    return Mixed(placed, probability, told, x)
 
 
-def _under_all(mixed: _Mixed, compared: Compared) -> Compared:
+def _under_all(mixed: Mixed, compared: Compared) -> Compared:
     """The likely numbers of points with the evidence that all families together give them."""
     counts = list(compared)
     firsts = np.array([compared[c][1] for c in counts])
@@ -153,8 +164,8 @@ def _under_all(mixed: _Mixed, compared: Compared) -> Compared:
     return {c: (float(e), compared[c][1]) for c, e in zip(counts, mean, strict=True)}
 
 
-def _answer(table: PublishedTable, simulate: Simulate, mixed: _Mixed, counted: _Counted) -> Reconstruction:
-    force, covariance = together_told([t.forces for t in mixed.told.values()], mixed.share)
+def _answer(table: PublishedTable, simulate: Simulate, mixed: Mixed, counted: _Counted) -> Reconstruction:
+    force, covariance = mixed.forces
     model, mode = mixed.working.model, mixed.working.best
     checks = [check_row(model, mode, k) for k in range(len(table.rows))]
     wrong = np.flatnonzero(~model.use).tolist()
@@ -166,26 +177,23 @@ def _answer(table: PublishedTable, simulate: Simulate, mixed: _Mixed, counted: _
         tuple(suspect(table, model, mode, checks[k], simulate) for k in wrong),
         tuple(replace(i, force=force + i.force - base) for i in _influence(model, mode, mixed.x)),
         _scales(table, mixed.working.modes),
-        float(mixed.share @ np.array([t.acceptance for t in mixed.told.values()])),
         _families(mixed),
     )
 
 
-def _families(mixed: _Mixed) -> tuple[FamilyResult, ...]:
+def _families(mixed: Mixed) -> tuple[FamilyResult, ...]:
     best = max(p.log_evidence for p in mixed.placed)
     found = []
     for k, (p, probability) in enumerate(zip(mixed.placed, mixed.probability.tolist(), strict=True)):
         told = mixed.told.get(k)
-        force = None if told is None else np.mean(told.forces, axis=0)
-        sd = None if told is None else np.std(told.forces, axis=0)
+        force = None if told is None else told.force
+        sd = None if told is None else np.sqrt(np.diag(told.covariance))
         found.append(FamilyResult(p.family.name, p.family.title, probability, p.log_evidence - best, force, sd))
     return tuple(found)
 
 
-def _ranges(
-    table: PublishedTable, mixed: _Mixed, force: Array, sd: Array, counted: _Counted
-) -> tuple[RangeResult, ...]:
-    firsts, cov = together_told([t.firsts for t in mixed.told.values()], mixed.share)
+def _ranges(table: PublishedTable, mixed: Mixed, force: Array, sd: Array, counted: _Counted) -> tuple[RangeResult, ...]:
+    firsts, cov = mixed.firsts
     found = []
     for r, block in enumerate(mixed.working.model.blocks()):
         probability, positions = tell_counts(r, counted.searched[r], counted.compared)
@@ -195,7 +203,7 @@ def _ranges(
     return tuple(found)
 
 
-def _losses(table: PublishedTable, mixed: _Mixed, checks: list[RowCheck]) -> tuple[LossCheck, ...]:
+def _losses(table: PublishedTable, mixed: Mixed, checks: list[RowCheck]) -> tuple[LossCheck, ...]:
     """Printed losses beside those of the families' most probable curves, averaged.
 
     Not of their average: curves at the right distance from a simulated one lie on a sphere, and their mean inside it.

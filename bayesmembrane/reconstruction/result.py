@@ -90,7 +90,7 @@ class FamilyResult:
     name, title : how answers call it, how reports print it
     probability : after the losses; families are equally probable before them
     log_evidence : ln p(losses) by Laplace's approximation, relative to the best family
-    force, force_sd : (N,) N, at the deflections of the reconstruction; None for a family that is not drawn from
+    force, force_sd : (N,) N, at the deflections of the reconstruction; None for a family that is not mixed
     """
 
     name: str
@@ -113,9 +113,10 @@ class FamilyResult:
 
 @dataclass(frozen=True)
 class Influence:
-    """Forces (N,) in N at the same deflections if one assumption were changed; ln evidence relative to the unchanged one.
+    """Forces (N,) in N at the same deflections if one assumption were changed, and what that does to ln evidence.
 
-    The change is that of the curve with a smooth logarithm, in which all of them mean something. The evidence is None where the data or the measure of the first positions differ too.
+    The change is that of the curve with a smooth logarithm, in which all of these assumptions mean something. The
+    evidence is None where the data or the measure of the first positions differ too.
     """
 
     changed: str
@@ -135,7 +136,6 @@ class Reconstruction(Showable):
     suspects : rows that contradict the others, with the smallest corrections
     influence : what other priors and likelihoods would give
     scales : posterior means of roughness, rounding and solver errors
-    acceptance : of the Hamiltonian steps
     families : what the curve may be, with probabilities; forces and covariance are those of their mixture
     """
 
@@ -145,7 +145,6 @@ class Reconstruction(Showable):
     suspects: tuple[Suspect, ...]
     influence: tuple[Influence, ...]
     scales: dict[str, float]
-    acceptance: float
     families: tuple[FamilyResult, ...] = ()
 
     @property
@@ -172,7 +171,6 @@ class Reconstruction(Showable):
             "losses": [c.summary() for c in self.losses],
             "influence": influence,
             "scales": self.scales,
-            "acceptance": self.acceptance,
         }
 
 

@@ -37,6 +37,11 @@ class CurveFamily(ABC):
         """The one of them that is used where one must do."""
 
     @property
+    def ready(self) -> bool:
+        """Whether it is good for any curve as it is, and needs not be made ready for those near one."""
+        return True
+
+    @property
     @abstractmethod
     def size(self) -> int:
         """J, the number of unknowns."""
@@ -59,7 +64,7 @@ class CurveFamily(ABC):
         return min(1.0, 0.5 / max(float(np.max(np.abs(moved @ step) / scale)), 1e-12))
 
     def nearest(self, x: Array, force: Array, start: Array, rounds: int = ROUNDS) -> Array:
-        """Unknowns (J,) of the curve through ``force`` (N,) at ``x`` (N,), met to `NEAR` of each force, from ``start``."""
+        """Unknowns (J,) of the curve through ``force`` (N,) at ``x`` (N,), met to `NEAR` of each; from ``start``."""
         c, sizes, sd = start, np.array([self.middle]), NEAR * (np.abs(force) + 0.02 * float(np.max(force)))
         for _ in range(rounds):
             y, _, moved = (v[0] for v in self.force(c[None], sizes, x[None]))

@@ -7,7 +7,6 @@ from functools import cached_property, lru_cache
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.stats import norm
 
@@ -32,37 +31,21 @@ NEWTON = 2  # steps that balance the frame
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """ln F of a film to second order in its coordinates, in standard deviations z (k,) of their priors, about ``at``.
+    """ln F of a film to first order in its coordinates, in standard deviations z (k,) of their priors, about ``at``.
 
-    ln F(d; z) = terms(ln d) . (1, z - at, products of pairs)
+    ln F(d; z) = terms(ln d) . (1, z - at). The error of the form takes up what is left where z is poorly known.
     """
 
     at: Array
     terms: CubicSpline
-    pairs: tuple[NDArray[np.intp], NDArray[np.intp]]
 
-    def of(self, z: Array, d: Array) -> tuple[Array, Array]:
-        """Film force f (B, N) and df/dd at deflections d (B, N); below 0.05 mm as at 0.05 mm."""
-        log_d, weight = np.log(np.maximum(d, NEAREST)), self._weight(z)[:, :, None]
-        force = np.exp((self.terms(log_d) @ weight)[:, :, 0])
-        slope = force * (self.terms(log_d, 1) @ weight)[:, :, 0] / np.exp(log_d)
-        return force, np.where(d > NEAREST, slope, 0.0)
-
-    def with_rates(self, z: Array, d: Array) -> tuple[Array, Array, Array]:
-        """As `of`, and df/dz (B, N, k)."""
-        force, slope = self.of(z, d)
-        step, k = z - self.at, z.shape[1]
-        i, j = self.pairs
-        rates = np.zeros((len(z), 1 + k + i.size, k))
-        rates[:, 1 + np.arange(k), np.arange(k)] = 1.0
-        rates[:, 1 + k + np.arange(i.size), i] += step[:, j]
-        rates[:, 1 + k + np.arange(i.size), j] += step[:, i]
-        return force, slope, force[:, :, None] * (self.terms(np.log(np.maximum(d, NEAREST))) @ rates)
-
-    def _weight(self, z: Array) -> Array:
-        step = z - self.at
-        i, j = self.pairs
-        return np.concatenate([np.ones((len(z), 1)), step, step[:, i] * step[:, j]], axis=1)
+    def of(self, z: Array, d: Array) -> tuple[Array, Array, Array]:
+        """Film force f (B, N), df/dd, and d ln f / dz (B, N, k) at d (B, N); below 0.05 mm as at 0.05 mm."""
+        log_d, weight = np.log(np.maximum(d, NEAREST)), (z - self.at)[:, :, None]
+        terms, rates = self.terms(log_d), self.terms(log_d, 1)
+        force = np.exp(terms[:, :, 0] + (terms[:, :, 1:] @ weight)[:, :, 0])
+        slope = force * (rates[:, :, 0] + (rates[:, :, 1:] @ weight)[:, :, 0]) / np.exp(log_d)
+        return force, np.where(d > NEAREST, slope, 0.0), terms[:, :, 1:]
 
 
 class EnergyCurve(CurveFamily):
@@ -125,6 +108,10 @@ class EnergyCurve(CurveFamily):
         return 0.04
 
     @property
+    def ready(self) -> bool:
+        return False
+
+    @property
     def size(self) -> int:
         return self.parameters + 3 + MODES
 
@@ -143,9 +130,9 @@ class EnergyCurve(CurveFamily):
         taut = x - shift
         d = taut
         for _ in range(NEWTON):
-            f, slope = self.expansion.of(z, d)
+            f, slope, _ = self.expansion.of(z, d)
             d = d - (d + compliance * COMPLIANCE * f - taut) / (1 + compliance * COMPLIANCE * slope)
-        f, slope, dz = self.expansion.with_rates(z, d)
+        f, slope, dz = self.expansion.of(z, d)
         yields = 1 + COMPLIANCE * compliance * slope
         shape, e = self._form(x) * size[:, None, None], c[:, k + 3 :]
         factor = np.exp(np.einsum("bnj,bj->bn", shape, e))
@@ -154,7 +141,7 @@ class EnergyCurve(CurveFamily):
         moving = slope * factor / yields
         derivatives = np.concatenate(
             [
-                dz * (factor / yields)[:, :, None],
+                dz * (film / yields)[:, :, None],
                 -SHIFT * moving[:, :, None],
                 -(COMPLIANCE * dcompliance * f * moving)[:, :, None],
                 np.full((*x.shape, 1), OFFSET),
@@ -173,17 +160,9 @@ class EnergyCurve(CurveFamily):
         base = self._logs(at, x)
         pairs = [self._either_side(at, i, x) for i in range(k)]
         step = np.array([h for h, _, _ in pairs])
-        up, down, along = np.array([u for _, u, _ in pairs]), np.array([d for _, _, d in pairs]), np.diag(step)
-        i, j = np.triu_indices(k)
-        second = []
-        for a, b in zip(i, j, strict=True):
-            if a == b:
-                second.append(0.5 * (up[a] + down[a] - 2 * base) / step[a] ** 2)
-            else:
-                both = self._logs(at + along[a] + along[b], x)
-                second.append((both - up[a] - up[b] + base) / (step[a] * step[b]))
+        up, down = np.array([u for _, u, _ in pairs]), np.array([d for _, _, d in pairs])
         first = (up - down) / (2 * step[:, None])
-        return Expansion(at, CubicSpline(np.log(x), np.vstack([base, first, np.array(second)]).T), (i, j))
+        return Expansion(at, CubicSpline(np.log(x), np.vstack([base, first]).T))
 
     def _either_side(self, at: Array, i: int, x: Array) -> tuple[float, Array, Array]:
         """The step along coordinate i, and ln F (N,) one step up and down."""

@@ -19,8 +19,8 @@ class SmoothForce(CurveFamily):
     """g = a line plus an integrated Wiener process; nothing is known at zero, neither its place nor a cubic start.
 
     The slope changes in proportion to a typical one: root mean square of the slopes of the simulated curves, the
-    largest up to x, not less than over the shortest range. The size is the standard deviation of the change of slope over 10 mm
-    relative to it.
+    largest up to x, not less than over the shortest range. The size is the standard deviation of the change of slope
+    over 10 mm relative to it.
     """
 
     name = "smooth_force"
