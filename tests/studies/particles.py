@@ -5,10 +5,15 @@ Gaussian of its mode, and Laplace's evidence is off by several units. With error
 that Gaussian. Particles drawn there, one scale of the errors each, follow as the errors shrink to their size, in steps
 that leave `KEPT` of them effective; at each they are weighed, drawn anew and moved by Hamiltonian steps (P. Del Moral,
 A. Doucet, A. Jasra, J. R. Stat. Soc. B 68 (2006) 411). The weights give the evidence of all settings together.
+
+    python -m tests.studies.particles [--seeds 1 2] [--particles 64]
+
+prints, for each family of curves behind the paper's losses, Laplace's evidence beside that of the particles.
 """
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -17,10 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from bayesmembrane.data.published import read_published_table
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.reconstruction.families.smooth_logarithm import SmoothLogarithm
 from bayesmembrane.reconstruction.fit import ROUGH_GAIN, Mode, climb, curvature, together
+from bayesmembrane.reconstruction.mixture import moved
 from bayesmembrane.reconstruction.model import CurveState, Knobs, LossModel
+from bayesmembrane.reconstruction.reconstruct import curve_of_all_families, simulate_on
+from bayesmembrane.reconstruction.scales import all_scales
+from bayesmembrane.reconstruction.simulations import tabulate
 
 LOOSEN = 64.0
 KEPT = 0.5  # share of the particles that stays effective on the way from one stage to the next
@@ -262,3 +273,38 @@ def _move(crowd: _Crowd, path: _Path, rng: np.random.Generator) -> tuple[_Crowd,
 
 def _chosen(take: NDArray[np.bool_], new: Array, old: Array) -> Array:
     return np.where(take.reshape(-1, *(1,) * (new.ndim - 1)), new, old)
+
+
+def main() -> None:
+    """Both estimates of the evidence of every family, and the force at 4.8 mm that particles find."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--particles", type=int, default=64)
+    asked = parser.parse_args()
+    table = read_published_table()
+    simulate = simulate_on(table)
+    simulations = tabulate(table, simulate)
+    curve = SmoothLogarithm(simulations)
+    model = LossModel(simulations, curve, table.losses, simulations.usable, (0, 1), (10, 9), table.step).without(3)
+    mixed = curve_of_all_families(model, table, simulate)
+    for k in mixed.told:
+        placed = mixed.placed[k]
+        settings = len(all_scales(placed.family, 2))
+        for seed in asked.seeds:
+            draws = sample(placed.model, placed.modes, asked.particles, 30, seed)
+            forces = np.concatenate(
+                [
+                    moved(placed.model, theta, draws.knobs, state, mixed.x)
+                    for theta, state in zip(draws.theta, draws.states(placed.model), strict=True)
+                ]
+            )
+            print(
+                f"{placed.family.name}: Laplace {placed.log_evidence:.1f}, particles "
+                f"{draws.log_evidence - np.log(settings):.1f} +- {draws.log_evidence_sd:.1f}, at 4.8 mm "
+                f"{1e3 * np.mean(forces[:, 1]):.0f} +- {1e3 * np.std(forces[:, 1]):.0f} mN",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
