@@ -14,7 +14,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import material
 from bayesmembrane.reconstruction.families.base import CurveFamily
 from bayesmembrane.reconstruction.families.displaced import Displaced
-from bayesmembrane.reconstruction.families.energy import EnergyCurve, standard
+from bayesmembrane.reconstruction.families.energy import EnergyCurve, NoFilmError, standard
 from bayesmembrane.reconstruction.families.smooth_force import SmoothForce
 from bayesmembrane.reconstruction.families.smooth_logarithm import SmoothLogarithm
 from bayesmembrane.reconstruction.fit import ROUGH_GAIN, Mode, climb, find_mode, scan, together
@@ -67,17 +67,23 @@ def families(table: PublishedTable, simulations: Simulations, simulate: Simulate
     logarithm = SmoothLogarithm(simulations)
     found: list[CurveFamily] = [logarithm, Displaced(logarithm), SmoothForce(simulations)]
     top, names = float(max(simulations.ends)), dict.fromkeys(row.material for row in table.rows)
-    x, force = near
-    simulated = simulations.forces(x)[0]
-    miss = np.sum((np.log(simulated / np.maximum(force, 1e-3)[:, None]) * np.sqrt(force)[:, None]) ** 2, axis=0)
+    x, force = near[0], np.maximum(near[1], 1e-3)[:, None]
+    miss = np.sum(force * np.log(simulations.forces(x)[0] / force) ** 2, axis=0)
     for name in names:
         rows = [k for k, row in enumerate(table.rows) if row.material == name and simulations.usable[k]]
-        for k in sorted(rows, key=lambda k: float(miss[k])):
-            at = standard(material(name), np.array(table.rows[k].values))
-            if np.all(np.isfinite(at)):
-                found.append(EnergyCurve(material(name), simulate, top, at))
-                break
+        starts = [standard(material(name), np.array(table.rows[k].values)) for k in sorted(rows, key=lambda k: miss[k])]
+        found += _first_film(name, simulate, top, [at for at in starts if np.all(np.isfinite(at))])
     return found
+
+
+def _first_film(name: str, simulate: Simulate, top: float, starts: list[Array]) -> list[CurveFamily]:
+    """The family of an energy about the first start that has films on all sides; none if there is no such start."""
+    for at in starts:
+        try:
+            return [EnergyCurve(material(name), simulate, top, at)]
+        except NoFilmError:
+            continue
+    return []
 
 
 def place_all(model: LossModel, candidates: Sequence[CurveFamily], start: Mode) -> list[Placed]:

@@ -105,7 +105,7 @@ class FamilyResult:
         return {
             "title": self.title,
             "probability": self.probability,
-            "log_evidence": self.log_evidence,
+            "log_evidence": self.log_evidence if np.isfinite(self.log_evidence) else None,
             "force_N": None if self.force is None else self.force.tolist(),
             "sd_N": None if self.force_sd is None else self.force_sd.tolist(),
         }

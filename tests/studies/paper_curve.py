@@ -33,10 +33,10 @@ DIAGNOSES = "## Diagnoses"
 WORDS = (
     "## Do ranking and effects survive the covariance?",
     "",
-    "Made by `python -m tests.studies.paper_curve`. Each energy is fitted to the reconstructed curve, with an offset of "
-    "the deflection zero (prior sd 0.5 mm), a yielding frame, an offset of the force zero, or none of them; with a form "
-    "that is exact, or off by a smooth 2 %. ln Z is Laplace's evidence relative to the best of its column and range, "
-    "under the covariance of the smooth logarithm alone and under that of all families of curves.",
+    "Made by `python -m tests.studies.paper_curve`. Each energy is fitted to the reconstructed curve, with an offset "
+    "of the deflection zero (prior sd 0.5 mm), a yielding frame, an offset of the force zero, or none of them; with a "
+    "form that is exact, or off by a smooth 2 %. ln Z is Laplace's evidence relative to the best of its column and "
+    "range, under the covariance of the smooth logarithm alone and under that of all families of curves.",
 )
 
 
@@ -94,7 +94,8 @@ def page(rows: list[str], sentences: list[str], seed: int) -> str:
     head = [
         DIAGNOSES,
         "",
-        f"Made by `python -m tests.studies.paper_curve --diagnose --seed {seed}`; the reconstructed curve with its covariance.",
+        f"Made by `python -m tests.studies.paper_curve --diagnose --seed {seed}`; the reconstructed curve with its "
+        "covariance.",
         "",
         "| material | curve | effect | size | ln K | rms, mN | reduced chi-square | worth at most, mN | verdict |",
         "|---|---|---|---|---|---|---|---|---|",

@@ -29,6 +29,10 @@ SETTLED = 0.02  # such a change: an expansion as near as this need not be made a
 NEWTON = 2  # steps that balance the frame
 
 
+class NoFilmError(Exception):
+    """There is no film with these parameters over the whole range."""
+
+
 @dataclass(frozen=True, eq=False)
 class Expansion:
     """ln F of a film to first order in its coordinates, in standard deviations z (k,) of their priors, about ``at``.
@@ -70,7 +74,7 @@ class EnergyCurve(CurveFamily):
         for _ in range(HALVINGS):
             try:
                 return type(self)(self.material, self.simulate, self.top, self.expansion.at + step)
-            except ValueError:
+            except NoFilmError:
                 step = 0.5 * step
         return self
 
@@ -154,7 +158,7 @@ class EnergyCurve(CurveFamily):
     # ---- the film ----------------------------------------------------------------------------------------------------
 
     def _expanded(self, at: Array) -> Expansion:
-        """Raises `ValueError` where there is no film."""
+        """Raises `NoFilmError` where there is no film."""
         x = np.geomspace(NEAREST, 1.1 * self.top, NODES)
         k = at.size
         base = self._logs(at, x)
@@ -170,14 +174,14 @@ class EnergyCurve(CurveFamily):
         for _ in range(HALVINGS):
             try:
                 return float(step[i]), self._logs(at + step, x), self._logs(at - step, x)
-            except ValueError:
+            except NoFilmError:
                 step = step / 2
-        raise ValueError(f"no {self.material.name} film over the whole range")
+        raise NoFilmError(self.material.name)
 
     def _logs(self, z: Array, x: Array) -> Array:
         force = self.simulate(self.material.name, tuple(natural(self.material, z).tolist()), x)
         if not np.all(np.isfinite(force) & (force > 0)):
-            raise ValueError(f"no {self.material.name} film over the whole range")
+            raise NoFilmError(self.material.name)
         return np.log(force)
 
 
