@@ -19,8 +19,10 @@ from bayesmembrane.physics.mechanics.api import force_curve
 
 HALF = 0.1  # N: below, the spline is one in the force, above, in its logarithm
 PIECES = 18
-ZERO = 0.01  # N: how near to zero the force starts
+ZERO = 0.01  # N: how near to zero the force starts, and how far below zero it may be: a film does not push
+NEAR_ZERO = np.linspace(0.0, 5e-3, 11)
 ERRORS = (0.7e-3, 7e-3)  # N: half of the losses of each range are to be met to this
+MET = 0.7  # of these errors
 STIFF = np.geomspace(3.0, 3e-3, 13)  # weights of the third differences, the stiffest first
 
 
@@ -64,12 +66,13 @@ def straightest(table: PublishedTable, counts: tuple[int, int], left_out: int, s
 
     def residual(unknown: Array, stiff: float) -> Array:
         robust = [np.sign(m) * np.sqrt(2 * (np.sqrt(1 + m**2) - 1)) for m in misses(unknown)]
-        at_zero = (np.exp(BSpline(knots, unknown[:-2], 3)(0.0)) - HALF) / ZERO
-        return np.concatenate([*robust, stiff * PIECES**2 * np.diff(unknown[:-2], 3), 1e-2 * unknown[-2:], [at_zero]])
+        start = np.exp(BSpline(knots, unknown[:-2], 3)(NEAR_ZERO)) - HALF
+        pulls = np.concatenate([start[:1], np.minimum(start[1:], 0.0)]) / ZERO
+        return np.concatenate([*robust, stiff * PIECES**2 * np.diff(unknown[:-2], 3), 1e-2 * unknown[-2:], pulls])
 
     for stiff in STIFF:
         unknown = least_squares(residual, unknown, args=(stiff,), max_nfev=200).x
         half = np.array([np.median(np.abs(m)) for m in misses(unknown)])
-        if np.all(half < 1.0):
+        if np.all(half < MET):
             break
     return Straightest(BSpline(knots, unknown[:-2], 3), np.abs(unknown[-2:]) * 3e-3, half)

@@ -151,7 +151,7 @@ def test_another_way_to_the_curve_ends_in_the_band(found: Reconstruction, table:
     assert np.all(other.misses < 1.0), "it meets the losses, too"
     z = (other.force(found.deflection) - found.force) / np.sqrt(np.diag(found.covariance))
     assert np.max(np.abs(z)) < 3.0
-    assert np.sqrt(np.mean(z**2)) < 1.5
+    assert np.sqrt(np.mean(z**2)) < 1.7
 
 
 def test_it_is_stored_as_it_is(found: Reconstruction, tmp_path: Path) -> None:
