@@ -69,7 +69,7 @@ class Work:
 
 def reconstruct(work: Work) -> Answer[Reconstruction]:
     """The measured curve behind the published losses of the paper."""
-    found = run_reconstruct(read_published_table(), seed=work.seed)
+    found = run_reconstruct(read_published_table())
     mark = fingerprint(run_reconstruct.__module__, (), (), {}, work.seed)
     what = Asked("reconstruct", "published losses", "", float("nan"), mark)
     return kept("reconstruction", found, document(found), what, work.out)

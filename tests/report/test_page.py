@@ -68,7 +68,6 @@ def reconstruction() -> Reconstruction:
         (suspect,),
         (Influence("curve twice as rough", f + 0.01, 0.1),),
         {},
-        0.8,
     )
 
 
