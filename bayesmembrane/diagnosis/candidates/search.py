@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bayesmembrane.calibration.descent import descend
+from bayesmembrane.calibration.descent import Patience, descend
 from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
@@ -180,7 +180,8 @@ class Search:
                 np.concatenate([j * axes.slope(u)[:, None, :], diagonal], axis=1),
             )
 
-        return descend(residuals, starts, axes.bounds, most, behind=SEARCH.given_up, slow_below=SEARCH.slow_below)
+        patience = Patience(SEARCH.given_up, SEARCH.slow_below)
+        return descend(residuals, starts, axes.bounds, most, patience=patience)
 
     def _candidate(self, objective: Objective, axes: Standard, u: Array) -> Candidate:
         x = axes.to_x(u)
