@@ -23,7 +23,7 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.words.diagnosis import sentence, size_in_words
-from tests.studies.paper_curve_bands import HEAD
+from tests.studies.paper_curve_bands import HEAD, bands
 from tests.studies.paper_curve_bands import lines as bands_lines
 
 TARGET = Path(__file__).resolve().parents[2] / "docs" / "studies" / "paper_curve.md"
@@ -48,7 +48,7 @@ def main() -> None:
     asked = parser.parse_args()
     old = TARGET.read_text(encoding="utf-8")
     below = diagnoses(asked.seed) if asked.diagnose else old[old.index(DIAGNOSES) :]
-    survive = ["# What the paper's curve holds beside the material", "", *WORDS, "", *HEAD, *bands_lines(), ""]
+    survive = ["# What the paper's curve holds beside the material", "", *WORDS, "", *HEAD, *bands_lines(*bands()), ""]
     TARGET.write_text("\n".join([*survive, below]), encoding="utf-8")
 
 

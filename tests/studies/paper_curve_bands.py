@@ -85,7 +85,8 @@ def judge(band: Band, family: EnergyCurve, effect: str, form: str) -> Judged:
     log_det = float(np.linalg.slogdet(band.covariance)[1])
 
     def level(c: Array) -> float:
-        z = root @ (band.force - family.force(c[None], size, band.x[None])[0][0])
+        with np.errstate(all="ignore"):
+            z = root @ (band.force - family.force(c[None], size, band.x[None])[0][0])
         return -0.5 * float(z @ z) - 0.5 * float(np.sum((c / sd)[free] ** 2))
 
     for _ in range(ROUNDS):
@@ -117,11 +118,10 @@ def judge(band: Band, family: EnergyCurve, effect: str, form: str) -> Judged:
     return Judged(evidence, float(z @ z) / count, SHIFT * c[k] if free[k] else np.nan, spread)
 
 
-def lines() -> Iterator[str]:
+def lines(alone: Band, together: Band) -> Iterator[str]:
     """Rows of the table: every energy, effect and form on both curves, ln Z relative to the best of its column."""
     table = read_published_table()
     simulate = simulate_on(table)
-    alone, together = bands()
     for words, count in (("to 35.1 mm", 10), ("both ranges", 19)):
         parts = [b.first(count) for b in (alone, together)]
         found: dict[tuple[str, str, str], list[Judged]] = {}
@@ -152,4 +152,4 @@ HEAD = (
 )
 
 if __name__ == "__main__":
-    print("\n".join([*HEAD, *lines()]), flush=True)
+    print("\n".join([*HEAD, *lines(*bands())]), flush=True)

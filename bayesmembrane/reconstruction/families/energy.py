@@ -179,7 +179,10 @@ class EnergyCurve(CurveFamily):
         raise NoFilmError(self.material.name)
 
     def _logs(self, z: Array, x: Array) -> Array:
-        force = self.simulate(self.material.name, tuple(natural(self.material, z).tolist()), x)
+        parameters = natural(self.material, z)
+        if not np.all(np.isfinite(parameters)):
+            raise NoFilmError(self.material.name)
+        force = self.simulate(self.material.name, tuple(parameters.tolist()), x)
         if not np.all(np.isfinite(force) & (force > 0)):
             raise NoFilmError(self.material.name)
         return np.log(force)
