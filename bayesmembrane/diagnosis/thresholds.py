@@ -172,8 +172,10 @@ class GrowthThresholds:
     """Sets of each size that are tried with every energy."""
     further_starts: int = 1
     """Draws of the material's prior that searches for a first effect start from, besides the plain fit."""
-    polished: int = 6
-    """Hypotheses of each size that are searched on with their own form error."""
+    polished: int = 12
+    """Sets of each size that are searched on with their own form error, at most."""
+    polish_reach: float = 25.0
+    """ln of the Bayes factor behind the best set of its size, beyond which one is left as it is: that gains less."""
     energy_reach: float = 15.0
     """ln of the Bayes factor behind the best energy, beyond which one is not tried with further sets of a size."""
     worth: float = 1e-3

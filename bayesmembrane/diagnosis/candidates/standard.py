@@ -174,7 +174,7 @@ class Standard:
             top, bottom = (float(np.trapezoid(p * np.exp(log_likelihood), grid)) for p in (cauchy, normal))
             if top > 0 and bottom > 0:
                 out += float(np.log(top / bottom))
-        return out
+        return float(out)
 
 
 def _grid(mean: float, sd: float, low: float, high: float) -> Array:

@@ -57,9 +57,11 @@ class Grown:
         return list(best.values())
 
     def polish(self, size: int) -> None:
-        """The most probable of this size searched on with the form error that they show themselves."""
-        for c in self.of_size(size)[: GROWTH.polished]:
-            self.add(self.search.polished(c))
+        """The best of each set of this size searched on with the form error that it shows itself: all that may matter."""
+        every = self.best_of_each_set(size)[: GROWTH.polished]
+        for c in every:
+            if every[0].log_evidence - c.log_evidence < GROWTH.polish_reach:
+                self.add(self.search.polished(c))
 
     def renew(self) -> None:
         """Noise from the best candidate, and all of them weighed under it."""
