@@ -57,7 +57,7 @@ class Grown:
         return list(best.values())
 
     def polish(self, size: int) -> None:
-        """The best of each set of this size searched on with the form error that it shows itself: all that may matter."""
+        """The best of each set of this size searched on with its own form error: all that may matter."""
         every = self.best_of_each_set(size)[: GROWTH.polished]
         for c in every:
             if every[0].log_evidence - c.log_evidence < GROWTH.polish_reach:
