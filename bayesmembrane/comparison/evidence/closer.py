@@ -30,7 +30,7 @@ class Closer(Problem):
         self.target, self.problem = problem.target, problem
         fitted = [around(x[rng.permutation(len(x))[:MOST]], rng) for x in (*points, *modes.clouds)]
         share = np.cumprod([1.0, *([BESIDES] * (len(points) - 1))])
-        share = np.concatenate([share / np.sum(share), modes.weights])
+        share = np.concatenate([np.asarray(share / np.sum(share), dtype=float), modes.weights])
         g = joined(fitted, share)
         self.q = Mixture(g.log_weights, g.means, WIDER * g.roots, DEGREES)
 

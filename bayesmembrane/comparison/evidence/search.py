@@ -105,7 +105,12 @@ def search(problem: Problem, rng: np.random.Generator) -> Modes:
         value = density(problem, v)
         more = _standing_out(v[np.isfinite(value)], value[np.isfinite(value)], effort.ascents)
         starts = np.concatenate([starts, more])
-        peaks = tuple(np.concatenate(both) for both in zip(peaks, _ascend(problem, more), strict=True))
+        places, heights, spreads = _ascend(problem, more)
+        peaks = (
+            np.concatenate([peaks[0], places]),
+            np.concatenate([peaks[1], heights]),
+            np.concatenate([peaks[2], spreads]),
+        )
         fitted = _all_fitted(problem, peaks, effort.each, rng)
     return _weighed(problem, fitted, effort.last, rng, Coverage(points, len(starts), len(fitted), volume))
 
@@ -133,7 +138,7 @@ def _standing_out(v: Array, value: Array, most: int) -> Array:
     first, others = np.split(peaks, [most // 2])
     if len(others) > most // 2:
         others = others[np.linspace(0, len(others) - 1, most // 2).astype(int)]
-    return v[np.concatenate([first, others])]
+    return np.asarray(v[np.concatenate([first, others])])
 
 
 def _ascend(problem: Problem, v: Array) -> tuple[Array, Array, Array]:
