@@ -23,6 +23,7 @@ class ForceGain(Sensor):
         "it."
     )
     rank: ClassVar[int] = 2
+    exact: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("error", "-", "reading over true force, less one", Normal(0.0, 0.02), (-0.5, 0.5), 0.0),
     )

@@ -18,6 +18,7 @@ class ForceOffset(Sensor):
     title: ClassVar[str] = "offset of the force zero"
     reference: ClassVar[str] = "ISO 376:2011, zero error of force-proving instruments"
     signature: ClassVar[str] = "A constant force everywhere, also where the film is slack."
+    exact: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("offset", "N", "reading without load", Normal(0.0, 0.03), (-1.0, 1.0), 0.0),
     )

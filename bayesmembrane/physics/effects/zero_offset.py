@@ -20,6 +20,7 @@ class ZeroOffset(Deflection):
     signature: ClassVar[str] = (
         "The whole curve lies to the right (or left): the residual follows the slope of the curve, alike on all legs."
     )
+    exact: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "shift", "m", "deflection read when the film becomes taut", Normal(0.0, 5e-4), (-5e-3, 5e-3), 0.0

@@ -1,0 +1,125 @@
+"""No energy is exact and no machine follows a textbook's law: how far both may be off, as smooth relative errors.
+
+    F_true = F (1 + eta_a u(state)) + sum_e eta_e t_e v_e(progress),     u, v_e ~ GP(0, K),
+
+with t_e the trace of effect e, what it changes of the force. Beside the noise S of the readings the covariance is
+S + eta_a^2 D_F K_u D_F + sum_e eta_e^2 D_t K_v D_t, with D of F and t on their diagonals: of low rank, as K is smooth.
+
+An energy knows no history: its error is a function of the state alone, the deflection (and the stretch across, where
+that was measured). A law's error may differ from leg to leg: it is a function of the progress of the test.
+M. C. Kennedy, A. O'Hagan, J. R. Stat. Soc. B 63 (2001) 425; J. Brynjarsdottir, A. O'Hagan, Inverse Problems 30 (2014)
+114007, for what such an error does to the intervals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.parameters import Array, Normal, Parameter
+from bayesmembrane.physics.forward import Forward
+
+ENERGY = Parameter(
+    "ln_eta", "-", "log of the relative error of the energy's form", Normal(float(np.log(3e-3)), 1.5), (-12.0, 0.0)
+)
+"""eta_a: half of the prior lies below 0.3 %, 95 % within 0.015 % to 6 %."""
+
+LAW = Parameter(
+    "ln_eta_law", "-", "log of the relative error of an effect's law", Normal(float(np.log(0.05)), 1.0), (-9.0, 0.7)
+)
+"""eta_e: half of the prior lies below 5 %, 95 % within 0.7 % to 37 %."""
+
+STATE_LENGTHS = (0.15, 0.3, 0.6)
+"""Of the whole range: over how much deflection the error of an energy changes. Equal parts of its variance."""
+PROGRESS_LENGTHS = (0.3, 1.0, 3.0)
+"""Of the whole range, along the way of the disc: over how much of it the error of a law changes."""
+DECADE = 0.3
+"""Of the whole range: how much of the way a decade of time counts in a hold, where the disc stands still."""
+KNOTS = 240
+"""Points at which the process is taken apart; between them it is interpolated by its own covariance."""
+LEAST = 1e-5
+"""Of the variance of the process: what a further column would add is left out below it."""
+
+
+@dataclass(frozen=True, eq=False)
+class FormFactors:
+    """Square roots of K for the N readings of one measurement: L L^T = K, ones on its diagonal.
+
+    state : (N, r) of an energy's error
+    progress : (N, q) of a law's error
+    """
+
+    state: Array
+    progress: Array
+
+
+def form_factors(measurement: Measurement) -> FormFactors:
+    """The processes of ``measurement``: along its states, and along its progress."""
+    return FormFactors(
+        smooth_factor(states(measurement), STATE_LENGTHS),
+        smooth_factor(progress(measurement)[:, None], PROGRESS_LENGTHS),
+    )
+
+
+def states(measurement: Measurement) -> Array:
+    """(N, m) the states in parts of the whole range: deflection, and the stretch across where it was measured."""
+    d = measurement.deflection / measurement.full_range
+    if measurement.across is None:
+        return d[:, None]
+    wide = measurement.across - 1.0
+    return np.column_stack([d, wide / max(float(np.max(np.abs(wide))), 1e-9)])
+
+
+def progress(measurement: Measurement) -> Array:
+    """(N,) the way of the disc in parts of the whole range; in a hold the logarithm of time goes on."""
+    path = measurement.path
+    way = np.cumsum(path.steps) / path.full_range
+    here = np.array(way[measurement.on_path])
+    for hold in measurement.holds:
+        time = path.clock[measurement.on_path[hold]]
+        gap = max(float(np.median(np.diff(time))), 1e-12)
+        further = DECADE * np.log10(1.0 + (time - time[0]) / gap)
+        here[hold] += further
+        here[hold[-1] + 1 :] += further[-1]
+    return here
+
+
+def smooth_factor(place: Array, lengths: tuple[float, ...]) -> Array:
+    """(N, r) L with L L^T = K(s, s') = mean over ``lengths`` l of exp(-|s - s'|^2 / (2 l^2)), at places s (N, m).
+
+    From the eigenvectors at `KNOTS` places (E. J. Nystroem, Acta Math. 54 (1930) 185), rows of unit length.
+    """
+    some = np.unique(np.linspace(0, len(place) - 1, min(len(place), 4 * KNOTS)).round().astype(int))
+    order = some[np.lexsort(place[some].T)]
+    at = place[order[np.unique(np.linspace(0, order.size - 1, min(order.size, KNOTS)).round().astype(int))]]
+    value, vector = np.linalg.eigh(_kernel(at, at, lengths))
+    keep = value > LEAST * float(np.sum(value))
+    root = _kernel(place, at, lengths) @ (vector[:, keep] / np.sqrt(value[keep]))
+    return np.asarray(root / np.linalg.norm(root, axis=1, keepdims=True))
+
+
+def _kernel(a: Array, b: Array, lengths: tuple[float, ...]) -> Array:
+    square = np.sum((a[:, None, :] - b[None, :, :]) ** 2, axis=2)
+    return np.asarray(np.mean([np.exp(-0.5 * square / length**2) for length in lengths], axis=0))
+
+
+def traces(forward: Forward, x: ArrayLike, force: Array) -> Array:
+    """(B, E, N) N: what each effect changes of the forces (B, N) at x (B, k); 0 where there is no curve without it.
+
+    One more curve for every effect whose law may be off; an effect that is exact has no trace (`Effect.exact`).
+    """
+    x = np.atleast_2d(np.asarray(x, dtype=float))
+    hypothesis = forward.hypothesis
+    out = np.zeros((len(x), len(hypothesis.effects), force.shape[1]))
+    place = hypothesis.material_size
+    for i, effect in enumerate(hypothesis.effects):
+        size = len(effect.coordinates)
+        if not effect.exact:
+            without = np.array(x)
+            without[:, place : place + size] = effect.null
+            out[:, i] = np.nan_to_num(force - forward(without, reached=False).force)
+        place += size
+    return out
