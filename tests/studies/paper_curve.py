@@ -34,7 +34,7 @@ WORDS = (
     "## Do ranking and effects survive the covariance?",
     "",
     "Made by `python -m tests.studies.paper_curve`. Each energy is fitted to the reconstructed curve, with an offset "
-    "of the deflection zero (prior sd 0.5 mm), a yielding frame, an offset of the force zero, or none of them; with a "
+    "of the deflection zero (prior sd 0.5 mm), an offset of the force zero, or neither; with a "
     "form that is exact, or off by a smooth 2 %. ln Z is Laplace's evidence relative to the best of its column and "
     "range, under the covariance of the smooth logarithm alone and under that of all families of curves.",
 )

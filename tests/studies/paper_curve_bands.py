@@ -1,6 +1,6 @@
 """What the losses say of energies and effects when the curve between them is not sure: part of `paper_curve`.
 
-Each energy, with and without an offset of the zeros or a yielding frame, with an exact form and with one that is off by
+Each energy, with and without an offset of the zeros, with an exact form and with one that is off by
 a few percent, is fitted to the reconstructed curve and judged by Laplace's evidence: under the covariance of the smooth
 logarithm alone, and under that of all families of curves.
 """
@@ -29,13 +29,12 @@ ZERO = 0.5e-3  # m: the prior that every analysis has for an offset of the zero
 EFFECTS = {
     "none": (False, False, False),
     "zero offset": (True, False, False),
-    "compliance": (False, True, False),
     "force offset": (False, False, True),
 }
 ABSENT = -8.0  # standard normal number of a compliance of nothing
 ROUNDS = 60
 SETTLED = 1e-3  # gain of the log posterior that a further step promises: where the climb is over
-BEYOND = 10.0  # standard deviations of the prior: a film from there on is not looked for
+BEYOND = 6.0  # standard deviations of the prior of an energy: a film from there on is not looked for
 LONGEST = 1.0  # standard deviations of the prior that a step may go
 TOLD = 0.1  # ... above which the table says that it was not
 WRONG = 3  # the row that contradicts the others
@@ -108,7 +107,7 @@ def judge(band: Band, family: EnergyCurve, effect: str, form: str) -> Judged:
         gradient = a.T @ (root @ (band.force - force)) - c[free] / sd[free] ** 2
         step = np.linalg.solve(precision, gradient)
         left = 0.5 * float(step @ gradient)
-        if left < SETTLED or np.max(np.abs(c / sd)[free]) > BEYOND:
+        if left < SETTLED or np.max(np.abs(c[:k])) > BEYOND:
             break
         far = family.distance(family.expansion.at + step[:k]) / TRUST
         here, share = level(c), 1 / max(1.0, far, float(np.max(np.abs(step))) / LONGEST)
