@@ -63,12 +63,16 @@ def without_outliers(measurement: Measurement) -> tuple[Measurement, SetAside | 
 
 
 def _off(m: Measurement) -> Array:
-    """(N,) robust standard deviations by which readings lie off the reference, 0 unless they do so alone."""
+    """(N,) robust standard deviations by which readings lie off the reference, 0 unless they do so alone.
+
+    Also 0 where the reference follows them anyway: one just after a turn may be the start of a relaxation.
+    """
     profile = np.ones(len(m)) if m.force_sd is None else m.force_sd
     q = orthonormal(smooth_reference(m) / profile[:, None])
     y = m.force / profile
     spare = 1.0 - np.sum(q**2, axis=1)
-    rest = (y - q @ (q.T @ y)) / np.sqrt(np.maximum(spare, OUTLIERS.least_spare))
+    seen = spare > OUTLIERS.least_spare
+    rest = np.where(seen, y - q @ (q.T @ y), 0.0) / np.sqrt(np.where(seen, spare, 1.0))
     return np.asarray(_alone(rest) / _scale(rest, 0.0 if m.force_sd is None else 1.0))
 
 
