@@ -37,7 +37,8 @@ def diagnose(
 
     A `Question` says whether the energy was declared at all, and whether pairs of effects are to be looked at.
     A measurement of more readings than `thinning.MOST` is thinned, single outliers are set aside, and what the answer
-    holds by reading is of those that are left. Raises `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
+    holds by reading is of those that are left. Raises `SettingsError` if there are too few points to tell a misfit
+    from noise, or no film reaches the data.
     """
     question = hypothesis if isinstance(hypothesis, Question) else Question(hypothesis)
     part = thinned(measurement)

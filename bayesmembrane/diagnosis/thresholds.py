@@ -64,7 +64,7 @@ class OutlierThresholds:
     reach: float = 6.0
     """Robust standard deviations off the reference, and off what comes before and after: noise does so never."""
     share: float = 0.02
-    """Of the readings, at most: more are no outliers but something that is to be explained, and nothing is set aside."""
+    """Of the readings, at most: more are no outliers but something to be explained, and nothing is set aside."""
     neighbours: int = 4
     """Readings on either side whose median counts: up to two outliers in a row do not hide each other."""
     window: int = 31

@@ -1,4 +1,4 @@
-"""The page on real cyclic tests under each declared energy: tables, and the sentences that follow from their numbers."""
+"""The page on real cyclic tests under each declared energy: tables, and the sentences that follow from them."""
 
 from __future__ import annotations
 
@@ -43,28 +43,28 @@ def _short(rows: Sequence[Row]) -> str:
         own = [r for r in rows if r.declared == name]
         first = _counts(next(iter(r.sets)) for r in own)
         out.append(
-            f"- {'No energy' if name == 'none' else name} declared, {len(own)} tests: {_counts(r.verdict for r in own)}. "
-            f"Most probable set: {first}. Relaxation among the most probable set: "
+            f"- {'No energy' if name == 'none' else name} declared, {len(own)} tests: "
+            f"{_counts(r.verdict for r in own)}. Most probable set: {first}. Relaxation among the most probable set: "
             f"{sum('viscoelastic' in next(iter(r.sets)) for r in own)}; hysteresis: "
             f"{sum('hysteresis' in next(iter(r.sets)) for r in own)}."
         )
     if several:
         out.append(
-            f"- Of {len(several)} tests that were diagnosed under several declarations, the verdict and its effects are "
-            f"the same in all of them in {same}, and the most probable set in {alike}."
+            f"- Of {len(several)} tests that were diagnosed under several declarations, the verdict and its effects "
+            f"are the same in all of them in {same}, and the most probable set in {alike}."
         )
     seconds = [r.seconds for r in rows]
     out.append(
-        f"- One core takes {min(seconds):.0f} to {max(seconds):.0f} s, median {np.median(seconds):.0f} s, on a machine that did "
-        f"other work. Readings set aside: {sum(r.set_aside for r in rows)} of {sum(r.readings for r in rows)}."
+        f"- One core takes {min(seconds):.0f} to {max(seconds):.0f} s, median {np.median(seconds):.0f} s, on a machine "
+        f"that did other work. Readings set aside: {sum(r.set_aside for r in rows)} of {sum(r.readings for r in rows)}."
     )
     return "\n".join(out)
 
 
 def _table(rows: Sequence[Row], declared: str) -> str:
     head = (
-        "| test | readings | verdict | sets of effects | energies | foreign | residual, kPa | reduced chi-square left | "
-        "held out inside 90 % | CPU, s |"
+        "| test | readings | verdict | sets of effects | energies | foreign | residual, kPa | reduced chi-square left "
+        "| held out inside 90 % | CPU, s |"
     )
     lines = [head, "|" + "---|" * (head.count("|") - 1)]
     for r in (r for r in rows if r.declared == declared):

@@ -30,13 +30,17 @@ class Hysteresis(Carried):
         "M. Berg, Veh. Syst. Dyn. 30 (1998) 197; M. Sjoberg, L. Kari, Nonlinear Dyn. 33 (2003) 323"
     )
     signature: ClassVar[str] = (
-        "Unloading below loading in every cycle and at any speed: closed loops whose width grows with the force, that do "
-        "not close at rest and do not remember the largest deflection."
+        "Unloading below loading in every cycle and at any speed: closed loops whose width grows with the force, that "
+        "do not close at rest and do not remember the largest deflection."
     )
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("level", "-", "half of the width of a loop over the force", HalfNormal(0.1), (0.0, 0.9), 0.0),
         EffectParameter(
-            "travel", "-", "way after a reversal over which it turns, as part of a leg", LogNormal(0.05, 0.8), (2e-3, 2.0)
+            "travel",
+            "-",
+            "way after a reversal over which it turns, as part of a leg",
+            LogNormal(0.05, 0.8),
+            (2e-3, 2.0),
         ),
         EffectParameter(
             "similar", "-", "part of that way that is shorter in small cycles", Uniform(0.0, 1.0), (0.0, 1.0)

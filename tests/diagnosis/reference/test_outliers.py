@@ -15,7 +15,7 @@ seeds = pytest.mark.parametrize("seed", range(6))
 
 
 def cycles(seed: int, sd: float = SD, grows: bool = False) -> Measurement:
-    """Three cycles of 300 readings in all, unloading below loading, with white noise; growing with the force if asked."""
+    """Three cycles, 300 readings in all, unloading below loading, with white noise, growing with the force or not."""
     up, down = np.linspace(0.01, 1.0, 50), np.linspace(0.99, 0.0, 50)
     d = np.concatenate([peak * way for peak in (0.02, 0.03, 0.04) for way in (up, down)])
     leg = np.concatenate([s * np.ones(50) for _ in range(3) for s in (1, -1)])

@@ -1,5 +1,7 @@
 """Hysteresis of the material: loops that know force and way, and neither time nor the largest deflection."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ def loop(d: np.ndarray, travel: float = 0.05, similar: float = 0.5) -> np.ndarra
 
 def triangles(*ends: float, points: int = 200) -> np.ndarray:
     turns = [0.0, *ends]
-    parts = [np.linspace(a, b, points)[1:] for a, b in zip(turns[:-1], turns[1:], strict=True)]
+    parts = [np.linspace(a, b, points)[1:] for a, b in pairwise(turns)]
     return np.concatenate(parts)
 
 
