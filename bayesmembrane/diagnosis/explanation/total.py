@@ -98,7 +98,9 @@ def summed(grown: Grown) -> Total:
     kinds = kinds_of(found)
     nothing = BELIEFS.log_foreign(0) if kinds else 0.0
     terms = [(c, NOTHING, weight(c) + nothing) for c in every]
-    terms += [(f.base, f.kind, weight(f.base) + f.gain + BELIEFS.log_foreign(kinds)) for f in found]
+    # What the data do not speak for is neither seen nor excluded, like a further effect that is idle.
+    seen = [f for f in found if f.gain > BELIEFS.supported]
+    terms += [(f.base, f.kind, weight(f.base) + f.gain + BELIEFS.log_foreign(kinds)) for f in seen]
     p = _normalised(np.array([w for _, _, w in terms]))
     judged = [_judged(grown, c, float(q)) for (c, kind, _), q in zip(terms, p, strict=True) if kind == NOTHING]
     owners = _owners(grown, [c for c, kind, _ in terms if kind == NOTHING])
