@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.thinning import thinned
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed
@@ -19,7 +21,7 @@ from bayesmembrane.diagnosis.left.remaining import remaining
 from bayesmembrane.diagnosis.left.shape import residual_shape
 from bayesmembrane.diagnosis.result import Diagnosis, thinning
 from bayesmembrane.diagnosis.separation import Experiment, experiments
-from bayesmembrane.diagnosis.thresholds import VERDICT
+from bayesmembrane.diagnosis.thresholds import TINY, VERDICT
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -121,7 +123,12 @@ def _validated(case: OpenCase, search: Search, found: Verdict) -> HeldOut | None
     if found.verdict not in ("named", "ambiguous", "material"):
         return validate(search, null, null, [])
     nulls = [j for j in found.ranking[3:] if j.candidate.label == null.label]
-    return validate(search, null, found.members[0].candidate, [*found.ranking[:3], *nulls])
+    return validate(search, null, found.members[0].candidate, [_believed(j) for j in (*found.ranking[:3], *nulls)])
+
+
+def _believed(j: Judged) -> tuple[Candidate, float]:
+    """A candidate, and ln of what was believed of it before the data, up to a constant."""
+    return j.candidate, float(np.log(max(j.probability, TINY))) - j.log_evidence
 
 
 def _experiments(search: Search, found: Verdict) -> tuple[Experiment, ...]:
