@@ -12,6 +12,7 @@ from bayesmembrane.data.thinning import thinned
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
+from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, Tell, opened
 from bayesmembrane.diagnosis.explanation.growth import grown
 from bayesmembrane.diagnosis.explanation.total import Judged, summed
@@ -128,7 +129,7 @@ def _validated(case: OpenCase, search: Search, found: Verdict) -> HeldOut | None
 
 def _believed(j: Judged) -> tuple[Candidate, float]:
     """A candidate, and ln of what was believed of it before the data, up to a constant."""
-    return j.candidate, float(np.log(max(j.probability, TINY))) - j.log_evidence
+    return j.candidate, float(np.log(max(j.probability, TINY))) / BELIEFS.counts - j.log_evidence
 
 
 def _experiments(search: Search, found: Verdict) -> tuple[Experiment, ...]:
