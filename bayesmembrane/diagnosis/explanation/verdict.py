@@ -95,8 +95,8 @@ def _first_order(case: OpenCase) -> Probabilities:
     """Probabilities of single effects beside the energies, from their traces alone."""
     count, visible = len(case.plain), case.visible
     log_energy = {
-        n: BELIEFS.counts * c.log_evidence + BELIEFS.log_energy(n, case.question.energy, count)
-        for n, c in case.plain.items()
+        name: BELIEFS.counts * c.log_evidence + BELIEFS.log_energy(name, case.question.energy, count)
+        for name, c in case.plain.items()
     }
     none = float(np.logaddexp.reduce(list(log_energy.values())))
     sets = {NOTHING: BELIEFS.log_set(0, len(visible))}
