@@ -10,6 +10,9 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.rigs.annulus import Annulus
 from tests.reference.slow_solver import force_curve
+from tests.seeds import move
+
+move()  # before any test module draws
 
 INNER, OUTER = 0.010, 0.035
 

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
@@ -51,7 +52,9 @@ def test_pins_satisfy_what_the_project_requires() -> None:
 def test_third_party_imports_are_declared() -> None:
     declared = {canonical(Requirement(r).name) for r in PROJECT["project"]["dependencies"]}
     found = {name for path in (ROOT / "bayesmembrane").rglob("*.py") for name in imported_by(path)}
-    foreign = {canonical(name) for name in found - set(sys.stdlib_module_names) - {"bayesmembrane"}}
+    packages = packages_distributions()  # a package may be imported under another name than it is installed under
+    strange = found - set(sys.stdlib_module_names) - {"bayesmembrane"}
+    foreign = {canonical(packages.get(name, [name])[0]) for name in strange}
     assert foreign <= declared, f"imported and not declared: {sorted(foreign - declared)}"
 
 

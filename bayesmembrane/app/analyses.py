@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.calibration.fingerprint import fingerprint
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.calibration.fit import fit as run_fit
-from bayesmembrane.calibration.predictions import Wanted
+from bayesmembrane.calibration.predictions import Wanted, rest_of
 from bayesmembrane.calibration.run import Run, RunSettings, predictions_of
 from bayesmembrane.calibration.run import sample as run_sample
 from bayesmembrane.calibration.sampling.walk import Progress
@@ -31,6 +32,7 @@ from bayesmembrane.diagnosis.loop import loop as run_loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.jobs import Tell, silent
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -67,7 +69,7 @@ class Work:
 
 def reconstruct(work: Work) -> Answer[Reconstruction]:
     """The measured curve behind the published losses of the paper."""
-    found = run_reconstruct(read_published_table(), seed=work.seed)
+    found = run_reconstruct(read_published_table())
     mark = fingerprint(run_reconstruct.__module__, (), (), {}, work.seed)
     what = Asked("reconstruct", "published losses", "", float("nan"), mark)
     return kept("reconstruction", found, document(found), what, work.out)
@@ -110,17 +112,10 @@ def sample(
     solve = work.solve
     how = RunSettings(work.seed, work.out, name, work.ess, predictions=False)
     run = run_sample(measurement, claim, how, progress=tell, solve=solve)
-    rest = _rest(measurement, whole)
-    if run.path is not None and not run.interrupted:
+    rest = rest_of(measurement, whole)
+    if run.path is not None:  # of an interrupted run, too: a report shows what there is, and solves nothing
         predictions_of(run, Wanted(rest=rest, breaks=tuple(breaks)) if breaks or rest is not None else None, solve)
     return Answer(run, {**document(run), "stored": None if run.path is None else str(run.path)})
-
-
-def _rest(measurement: Measurement, whole: Measurement | None) -> Measurement | None:
-    """The points of ``whole`` beyond the end of ``measurement``; None if there are none."""
-    if whole is None or not whole.deflection.max() > measurement.deflection.max():
-        return None
-    return whole.select(whole.deflection > measurement.deflection.max())
 
 
 def compare(
@@ -163,7 +158,7 @@ def diagnose(measurement: Measurement, claim: Hypothesis | Question, work: Work)
     label = question.hypothesis.label()
     found = run_diagnose(measurement, question, seed=work.seed, tell=lambda text: work.tell(label, text))
     settings = {"seed": work.seed, "declared": question.declared, "quick": question.quick}
-    what = asked("diagnose", run_diagnose, [measurement], [question.hypothesis], settings)
+    what = asked("diagnose", run_diagnose, [measurement], [question.hypothesis], settings, library())
     return kept("diagnosis", found, document(found), what, work.out)
 
 
@@ -181,8 +176,13 @@ def loop(
     label = question.hypothesis.label()
     found = run_loop(measurement, question, how, tell=lambda text: work.tell(label, text))
     settings = {"seed": work.seed, "ess": work.ess, "adapt_noise": adapt_noise, "declared": question.declared}
-    what = asked("loop", run_loop, [measurement], [question.hypothesis], settings)
+    what = asked("loop", run_loop, [measurement], [question.hypothesis], settings, library())
     return kept("loop", found, document(found), what, work.out)
+
+
+def library() -> list[type[Any]]:
+    """Every effect and every material: what a search for something missing may try, and thus depends on."""
+    return [*components("effects").values(), *materials().values()]
 
 
 def _mark(draws: Array) -> str:

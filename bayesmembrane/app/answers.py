@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -72,14 +72,15 @@ def asked(
     measurements: Sequence[Measurement],
     hypotheses: Sequence[Hypothesis],
     settings: Mapping[str, Any],
+    also: Iterable[type[Any]] = (),
 ) -> Asked:
     """A verb asked about hypotheses on one film; ``by`` is what computes, ``settings`` are plain, the seed among them.
 
-    The fingerprint covers the code that ``by`` reaches.
+    The fingerprint covers the code that ``by`` reaches, and the materials and effects that it may try (``also``).
     """
     last = max(measurements, key=lambda m: float(np.max(m.deflection)))
     options = {name: value for name, value in settings.items() if name != "seed"}
-    found = fingerprint(by.__module__, hypotheses, measurements, options, settings["seed"])
+    found = fingerprint(by.__module__, hypotheses, measurements, options, settings["seed"], also)
     models = "-".join(h.label() for h in hypotheses)
     return Asked(verb, last.specimen.name, models, float(np.max(last.deflection)), found)
 

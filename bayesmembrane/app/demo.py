@@ -17,6 +17,7 @@ import numpy as np
 from bayesmembrane.app import analyses
 from bayesmembrane.app.analyses import Work
 from bayesmembrane.app.answers import asked, kept
+from bayesmembrane.app.terminal import note
 from bayesmembrane.calibration.beside_paper import compare_with_paper, paper_break_points
 from bayesmembrane.calibration.run import load_run
 from bayesmembrane.comparison.compare import Range
@@ -78,7 +79,7 @@ def demo(page_folder: Path, work: Work) -> dict[str, Any]:
             for job in [submit(_done, label, verb, replace(work, tell=silent)) for label, verb in stage.items()]:
                 job.result()
     compare(work)
-    page = write_report([folder], page_folder, TITLE)
+    page = write_report([folder], page_folder, TITLE, note)
     return {
         "report": str(page),
         "verdicts": [_verdict(found) for found in _answers(folder, "loop")],

@@ -12,17 +12,20 @@ from typing import Any
 from bayesmembrane.app import analyses, documents
 from bayesmembrane.app.folders import lying
 from bayesmembrane.calibration.fit import Fit
-from bayesmembrane.calibration.run import Run
+from bayesmembrane.calibration.run import Run, predictions_of
 from bayesmembrane.comparison.compare import Range
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.reading import read_measurement
+from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics import hypothesis as hypotheses
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.report.page import write_report
+from bayesmembrane.report.runs import read as read_run
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
 
@@ -112,15 +115,18 @@ def valleys(
 
 
 def diagnose(
-    measurement: Measurement, hypothesis: Hypothesis, *, seed: int = 0, out: Folder | None = None
+    measurement: Measurement, hypothesis: Hypothesis | None = None, *, seed: int = 0, out: Folder | None = None
 ) -> Diagnosis:
-    """Whether the hypothesis leaves structure in the residual, and which effect or energy explains it."""
-    return analyses.diagnose(measurement, hypothesis, _work(seed, out)).result
+    """How probable it is that nothing, an effect, another energy or something foreign is behind the curve.
+
+    ``hypothesis`` has the energy that is preferred beforehand; without one all are as probable.
+    """
+    return analyses.diagnose(measurement, _asked(hypothesis), _work(seed, out)).result
 
 
 def loop(
     measurement: Measurement,
-    hypothesis: Hypothesis,
+    hypothesis: Hypothesis | None = None,
     *,
     ess: float = 1000.0,
     seed: int = 0,
@@ -129,9 +135,17 @@ def loop(
 ) -> Loop:
     """Diagnose, sample, add what is missing, and again, until adequate or abstaining.
 
-    ``adapt_noise`` samples with correlated noise where neighbouring readings turn out to be correlated.
+    Without a ``hypothesis`` it begins with the most probable energy. ``adapt_noise`` samples with correlated noise
+    where neighbouring readings turn out to be correlated.
     """
-    return analyses.loop(measurement, hypothesis, _work(seed, out, ess), adapt_noise=adapt_noise).result
+    return analyses.loop(measurement, _asked(hypothesis), _work(seed, out, ess), adapt_noise=adapt_noise).result
+
+
+def _asked(hypothesis: Hypothesis | None) -> Question:
+    """The question of a diagnosis, about an energy that is preferred or about none."""
+    if hypothesis is not None:
+        return Question(hypothesis)
+    return Question(hypotheses.hypothesis(min(materials())), declared=False)
 
 
 def reconstruct(*, seed: int = 0, out: Folder | None = None) -> Reconstruction:
@@ -142,9 +156,10 @@ def reconstruct(*, seed: int = 0, out: Folder | None = None) -> Reconstruction:
 def report(*shown: Any, out: Folder, title: str | None = None) -> Path:
     """Write ``out/index.html`` about results, and about all that lies in folders, and return its path.
 
-    Raises `SettingsError` if there is nothing to show, `StorageError` for a folder that holds nothing.
+    A stored answer that cannot be read is left out with a warning. Raises `SettingsError` if there is nothing to show,
+    `StorageError` for a folder that holds nothing.
     """
-    return write_report(shown, Path(out), title)
+    return write_report([_predicted(result) for result in shown], Path(out), title)
 
 
 def load(folder: Folder) -> Any:
@@ -159,6 +174,11 @@ def load(folder: Folder) -> Any:
 def as_dict(result: Any) -> dict[str, Any]:
     """A result as plain values, the ones that ``--json`` prints: for JSON, pandas or a notebook of one's own."""
     return documents.document(result)
+
+
+def _predicted(result: Any) -> Any:
+    """A run with its predictions, which are made here where none are stored; any other result as it is."""
+    return read_run(result, predictions_of(result)) if isinstance(result, Run) else result
 
 
 def _work(seed: int, out: Folder | None, ess: float = 1000.0) -> analyses.Work:

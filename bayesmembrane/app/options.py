@@ -170,7 +170,7 @@ class HypothesisOptions(OptionGroup):
     convexity: Annotated[str, typer.Option("--convexity", help="Convexity prior: reached, box, elliptic or none.")] = (
         "reached"
     )
-    noise: Annotated[str, typer.Option("--noise", help="Noise model: white, ar1 or ar1_readings.")] = "white"
+    noise: Annotated[str, typer.Option("--noise", help="Noise model: white, ar1, ar1_readings or form.")] = "white"
 
     def with_material(self, material: str, noise: str = "") -> Hypothesis:
         """The hypothesis; ``noise`` instead of the one asked for, unless it is ""."""
@@ -188,6 +188,15 @@ class HypothesisOptionsAuto(HypothesisOptions):
         str,
         typer.Option("--noise", help="A noise model, or auto: correlated if neighbouring readings turn out to be so."),
     ] = "auto"
+
+
+@dataclass(frozen=True)
+class HypothesisOptionsWeighed(HypothesisOptions):
+    """The same where several noises may be weighed."""
+
+    noise: Annotated[
+        str, typer.Option("--noise", help="A noise model, or auto: white, ar1 and form, weighed by evidence.")
+    ] = "white"
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,26 +19,39 @@ PATIENCE = 3  # slow steps in a row that end a search
 CRAWL, CRAWLS = 1e-3, 4  # the same of a search that is far behind the best one
 
 
+@dataclass(frozen=True)
+class Patience:
+    """When a search is given up, or done.
+
+    behind : times the least sum of squares from which on a search that crawls is not waited for
+    slow_below : relative decrease of |r|^2 below which a step counts as slow
+    """
+
+    behind: float = np.inf
+    slow_below: float = SLOW
+
+
 def descend(
     residuals: Residuals,
     start: Array,
     bounds: tuple[Array, Array],
     iterations: int,
     held: NDArray[np.bool_] | None = None,
-    behind: float = np.inf,
-    slow_below: float = SLOW,
+    patience: Patience | None = None,
 ) -> tuple[Array, Array]:
     """min |r(x)|^2 with x between ``bounds`` (k,) from each row of start (M, k), by Marquardt's damped steps
 
         (J^T J + m diag(J^T J)) s = -J^T r,
 
     with coordinates at a bound left out while the step would leave it, and those in ``held`` (M, k) left out always.
-    A row whose |r|^2 is more than ``behind`` times the least is given up when it crawls: films at the edge of what can
-    be solved cost most; and when |r|^2 falls by less than its part ``slow_below`` a few times in a row. Returns x (M, k) and |r| (M,), inf where a start has no residuals or no slopes: neither a
-    start nor a step goes where one of them is not a number.
+    A row whose |r|^2 is more than ``patience.behind`` times the least is given up when it crawls: films at the edge of
+    what can be solved cost most. One whose |r|^2 falls by less than its part ``patience.slow_below`` a few times in a
+    row is done. Returns x (M, k) and |r| (M,), inf where a start has no residuals or no slopes: neither a start nor a
+    step goes where one of them is not a number.
 
     D. W. Marquardt, J. SIAM 11 (1963) 431; a row that finds no better point with any damping is done.
     """
+    patience = patience or Patience()
     low, high = bounds
     x = np.clip(start, low, high)
     free = np.ones(x.shape, bool) if held is None else ~held
@@ -56,7 +70,7 @@ def descend(
         better = new_size < size[rows]
         take = rows[better]
         gain = (size[take] - new_size[better]) / np.maximum(size[take], 1e-300)
-        slow[take] = np.where(gain < slow_below, slow[take] + 1, 0)
+        slow[take] = np.where(gain < patience.slow_below, slow[take] + 1, 0)
         crawl[rows] += 1
         crawl[take[gain > CRAWL]] = 0
         x[take], r[take], jacobian[take], size[take] = (
@@ -67,7 +81,7 @@ def descend(
         )
         damping[rows] *= np.where(better, EASIER, HARDER)
         damping = np.maximum(damping, 1e-12)
-        lost = (crawl[rows] >= CRAWLS) & (size[rows] / behind > np.min(size))
+        lost = (crawl[rows] >= CRAWLS) & (size[rows] / patience.behind > np.min(size))
         going[rows] = (damping[rows] < HOPELESS) & (slow[rows] < PATIENCE) & ~lost
     return x, np.sqrt(size)
 

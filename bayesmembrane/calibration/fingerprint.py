@@ -23,9 +23,10 @@ def fingerprint(
 ) -> str:
     """SHA-256 over the code that ``entries`` reach, and over hypotheses, data, plain ``settings`` and ``seed``.
 
-    ``entries`` are dotted names of the modules whose functions make the answer; ``also`` are components that it looks
-    at besides those of the hypotheses: every effect, where it seeks one. Equal fingerprints mean equal answers;
-    a comment, a new component or a sentence elsewhere changes nothing. See `code_of` for what counts as code.
+    ``entries`` are dotted names of the modules whose functions make the answer; ``also`` are materials and effects that
+    it may try besides those of the hypotheses: all of them, where it seeks what is missing. Equal fingerprints mean
+    equal answers; a comment, a new component or a sentence elsewhere changes nothing. See `code_of` for what counts as
+    code.
     """
     claims = (hypotheses,) if isinstance(hypotheses, Hypothesis) else tuple(hypotheses)
     data = (measurements,) if isinstance(measurements, Measurement) else tuple(measurements)
@@ -48,21 +49,27 @@ def code_of(
 ) -> str:
     """SHA-256 of what the modules ``entries`` reach for these hypotheses on these measurements.
 
-    That is the statements of the modules that they import, of the own material, effects, noise and rig, of components
-    named in ``also``, and of what these import; every prior and its bounds as values; and the major versions of the
-    packages that do the numerical work.
+    That is the statements of the modules that they import, of the own material, effects, noise and rig, of materials
+    and effects in ``also``, and of what these import; every prior and its bounds as values; and the major versions of
+    the packages that do the numerical work.
     """
-    claims = tuple(hypotheses)
+    claims, further = tuple(hypotheses), sorted(set(also), key=_place)
     names = (entries,) if isinstance(entries, str) else tuple(entries)
-    components = set(also) | {part for h in claims for part in _components(h)} | {type(m.rig) for m in measurements}
-    ordered = sorted(components, key=lambda c: (c.__module__, c.__qualname__))
+    components = set(further) | {part for h in claims for part in _components(h)} | {type(m.rig) for m in measurements}
+    priors = [[p.name, repr(p.prior), repr(p.bounds)] for h in claims for p in h.parameters]
+    priors += [[f"{c.name}.{p.name}", repr(p.prior), repr(p.bounds)] for c in further for p in c.coordinates]
     return digest(
         {
-            "modules": reached(names, ordered),
-            "priors": [[p.name, repr(p.prior), repr(p.bounds)] for h in claims for p in h.parameters],
+            "modules": reached(names, sorted(components, key=_place)),
+            "priors": priors,
             "majors": majors(),
         }
     )
+
+
+def _place(component: type[Any]) -> tuple[str, str]:
+    """Where a class stands."""
+    return component.__module__, component.__qualname__
 
 
 def _components(hypothesis: Hypothesis) -> Iterator[type[Any]]:

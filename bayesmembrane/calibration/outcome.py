@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.calibration.checks import alike
 from bayesmembrane.calibration.crosscheck import crosscheck
 from bayesmembrane.calibration.goodness import dominates, goodness
 from bayesmembrane.calibration.layout import inference_data
@@ -23,13 +24,20 @@ WALK_STEPS = 500
 
 
 def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) -> tuple[Any, dict[str, Any]]:
-    """(InferenceData, status) of a walk that was to be worth ``wanted`` draws; all of it follows from the chains."""
+    """(InferenceData, status) of a walk that was to be worth ``wanted`` draws; all of it follows from the chains.
+
+    What is replicated is another test of the same film on the same rig: new noise, and the same form error, as far as
+    the data tell it. ``curve`` is the force without that noise, form error included.
+    """
     hypothesis, measurement = posterior.hypothesis, posterior.measurement
     x, lp = sampled.draws(MOST_DRAWS if len(measurement) <= LONG else DRAWS_IF_LONG)
     flat = x.reshape(-1, x.shape[-1])
     evaluation = posterior.evaluate(flat)
     rng = np.random.default_rng([seed, 1])
-    noise = posterior.noise.draw(hypothesis.noise_coordinates(flat), rng)
+    residual, theta = measurement.force - evaluation.force, hypothesis.noise_coordinates(flat)
+    noise = posterior.noise.at(evaluation.force, evaluation.traces)
+    curve = evaluation.force + noise.recurring(residual, theta, rng)
+    again = curve + noise.fresh(theta, rng)
     masses, prior = posterior.prior.survey(measurement, seed, solve=posterior.solve)
     prior = prior[:PRIOR_DRAWS]
     shape = x.shape[:2]
@@ -42,15 +50,19 @@ def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) ->
         _walked(sampled.chains),
         posterior=_named(hypothesis, measurement, flat, shape),
         prior=_named(hypothesis, measurement, prior, (1, len(prior))) if len(prior) else None,
-        log_likelihood={"force": folded(posterior.pointwise(flat, evaluation.force))},
-        posterior_predictive={"force": folded(evaluation.force + noise), "curve": folded(evaluation.force)},
+        log_likelihood={"force": folded(noise.pointwise(residual, theta))},
+        posterior_predictive={"force": folded(again), "curve": folded(curve)},
         sample_stats={"lp": lp, "log_prior": evaluation.log_prior.reshape(shape)},
     )
     best = int(np.argmax(lp))
+    square = noise.stated(residual, theta)
     status = {
         **_answer(hypothesis, data, sampled, wanted),
         "prior_mass": {mode: {"value": m.value, "sd": m.sd} for mode, m in masses.items()},
-        **_judgement(posterior, data, evaluation.force[best]),
+        **_judgement(posterior, data, evaluation.force[best], None if square is None else float(square[best])),
+        "checks": {
+            "alike": alike(hypothesis.noise, noise, residual, theta, hypothesis.curve_size, rng).summary(),
+        },
         "crosscheck": crosscheck(posterior.forward, flat, seed).summary(),
         "best": _best(hypothesis, measurement, flat[best]),
     }
@@ -104,9 +116,9 @@ def _answer(hypothesis: Hypothesis, data: Any, sampled: Sampled, wanted: float) 
     }
 
 
-def _judgement(posterior: Posterior, data: Any, best: Array) -> dict[str, Any]:
+def _judgement(posterior: Posterior, data: Any, best: Array, square: float | None) -> dict[str, Any]:
     """Goodness of the best draw's curve, by the measurement's own noise, and what the inferred noise says."""
-    found = goodness(posterior.measurement, best, posterior.hypothesis.curve_size)
+    found = goodness(posterior.measurement, best, posterior.hypothesis.curve_size, square)
     sd = data.posterior["noise.sd"].values.ravel() if "noise.sd" in data.posterior else np.empty(0)
     return {
         "goodness": found.summary(),

@@ -14,6 +14,7 @@ from bayesmembrane.calibration.prior import JointPrior
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.form_error import traces
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -49,12 +50,21 @@ class Evaluation:
         so that the normalised one is larger by -ln(mass)
     force : (B, N) N; nan where there is none, or where a film that the prior rules out was not followed
     outcome : (B,) `Outcome` codes
+    traces : (B, E, N) N, what each effect changes of the force, where the noise asks for it; else None
     """
 
     log_prior: Array
     log_likelihood: Array
     force: Array
     outcome: NDArray[np.int8]
+    traces: Array | None = None
+
+    @property
+    def curves(self) -> Array:
+        """(B, N) or (B, (1 + E) N) N: all that the likelihood is made of; forces, and after them the traces."""
+        if self.traces is None:
+            return self.force
+        return np.concatenate([self.force, self.traces.reshape(len(self.force), -1)], axis=1)
 
     @property
     def log_posterior(self) -> Array:
@@ -102,15 +112,18 @@ class Posterior:
         prediction = self.forward(x, reached=mode.looks_beyond, spare=mode.spare)
         inside = self.prior.inside(prediction)
         ok = prediction.ok
-        log_likelihood = np.full(len(x), -np.inf)
+        log_likelihood, every = np.full(len(x), -np.inf), None
         if np.any(ok):
-            residual = self.measurement.force - prediction.force[ok]
-            noise = self.hypothesis.noise_coordinates(x[ok])
+            force = prediction.force[ok]
+            shown = self._traces(x[ok], force)
             with np.errstate(over="ignore", invalid="ignore"):
-                value = self.noise.log_likelihood(residual, noise)
+                value = self._likelihood(force, shown, x[ok])
             log_likelihood[ok] = np.where(np.isnan(value), -np.inf, value)
+            if shown is not None:
+                every = np.full((len(x), *shown.shape[1:]), np.nan)
+                every[ok] = shown
         log_prior = np.where(inside, self.prior.log_density(x), -np.inf)
-        return Evaluation(log_prior, log_likelihood, prediction.force, _outcome(prediction.status, inside))
+        return Evaluation(log_prior, log_likelihood, prediction.force, _outcome(prediction.status, inside), every)
 
     def log_prior(self, x: ArrayLike) -> Array:
         """ln p0(x) where the convexity prior holds, -inf elsewhere; (B,)."""
@@ -120,14 +133,27 @@ class Posterior:
         """ln p(y | x), (B,); -inf where the film has no curve, or is not followed since the prior rules it out."""
         return self.evaluate(x).log_likelihood
 
-    def given(self, force: Array, x: Array) -> Array:
-        """(B,) ln p0(x) + ln p(y | x) if the curves of x (B, k) were ``force`` (B, N): what an emulator asks."""
-        residual = self.measurement.force - force
-        return self.prior.log_density(x) + self.noise.log_likelihood(residual, self.hypothesis.noise_coordinates(x))
+    def given(self, curves: Array, x: Array) -> Array:
+        """(B,) ln p0(x) + ln p(y | x) if x (B, k) had the ``curves`` of an `Evaluation`: what an emulator asks."""
+        n = len(self.measurement)
+        traces = curves[:, n:].reshape(len(curves), -1, n) if self.noise.traced else None
+        return self.prior.log_density(x) + self._likelihood(curves[:, :n], traces, x)
 
     def pointwise(self, x: Array, force: Array) -> Array:
         """ln p(y_i | other y, x) of draws x (B, k) with curves ``force`` (B, N), shape (B, N)."""
-        return self.noise.pointwise(self.measurement.force - force, self.hypothesis.noise_coordinates(x))
+        residual, noise = self.measurement.force - force, self.noise_at(x, force)
+        return noise.pointwise(residual, self.hypothesis.noise_coordinates(x))
+
+    def noise_at(self, x: Array, force: Array) -> NoiseLikelihood:
+        """The noise of draws x (B, k) with curves ``force`` (B, N) N, none of them nan."""
+        return self.noise.at(force, self._traces(x, force))
+
+    def _traces(self, x: Array, force: Array) -> Array | None:
+        return traces(self.forward, x, force) if self.noise.traced else None
+
+    def _likelihood(self, force: Array, shown: Array | None, x: Array) -> Array:
+        noise = self.noise.at(force, shown)
+        return noise.log_likelihood(self.measurement.force - force, self.hypothesis.noise_coordinates(x))
 
 
 def _outcome(status: NDArray[np.int8], inside: NDArray[np.bool_]) -> NDArray[np.int8]:

@@ -16,12 +16,14 @@ from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.convexity import RESTRICTING
+from bayesmembrane.physics.form_error import traces
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.convexity import least_eigenvalue
 from bayesmembrane.physics.mechanics.solution import Status
+from bayesmembrane.physics.noise.base import Elsewhere
 from bayesmembrane.physics.rigs.base import rig_of
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -49,6 +51,14 @@ class Wanted:
     draws: int = DRAWS
 
 
+def rest_of(measurement: Measurement, whole: Measurement | None) -> Measurement | None:
+    """The points of ``whole`` beyond the end of ``measurement``; None if there are none."""
+    end = float(measurement.deflection.max())
+    if whole is None or not whole.deflection.max() > end:
+        return None
+    return whole.select(whole.deflection > end)
+
+
 @dataclass(frozen=True, eq=False)
 class Predictions:
     """A run in numbers that can be drawn. SI units; Q stands for 5, 50 and 95 %.
@@ -59,11 +69,11 @@ class Predictions:
     rest_at, rest_force, rest_sd : (R,) points that were not used, the same
     end, full_range : largest deflection that was fitted, and of the whole measurement, m
     deflection, beyond : (G,) m, and True outside the fitted range
-    curve, repeat : (Q, G) N, noiseless curve, and a new measurement of it
+    curve, repeat : (Q, G) N, noiseless curve with its form error, and a new measurement of it
     lost : (L, G) share of the draws without a force, one row per reason in ``reasons``
-    residual : (Q, N) N, measured minus computed
+    residual : (Q, N) N, measured minus computed, without form error
     rest_residual : (Q, R) N, measured minus predicted measurement: the noise is in the prediction
-    curves_at : (Q, N) N, computed curve at the fitted points
+    curves_at : (Q, N) N, noiseless curve at the fitted points
     film : (n,) membrane parameters of the draw whose curve is nearest to the median one
     convex : by convexity mode, the share of draws that meet it
     shape_at : (D,) m, deflections of what follows
@@ -128,7 +138,11 @@ def predict_draws(
     seed: int = 0,
     solve: Solve = api.solve,
 ) -> Predictions:
-    """What posterior draws x (S, k) of a hypothesis on a measurement predict."""
+    """What posterior draws x (S, k) of a hypothesis on a measurement predict: of the same film on the same rig.
+
+    A form error goes on where the data leave it: its conditional process has their mean and width at the fitted points,
+    and widens to its own with the distance from them.
+    """
     wanted = wanted or Wanted()
     up_to, rest, breaks, draws = wanted.up_to, wanted.rest, wanted.breaks, wanted.draws
     x = _subset(np.atleast_2d(np.asarray(coordinates, dtype=float)), draws, seed)
@@ -137,12 +151,9 @@ def predict_draws(
     grid = _grid(end, last)
     rng = np.random.default_rng(seed)
 
-    def force(at: Array) -> tuple[Array, NDArray[np.int8]]:
-        found = Forward(hypothesis, measurement, at, solve)(x, reached=False)
-        return found.force, found.status
-
-    here = Forward(hypothesis, measurement, measurement.deflection, solve)(x)
-    curve, status = force(grid)
+    carried = _Carried(hypothesis, measurement, x, rng, solve)
+    here = carried.here
+    curve, status = carried.on(measurement, grid)
     reasons = [s for s in Status if s is not Status.OK and np.any(status == s)]
     films = hypothesis.films(x)
     chosen = _representative(here.force)
@@ -152,15 +163,14 @@ def predict_draws(
     own_sd = measurement.force_sd
     unused = _points(rest)
     rest_force = np.empty((len(x), 0))
-    if rest is not None and rest.across is not None:  # each reading has its own state
-        rest_force = Forward(hypothesis, rest, rest.deflection, solve)(x, reached=False).force
-    elif unused.at.size:
-        rest_force = force(unused.at)[0]
+    if rest is not None and unused.at.size:
+        # Across a strip each reading has its own state.
+        rest_force = carried.on(measurement if rest.across is None else rest, unused.at)[0]
     rest_force = rest_force + _total_sd(hypothesis, measurement, x, np.nan_to_num(unused.sd)) * rng.standard_normal(
         rest_force.shape
     )
     broken = np.array([b.deflection for b in breaks])
-    at_break = force(broken)[0] if broken.size else np.empty((len(x), 0))
+    at_break = carried.on(measurement, broken)[0] if broken.size else np.empty((len(x), 0))
     thickness = np.array([b.thickness for b in breaks])
     scaled = at_break * (thickness / measurement.specimen.thickness)
     some = films[np.linspace(0, len(films) - 1, min(SHAPE_DRAWS, len(films))).astype(int)]
@@ -183,7 +193,7 @@ def predict_draws(
         reasons=tuple(s.label for s in reasons),
         residual=_band(measurement.force - here.force),
         rest_residual=_band(unused.force - rest_force),
-        curves_at=_band(here.force),
+        curves_at=_band(here.force + carried.at_points()),
         film=films[chosen],
         convex={m.name: float(np.mean(m.holds(m.margin(here, hypothesis.material)))) for m in RESTRICTING},
         shape_at=shape_at,
@@ -204,6 +214,35 @@ def predict_draws(
 
 
 # ---- pieces ----------------------------------------------------------------------------------------------------------
+
+
+class _Carried:
+    """Curves of draws x (B, k) anywhere, each with the form error that its residual at the fitted points tells."""
+
+    def __init__(
+        self, hypothesis: Hypothesis, measurement: Measurement, x: Array, rng: np.random.Generator, solve: Solve
+    ) -> None:
+        self.hypothesis, self.x, self.rng, self.solve = hypothesis, x, rng, solve
+        forward = Forward(hypothesis, measurement, measurement.deflection, solve)
+        self.here = forward(x)
+        self.residual = measurement.force - self.here.force
+        bound = hypothesis.noise.bind(measurement)
+        self.noise = bound.at(self.here.force, traces(forward, x, self.here.force) if bound.traced else None)
+
+    def on(self, measurement: Measurement, at: Array) -> tuple[Array, NDArray[np.int8]]:
+        """Forces (B, G) N and statuses at deflections (G,) m of a film on the rig of ``measurement``."""
+        forward = Forward(self.hypothesis, measurement, at, self.solve)
+        found = forward(self.x, reached=False)
+        shown = traces(forward, self.x, found.force) if self.noise.traced else None
+        return found.force + self._error(Elsewhere(forward.path, found.force, shown)), found.status
+
+    def at_points(self) -> Array:
+        """(B, N) N: the form error at the fitted points."""
+        return self._error(None)
+
+    def _error(self, there: Elsewhere | None) -> Array:
+        theta = self.hypothesis.noise_coordinates(self.x)
+        return self.noise.recurring(self.residual, theta, self.rng, there)
 
 
 @dataclass(frozen=True)

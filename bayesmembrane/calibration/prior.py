@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import qmc
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
@@ -14,12 +17,14 @@ from bayesmembrane.physics.forward import Forward, Prediction, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 
-DRAWS = 2048
+DRAWS, MOST_DRAWS = 2048, 16384
+SCRAMBLES = 8  # of the points, independent of each other: their spread is the error
+LOG_SD = 0.01  # standard error of ln mass that is aimed at
 
 
 @dataclass(frozen=True)
 class Mass:
-    """The part of the untruncated prior that a convexity mode leaves, with its Monte Carlo standard error."""
+    """The part of the untruncated prior that a convexity mode leaves, with the standard error of its quadrature."""
 
     value: float
     sd: float
@@ -51,18 +56,42 @@ class JointPrior:
         mode = mode or self.hypothesis.convexity
         return mode.holds(mode.margin(prediction, self.hypothesis.material))
 
+    def scrambled(self, seed: int) -> list[Scrambled]:
+        """`SCRAMBLES` independent sequences of points that fill p0 evenly; others for another hypothesis."""
+        h = self.hypothesis
+        own = zlib.crc32(f"{h.label()} {h.noise.name} {h.convexity}".encode())
+        rngs = np.random.default_rng([seed, own]).spawn(SCRAMBLES)
+        return [Scrambled(self, qmc.Sobol(len(h.parameters), rng=rng)) for rng in rngs]
+
+    def mass(self, inside: Callable[[Array], NDArray[np.bool_]], seed: int = 0) -> Mass:
+        """The mass of the x (B, k) that are ``inside``: by so many points that ln of it is known to `LOG_SD`.
+
+        That is the mean over scrambled Sobol points (A. B. Owen, J. Complexity 14 (1998) 466), and its error comes from
+        the spread of `SCRAMBLES` independent scrambles. Twice as many points are taken until it is small enough, or
+        `MOST_DRAWS` have been. None inside is a mass of zero with the error of one point.
+        """
+        sequences, counted = self.scrambled(seed), DRAWS // SCRAMBLES
+        hits = np.array([int(np.sum(inside(s.draw(counted)))) for s in sequences])
+        while (found := _mass(hits, counted)).sd > LOG_SD * found.value and 2 * counted * SCRAMBLES <= MOST_DRAWS:
+            hits += [int(np.sum(inside(s.draw(counted)))) for s in sequences]
+            counted *= 2
+        return found if np.any(hits) else Mass(0.0, 1 / (counted * SCRAMBLES))
+
     def survey(
         self, measurement: Measurement, seed: int = 0, draws: int = DRAWS, solve: Solve = api.solve
     ) -> tuple[dict[str, Mass], Array]:
         """The mass of every convexity mode, and the draws that the hypothesis' own mode leaves, shape (M, k).
 
-        From ``draws`` draws of p0, of which k are inside, the mass is m = k/n with sd sqrt(m (1 - m) / n); none inside
-        is reported as half a hit, whose logarithm exists, and all of them as 1.
+        From ``draws`` points at least, those of `mass`; none inside is reported as half a hit, whose logarithm exists,
+        and all of them as 1.
         """
-        x = self.draw(np.random.default_rng(seed), draws)
+        each = 1 << int(np.ceil(np.log2(max(1, draws / SCRAMBLES))))
+        x = np.concatenate([s.draw(each) for s in self.scrambled(seed)])
         prediction = Forward(self.hypothesis, measurement, measurement.deflection, solve)(x)
-        masses = {n: _mass(int(np.sum(self.inside(prediction, m))), draws) for n, m in MODES.items()}
-        return masses, x[self.inside(prediction)]
+        inside = {n: self.inside(prediction, m) for n, m in MODES.items()}
+        masses = {n: _mass(np.sum(i.reshape(SCRAMBLES, each), axis=1), each) for n, i in inside.items()}
+        order = np.random.default_rng([seed, 2]).permutation(len(x))
+        return masses, x[order][self.inside(prediction)[order]]
 
     def masses(
         self, measurement: Measurement, seed: int = 0, draws: int = DRAWS, solve: Solve = api.solve
@@ -71,8 +100,28 @@ class JointPrior:
         return self.survey(measurement, seed, draws, solve)[0]
 
 
-def _mass(hits: int, draws: int) -> Mass:
-    if hits == draws:
+@dataclass(frozen=True, eq=False)
+class Scrambled:
+    """Points of one scrambled sequence, in the coordinates of a prior."""
+
+    prior: JointPrior
+    sequence: qmc.Sobol
+
+    def draw(self, count: int) -> Array:
+        """The next ``count`` points, (count, k); powers of two keep them even."""
+        # The sequence lies on a grid of 2^-30 that has 0 in it.
+        return self.prior.transform(self.sequence.random(count) + 2.0**-31)
+
+
+def _mass(hits: NDArray[np.integer], counted: int) -> Mass:
+    """From the ``hits`` (R,) of R independent scrambles of ``counted`` points each.
+
+    The error is no less than that of a whole number of hits: a grid in one dimension misses by up to one each time.
+    """
+    n = hits.size * counted
+    if np.all(hits == counted):
         return Mass(1.0, 0.0)
-    m = hits / draws if hits else 0.5 / (draws + 1)
-    return Mass(m, float(np.sqrt(m * (1 - m) / draws)))
+    if not np.any(hits):
+        return Mass(0.5 / (n + 1), float(np.sqrt(0.5) / n))
+    least = 1 / (np.sqrt(12 * hits.size) * counted)
+    return Mass(float(np.sum(hits) / n), max(float(np.std(hits, ddof=1) / np.sqrt(hits.size) / counted), float(least)))

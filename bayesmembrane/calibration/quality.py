@@ -14,6 +14,8 @@ from bayesmembrane.ground.parameters import Array
 
 NOTEWORTHY = 1e-3
 """A part of numerical failures above this is reported."""
+SMOOTH = 0.01
+"""A p-value of neighbouring residuals below this is reported."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,9 @@ class Quality:
     lengths : autocorrelation times that were walked after burn-in
     r_hat : of the worst coordinate
     failed, evaluated : draws that could not be solved, and all
+    alike, alike_p : lag-1 correlation of the residuals along the path, and how often the noise model by itself gives
+        one as large; None if nobody looked
+    noise : name of the noise model, "" if nobody looked
     own_noise, extra_noise : N, stated by the measurement, and the median of the inferred one; None unless it dominates
     """
 
@@ -41,11 +46,19 @@ class Quality:
     evaluated: int
     own_noise: float | None = None
     extra_noise: float | None = None
+    alike: float | None = None
+    alike_p: float | None = None
+    noise: str = ""
 
     @property
     def converged(self) -> bool:
         """Whether tau can be believed, ESS is what was wanted and R-hat is at most 1.01."""
         return self.lengths >= LEAST_TAUS and self.ess >= self.wanted and self.r_hat <= R_HAT
+
+    @property
+    def smooth(self) -> bool:
+        """Whether neighbouring residuals are more alike than the noise model can explain."""
+        return self.alike_p is not None and self.alike_p < SMOOTH
 
     @property
     def noteworthy_failures(self) -> bool:
@@ -55,6 +68,7 @@ class Quality:
 
 def quality_of(status: Mapping[str, Any], noise_sd: Array) -> Quality:
     """The quality of a run from its ``status``, as it is stored, and its draws of the inferred noise in N, if any."""
+    alike = status.get("checks", {}).get("alike", {})
     taus = [np.inf if tau is None else float(tau) for tau in status["tau"].values()]
     tally, dominated = status["tally"], bool(status["extra_noise_dominates"])
     return Quality(
@@ -68,6 +82,9 @@ def quality_of(status: Mapping[str, Any], noise_sd: Array) -> Quality:
         evaluated=sum(tally.values()),
         own_noise=status["goodness"]["own_noise_N"] if dominated else None,
         extra_noise=float(np.median(noise_sd)) if dominated else None,
+        alike=alike.get("lag_1"),
+        alike_p=alike.get("p_value"),
+        noise=alike.get("noise", ""),
     )
 
 

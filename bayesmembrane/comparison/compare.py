@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesmembrane.comparison.jobs import AS_USUAL, Job, Judging, judge
+from bayesmembrane.comparison.noises import AUTO, NOISES
 from bayesmembrane.comparison.result import Comparison, Row, ranked
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
@@ -27,13 +28,16 @@ class Range:
 def claimed(materials: str, effects: str, noise: str, convexity: str) -> tuple[Hypothesis, ...]:
     """The hypotheses "yeoh,gent+prestretch" with the ``effects`` "a,b" beside each of them.
 
-    Raises `SettingsError` for a name that nobody declared.
+    The ``noise`` "auto" makes one of each with every one of `NOISES`. Raises `SettingsError` for a name that nobody
+    declared.
     """
     found = []
     for name in (m.strip() for m in materials.split(",") if m.strip()):
         material, *own = (part.strip() for part in name.split("+"))
         common = [e.strip() for e in effects.split(",") if e.strip()]
-        found.append(hypothesis(material, dict.fromkeys([*own, *common]), noise, convexity))
+        effects_of = dict.fromkeys([*own, *common])
+        for model in NOISES if noise == AUTO else (noise,):
+            found.append(hypothesis(material, effects_of, model, convexity))
     return tuple(found)
 
 

@@ -20,8 +20,9 @@ from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.plain import plain
-from bayesmembrane.physics.convexity import FREE, MODES
+from bayesmembrane.physics.convexity import FREE, MODES, ConvexityMode
 
+WITHIN = "within the range fitted"
 ROUNDS, EACH, LAST = 3, 600, 2000
 KNOWN, STARTS = 1000, 64  # draws of the own mode, and starts without one, that the first proposal is fitted to
 LEAST_ESS, LARGEST_SHARE = 100.0, 0.1  # of the weights that a number may stand on
@@ -71,7 +72,8 @@ def by_convexity(
     ----------
     draws : (B, k) of ``posterior``, whose own mode is that of its hypothesis
     log_evidence, sd : of the same, not yet divided by the mass
-    masses : of every mode, from `JointPrior.masses`
+    masses : of every mode, from `JointPrior.masses`; and of `WITHIN`, if the own mode is also to be judged as if it
+        looked no farther than the points that are fitted
 
     g is a mixture of t-distributions, at first fitted to the draws and to starting points that know of no convexity,
     then to its own weighted draws (O. Cappé et al., Stat. Comput. 18 (2008) 447), and once more for each mode that is
@@ -84,12 +86,21 @@ def by_convexity(
         starts = starting_points(free, rng, 2, STARTS, Counter()).reshape(-1, free.size)
     except SettingsError:
         starts = first[:0]
-    found = _adapted(free, around(np.concatenate([first, starts]), rng), FREE.name, ROUNDS, rng)
+    target = _Target(free, posterior.hypothesis.convexity if WITHIN in masses else None)
+    found = _adapted(target, around(np.concatenate([first, starts]), rng), FREE.name, ROUNDS, rng)
     own, rows = (posterior.hypothesis.convexity.name, log_evidence, sd), []
-    for mode in MODES:
-        part = found if found.ess(mode) >= LEAST_ESS else _again(free, found, mode, rng)
+    for mode in masses:
+        part = found if found.ess(mode) >= LEAST_ESS else _again(target, found, mode, rng)
         rows.append(_row(own, mode, found, part, masses[mode]))
     return tuple(rows)
+
+
+@dataclass(frozen=True, eq=False)
+class _Target:
+    """A posterior without convexity prior, and the mode that is also to be seen within the range fitted."""
+
+    free: Posterior
+    within: ConvexityMode | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,35 +137,38 @@ class _Weighted:
         return self.x[rng.choice(len(w), count, p=w / np.sum(w))]
 
 
-def _weigh(free: Posterior, g: Mixture, count: int, rng: np.random.Generator) -> _Weighted:
-    x = g.draw(rng, count)
+def _weigh(target: _Target, g: Mixture, count: int, rng: np.random.Generator) -> _Weighted:
+    x, free = g.draw(rng, count), target.free
     prediction = free.forward(x)
     log_likelihood = np.full(count, -np.inf)
     ok = prediction.ok
     if np.any(ok):
         noise = free.hypothesis.noise_coordinates(x[ok])
         with np.errstate(over="ignore", invalid="ignore"):
-            log_likelihood[ok] = free.noise.log_likelihood(free.measurement.force - prediction.force[ok], noise)
+            bound = free.noise_at(x[ok], prediction.force[ok])
+            log_likelihood[ok] = bound.log_likelihood(free.measurement.force - prediction.force[ok], noise)
     log_weight = free.prior.log_density(x) + log_likelihood - g.log_density(x)
     inside = {n: free.prior.inside(prediction, m) for n, m in MODES.items()}
+    if target.within is not None:
+        inside[WITHIN] = free.prior.inside(free.forward(x, reached=False), target.within)
     return _Weighted(x, np.where(np.isnan(log_weight), -np.inf, log_weight), inside)
 
 
-def _adapted(free: Posterior, g: Mixture, mode: str, rounds: int, rng: np.random.Generator) -> _Weighted:
+def _adapted(target: _Target, g: Mixture, mode: str, rounds: int, rng: np.random.Generator) -> _Weighted:
     """The last draws of a proposal that was fitted ``rounds`` times to what it found of ``mode``."""
     for _ in range(rounds):
-        found = _weigh(free, g, EACH, rng)
-        if found.ess(mode) < free.size + 2:
+        found = _weigh(target, g, EACH, rng)
+        if found.ess(mode) < target.free.size + 2:
             break
         g = around(found.resampled(mode, EACH, rng), rng)
-    return _weigh(free, g, LAST, rng)
+    return _weigh(target, g, LAST, rng)
 
 
-def _again(free: Posterior, found: _Weighted, mode: str, rng: np.random.Generator) -> _Weighted:
+def _again(target: _Target, found: _Weighted, mode: str, rng: np.random.Generator) -> _Weighted:
     """Draws around those few that meet ``mode``, if there are enough to begin with."""
-    if found.ess(mode) < free.size + 2:
+    if found.ess(mode) < target.free.size + 2:
         return found
-    return _adapted(free, around(found.resampled(mode, EACH, rng), rng), mode, 2, rng)
+    return _adapted(target, around(found.resampled(mode, EACH, rng), rng), mode, 2, rng)
 
 
 def _row(own: tuple[str, float, float], mode: str, found: _Weighted, part: _Weighted, mass: Mass) -> ByMode:

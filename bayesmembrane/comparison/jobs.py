@@ -5,19 +5,22 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesmembrane.calibration.fingerprint import code_of
 from bayesmembrane.calibration.posterior import Posterior
-from bayesmembrane.calibration.prior import DRAWS, Mass
-from bayesmembrane.calibration.run import Run, RunSettings, load_run, sample
+from bayesmembrane.calibration.predictions import Wanted, rest_of
+from bayesmembrane.calibration.prior import Mass
+from bayesmembrane.calibration.run import Run, RunSettings, load_run, predictions_of, sample, stored_predictions
 from bayesmembrane.calibration.sampling.walk import Progress, Settings
 from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.calibration.store import describe, run_name
-from bayesmembrane.comparison.convexity_modes import ByMode, by_convexity
+from bayesmembrane.comparison.convexity_modes import WITHIN, ByMode, by_convexity
 from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, SIGMAS, together
 from bayesmembrane.comparison.evidence.nested import nested
@@ -94,7 +97,9 @@ def judge(job: Job, tell: Tell) -> Row:
         mass = _mass(posterior, job.judging.seed)
         if mass.value == 0.0:
             raise SettingsError(_no_mass(job.hypothesis))
-        return _row(job, posterior, mass, _run(job, tell), tell)
+        run = _run(job, tell)
+        _predict(job, run, tell)
+        return _row(job, posterior, mass, run, tell)
     except (SettingsError, DataError) as error:
         return Row(job.label, job.hypothesis, prior_mass=mass, failure=str(error))
 
@@ -124,7 +129,7 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
         rest = part("range", "the rest", lambda: leave_range_out(posterior, draws, whole), whole.data_hash)
     modes: tuple[ByMode, ...] = ()
     if job.judging.modes:
-        modes = part("modes", "convexity modes", lambda: _modes(posterior, run, bridged, seed))
+        modes = part("modes", "convexity modes", lambda: _modes(posterior, run, bridged, mass, seed))
     return Row(
         label=job.label,
         hypothesis=job.hypothesis,
@@ -142,14 +147,8 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
 
 
 def _mass(posterior: Posterior, seed: int) -> Mass:
-    """The part of the prior that its own convexity mode leaves; as `JointPrior.survey`, without what it says of others.
-
-    None of n draws inside is a mass of zero, with the error of one draw.
-    """
-    x = posterior.prior.draw(np.random.default_rng(seed), DRAWS)
-    hits = int(np.count_nonzero(posterior.log_prior(x) > -np.inf))
-    part = hits / DRAWS
-    return Mass(part, float(np.sqrt(part * (1 - part) / DRAWS)) if hits else 1 / DRAWS)
+    """The part of the prior that its own convexity mode leaves; none of the points inside is a mass of zero."""
+    return posterior.prior.mass(lambda x: posterior.log_prior(x) > -np.inf, seed)
 
 
 def _no_mass(hypothesis: Hypothesis) -> str:
@@ -192,6 +191,13 @@ def _run(job: Job, tell: Tell) -> Run:
     return run
 
 
+def _predict(job: Job, run: Run, tell: Tell) -> None:
+    """Store what a report will show of a run, unless that is there."""
+    if run.path is not None and stored_predictions(run) is None:
+        tell(job.label, "predictions")
+        predictions_of(run, Wanted(rest=rest_of(job.measurement, job.whole)))
+
+
 def _bridged(posterior: Posterior, run: Run, seed: int) -> EvidenceEstimate:
     """Bridge sampling on the draws of a run, ensemble by ensemble."""
     log_posterior = run.data.sample_stats["lp"].values.ravel().astype(float)
@@ -204,6 +210,16 @@ def _bridged(posterior: Posterior, run: Run, seed: int) -> EvidenceEstimate:
     )
 
 
-def _modes(posterior: Posterior, run: Run, found: EvidenceEstimate, seed: int) -> tuple[ByMode, ...]:
+def _modes(posterior: Posterior, run: Run, found: EvidenceEstimate, mass: Mass, seed: int) -> tuple[ByMode, ...]:
     masses = {mode: Mass(m["value"], m["sd"]) for mode, m in run.status["prior_mass"].items()}
+    own, m = posterior.hypothesis.convexity, posterior.measurement
+    masses[own.name] = mass
+    if own.looks_beyond and m.full_range > np.max(np.abs(m.deflection)) * (1 + 1e-9):
+        masses[WITHIN] = posterior.prior.mass(partial(_within, posterior), seed)
     return by_convexity(posterior, run.draws(), found.log_evidence, found.sd, masses, seed)
+
+
+def _within(posterior: Posterior, x: Array) -> NDArray[np.bool_]:
+    """(B,) whether films meet their own convexity mode up to the last point fitted."""
+    spare = posterior.hypothesis.convexity.spare
+    return posterior.prior.inside(posterior.forward(x, reached=False, spare=spare))

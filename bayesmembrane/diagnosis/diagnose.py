@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.thinning import thinned
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
+from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, Tell, opened
 from bayesmembrane.diagnosis.explanation.growth import grown
-from bayesmembrane.diagnosis.explanation.total import summed
+from bayesmembrane.diagnosis.explanation.total import Judged, summed
 from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, decided
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
 from bayesmembrane.diagnosis.left.remaining import remaining
@@ -19,7 +23,7 @@ from bayesmembrane.diagnosis.left.shape import residual_shape
 from bayesmembrane.diagnosis.reference.outliers import without_outliers
 from bayesmembrane.diagnosis.result import Diagnosis, thinning
 from bayesmembrane.diagnosis.separation import Experiment, experiments
-from bayesmembrane.diagnosis.thresholds import VERDICT
+from bayesmembrane.diagnosis.thresholds import TINY, VERDICT
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -60,6 +64,7 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
     validation = _validated(case, search, found)
     found = _predicting(found, validation)
     known = found.verdict in ("named", "ambiguous", "material")
+    found = replace(found, members=_adapted(search, found.members), ranking=_adapted(search, found.ranking))
     null = _null(case, found)
     best = found.members[0].candidate if known else null
     sd = search.noise.each
@@ -84,12 +89,17 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
         noise=search.noise,
         power=smallest_sizes(case.signatures, case.detection.score.critical),
         absorbed=tuple(e.name for e in absorbed(case.measurement, null.hypothesis)),
-        before=misfit_of(null.residual, sd, null.x.size),
-        after=misfit_of(best.residual, sd, best.x.size),
+        before=misfit_of(null.residual, sd, null.x.size, search.noise.white(null.residual)),
+        after=misfit_of(best.residual, sd, best.x.size, search.noise.white(best.residual)),
         shape=residual_shape(case.measurement, null.residual),
         validation=validation,
         experiments=_experiments(search, found),
     )
+
+
+def _adapted(search: Search, every: Sequence[Judged]) -> tuple[Judged, ...]:
+    """The same with the residuals of their best fits, which is what people call a residual."""
+    return tuple(replace(j, candidate=replace(j.candidate, residual=search.adapted(j.candidate))) for j in every)
 
 
 def _null(case: OpenCase, found: Verdict) -> Candidate:
@@ -116,7 +126,13 @@ def _validated(case: OpenCase, search: Search, found: Verdict) -> HeldOut | None
     null = _null(case, found)
     if found.verdict not in ("named", "ambiguous", "material"):
         return validate(search, null, null, [])
-    return validate(search, null, found.members[0].candidate, [j.candidate for j in found.ranking[:3]])
+    nulls = [j for j in found.ranking[3:] if j.candidate.label == null.label]
+    return validate(search, null, found.members[0].candidate, [_believed(j) for j in (*found.ranking[:3], *nulls)])
+
+
+def _believed(j: Judged) -> tuple[Candidate, float]:
+    """A candidate, and ln of what was believed of it before the data, up to a constant."""
+    return j.candidate, float(np.log(max(j.probability, TINY))) / BELIEFS.counts - j.log_evidence
 
 
 def _experiments(search: Search, found: Verdict) -> tuple[Experiment, ...]:

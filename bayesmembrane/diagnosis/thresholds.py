@@ -126,6 +126,8 @@ class SearchThresholds:
     """Times the least sum of squares: a search as far behind is not waited for."""
     at_bound: float = 1e-3
     """Of the width of the bounds: an estimate as near lies at its bound."""
+    rank: float = 1e-7
+    """Of the largest singular value: coordinates along directions below it stay where they are."""
     spare_points: int = 3
     """Points beyond the parameters, at least: fewer tell no misfit from noise."""
     better_null: float = 1.0
@@ -186,8 +188,10 @@ class GrowthThresholds:
     """Sets of each size that are tried with every energy."""
     further_starts: int = 1
     """Draws of the material's prior that searches for a first effect start from, besides the plain fit."""
-    polished: int = 6
-    """Hypotheses of each size that are searched on with their own form error."""
+    polished: int = 12
+    """Sets of each size that are searched on with their own form error, at most."""
+    polish_reach: float = 25.0
+    """ln of the Bayes factor behind the best set of its size, beyond which one is left as it is: that gains less."""
     energy_reach: float = 15.0
     """ln of the Bayes factor behind the best energy, beyond which one is not tried with further sets of a size."""
     worth: float = 1e-3
@@ -236,6 +240,8 @@ class VerdictThresholds:
     """Of an ambiguous answer; if more are needed, nothing can be told."""
     carried: float = 0.05
     """Relative error of an energy from which on none of those known is said to hold."""
+    law_carried: float = 0.6
+    """Relative error of a law from which on the effect is no longer the one that the library means."""
     least_coverage: float = 0.45
     """Of held-out points inside the 90 % band: a model that covers fewer predicts nothing, and is not named."""
 

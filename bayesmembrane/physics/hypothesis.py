@@ -32,7 +32,7 @@ class Hypothesis:
 
     The vector x holds the material's coordinates, those of the effects, and those of the noise, in this order. Their
     names carry the component: ``yeoh.ln_gd``, ``clamp_slip.length``, ``noise.ln_sd``. Raises `SettingsError` for
-    an effect that is named twice.
+    an effect that is named twice. A noise that infers something about effects suits itself to those that there are.
     """
 
     material: type[Material]
@@ -44,6 +44,7 @@ class Hypothesis:
         names = [e.name for e in self.effects]
         if repeated := sorted({n for n in names if names.count(n) > 1}):
             raise SettingsError(f'the effect "{repeated[0]}" is named twice', remedy="name every effect once")
+        object.__setattr__(self, "noise", self.noise.beside(self.effects))
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -112,7 +113,7 @@ class Hypothesis:
             "material": self.material.name,
             "effects": [e.name for e in self.effects],
             "noise": self.noise.name,
-            "extra_noise": getattr(self.noise, "extra", True),
+            "extra_noise": self.noise.inferred,
             "convexity": self.convexity.name,
         }
 
@@ -126,14 +127,10 @@ def hypothesis(
 ) -> Hypothesis:
     """The hypothesis made of components by name; raises `SettingsError` for a name that nobody declared.
 
-    ``extra_noise`` False keeps to the noise that the measurement states; only white noise can do without.
+    ``extra_noise`` False keeps to the noise that the measurement states, where the noise model can do without its own.
     """
     model = component("noise", noise)
-    if not extra_noise and not hasattr(model, "extra"):
-        raise SettingsError(
-            f'the noise model "{noise}" always infers a part of the noise', remedy='use "white" to do without'
-        )
-    instance = model() if extra_noise else model(extra=False)
+    instance = model() if extra_noise else model.stated_only()
     return Hypothesis(
         material(material_name), tuple(component("effects", e)() for e in effects), instance, mode(convexity)
     )

@@ -22,9 +22,11 @@ STATEMENT = (
 )
 METHOD = (
     "a loss is the Euclidean distance between measured and simulated forces, so the losses locate the measured curve; "
-    "number and first position of the evenly spaced deflections are inferred too. Prior: one smooth curve for both "
-    "ranges (integrated Wiener process in the logarithm of the force over a neo-Hookean one). The covariance holds "
-    "what the losses leave open: curve, positions, load cell. See docs/reconstruction.md"
+    "number and first position of the evenly spaced deflections are inferred too. One curve for both ranges, of one of "
+    "several families: smooth in force, smooth in the logarithm of force over a neo-Hookean one with and without "
+    "offsets of the zeros, or a strain energy with effects of the rig and an error of its form. Forces and covariance "
+    "are mean and covariance of their mixture, and hold what the losses leave open: family, curve, positions, load "
+    "cell. See docs/reconstruction.md"
 )
 SOURCE = 'Claudia Grabs and Werner Wirges, "Data-Based Approach to Hyperelastic Membranes", results table; cite it'
 LICENCE = "the inferred numbers: MIT, as the package; the printed ones are facts quoted from the paper"

@@ -1,25 +1,23 @@
-"""Mode, evidence and draws of the reconstruction's posterior: trilateration, damped Gauss-Newton, Hamiltonian steps."""
+"""Modes of the reconstruction's posterior and their evidence: trilateration, damped Gauss-Newton, Laplace."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.special import expit, logit, logsumexp
+from numpy.typing import NDArray
+from scipy.special import expit, logit
 
-from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.reconstruction.model import MODES, CurveState, Knobs, LossModel, wiener_basis
+from bayesmembrane.reconstruction.model import CurveState, Knobs, LossModel
 
 LOOSEN = (64.0, 16.0, 4.0, 1.0)  # errors are first taken as larger than they are: the way to the mode is then smooth
 ROUNDS = 8
-MOST_STEPS = 80
+MOST_STEPS, MOST_TRIES = 200, 15
 LEAST_GAIN, ROUGH_GAIN = 1e-4, 1e-2  # gain of the log posterior at which a mode is found, and nearly found
 SHARES = (0.3, 0.05, 0.8)  # first positions, in parts of the largest, from which the mode is looked for
-STEP, LEAPS = 0.2, 20  # first Hamiltonian step in units of the posterior's own scales, and most steps per draw
-WARM_UP = 40
-ACCEPT = 0.8  # acceptance at which each chain's step is aimed during the warm-up
 
 
 class Mode(NamedTuple):
@@ -52,27 +50,26 @@ def knobs_at(roughness: float, nugget: float, rounding: float, solver: tuple[flo
 
 def find_mode(model: LossModel, knobs: Knobs) -> Mode:
     """The best of the modes that trilateration at several first positions leads to."""
-    found = []
-    for share in SHARES:
-        theta = trilaterate(model, knobs, np.full(len(model.ranges), share))
-        for loosen in LOOSEN:
-            mode = _climb(model, theta, knobs, loosen, ROUGH_GAIN)
-            theta = mode.theta
-        found.append(mode)
-    best = max(found, key=lambda m: m.value)
-    return _climb(model, best.theta, knobs)
+    theta, settings = _starts(model, knobs), together([knobs] * len(SHARES))
+    for loosen in LOOSEN:
+        modes = climb(model, theta, settings, loosen, ROUGH_GAIN)
+        theta = np.array([m.theta for m in modes])
+    best = max(modes, key=lambda m: m.value)
+    return climb(model, best.theta[None], knobs)[0]
 
 
 def descend(model: LossModel, knobs: list[Knobs]) -> list[Mode]:
     """The modes at settings that allow for ever smaller errors, each started from the one before."""
-    found: list[list[Mode]] = []
-    for share in SHARES:
-        theta = trilaterate(model, knobs[0], np.full(len(model.ranges), share))
-        path: list[Mode] = []
-        for k in knobs:
-            path.append(_climb(model, _restart(path[-1], k) if path else theta, k, least=ROUGH_GAIN))
-        found.append(path)
-    return [max(at, key=lambda m: m.value) for at in zip(*found, strict=True)]
+    theta, path = _starts(model, knobs[0]), []
+    for k in knobs:
+        modes = climb(model, theta, together([k] * len(SHARES)), least=ROUGH_GAIN)
+        theta = np.array([m.theta for m in modes])
+        path.append(max(modes, key=lambda m: m.value))
+    return path
+
+
+def _starts(model: LossModel, knobs: Knobs) -> Array:
+    return np.array([trilaterate(model, knobs, np.full(len(model.ranges), share)) for share in SHARES])
 
 
 def trilaterate(model: LossModel, knobs: Knobs, share: Array) -> Array:
@@ -82,31 +79,27 @@ def trilaterate(model: LossModel, knobs: Knobs, share: Array) -> Array:
 
     with |y|^2 as an unknown of its own, y linearised about the smooth curve, and rows weighted down that do not fit.
     """
-    nb, count = 2 + MODES, len(model.ranges)
+    nb, count = model.curve.size, len(model.ranges)
     x, _, _, _ = model.positions(logit(share)[None])
-    force, reference = model.simulations.forces(x)[0][0], model.simulations.reference_force(x)[0][0]
-    basis = wiener_basis(float(max(model.simulations.ends)))(x[0])
-    basis[:, 2:] *= np.ravel(knobs.roughness)[0]
+    force = model.simulations.forces(x)[0][0]
     usable = force[:, model.use & model.simulations.usable]
-    c = np.linalg.solve(
-        basis.T @ basis / 0.02**2 + np.eye(nb), basis.T @ np.median(np.log(usable / reference[:, None]), 1) / 0.02**2
-    )
+    size = np.ravel(knobs.roughness)[:1]
+    c = model.curve.nearest(x[0], np.median(usable, axis=1), np.zeros(nb))
     scale = model.error_scale(knobs, 1).reshape(count, -1) * LOOSEN[1]
     weight = np.tile(model.use.astype(float), (count, 1))
     for _ in range(ROUNDS):
-        y = reference * np.exp(basis @ c)
+        y, _, moved = (v[0] for v in model.curve.force(c[None], size, x))
         a = np.zeros((count, force.shape[1], nb + count))
         b = np.empty((count, force.shape[1]))
         for i, block in enumerate(model.blocks()):
             loss = model.losses[model.ranges[i]]
-            part, moved = force[block].T, y[block, None] * basis[block]
-            a[i, :, :nb], a[i, :, nb + i] = -2 * part @ moved, 1.0
-            b[i] = loss**2 - np.sum(part**2, 1) + 2 * part @ (y[block] - moved @ c)
+            part = force[block].T
+            a[i, :, :nb], a[i, :, nb + i] = -2 * part @ moved[block], 1.0
+            b[i] = loss**2 - np.sum(part**2, 1) + 2 * part @ (y[block] - moved[block] @ c)
             a[i] /= 2 * (loss * scale[i])[:, None]
             b[i] /= 2 * loss * scale[i]
         new = _robust_lines(a.reshape(-1, nb + count), b.ravel(), weight.ravel(), nb, model.tail)[:nb]
-        step = basis @ (new - c)
-        c = c + min(1.0, 0.5 / max(float(np.max(np.abs(step))), 1e-12)) * (new - c)
+        c = c + model.curve.stride(moved, y, new - c) * (new - c)
     theta = np.zeros(model.size)
     theta[:nb], theta[-count:] = c, logit(share)
     return theta
@@ -122,71 +115,102 @@ def _robust_lines(a: Array, b: Array, believed: Array, priors: int, tail: float)
     return s
 
 
-def _climb(model: LossModel, theta: Array, knobs: Knobs, loosen: float = 1.0, least: float = LEAST_GAIN) -> Mode:
-    """Damped Gauss-Newton from ``theta``; every step raises the posterior density, or it is the last."""
+def climb(model: LossModel, theta: Array, knobs: Knobs, loosen: float = 1.0, least: float = LEAST_GAIN) -> list[Mode]:
+    """Damped Gauss-Newton from each of ``theta`` (B, P), with B settings of the scales.
+
+    Every step raises the posterior density, or the climb is over.
+    """
     here = _look(model, theta, knobs, loosen)
-    damping = 1e-3
+    damping, tries = np.full(len(theta), 1e-3), np.zeros(len(theta), dtype=int)
+    going = np.isfinite(here.value)
     for _ in range(MOST_STEPS):
-        gain = 0.0
-        for _ in range(15):
-            step = np.linalg.solve(here.precision + damping * np.diag(np.diag(here.precision)), here.gradient)
-            step = step / max(1.0, float(np.max(np.abs(step[-len(model.ranges) :]))))
-            there = _look(model, here.theta + step, knobs, loosen)
-            gain = there.value - here.value
-            if gain > 0:
-                break
-            damping = max(damping, 1e-7) * 5
-        if gain <= 0:
+        at = np.flatnonzero(going)
+        if not at.size:
             break
-        here, damping = there, max(damping / 10, 1e-10)
-        if gain < least:
-            break
-    spread = 0.5 * theta.size * np.log(2 * np.pi) - 0.5 * float(np.linalg.slogdet(here.precision)[1])
-    return Mode(here.theta, here.value, here.precision, here.value + spread, knobs)
+        there = _look(model, _step(model, here.take(at), damping[at]), knobs.take(at), loosen)
+        gain = np.where(np.isfinite(there.value), there.value - here.value[at], -np.inf)
+        up = gain > 0
+        here.put(at[up], there.take(up))
+        damping[at] = np.where(up, np.maximum(damping[at] / 10, 1e-10), np.maximum(damping[at], 1e-7) * 5)
+        tries[at] = np.where(up, 0, tries[at] + 1)
+        going[at] = np.where(up, gain >= least, tries[at] < MOST_TRIES)
+    spread = 0.5 * theta.shape[1] * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(here.precision)[1]
+    return [
+        Mode(here.theta[i], float(here.value[i]), here.precision[i], float(here.value[i] + spread[i]), knobs.take([i]))
+        for i in range(len(theta))
+    ]
+
+
+def _step(model: LossModel, here: _Look, damping: Array) -> Array:
+    """Unknowns (B, P) one damped step further; no first position moves by more than one in its logit."""
+    diagonal = np.einsum("bpp->bp", here.precision) * damping[:, None]
+    matrix = here.precision + diagonal[:, :, None] * np.eye(diagonal.shape[1])
+    step = np.linalg.solve(matrix, here.gradient[:, :, None])[:, :, 0]
+    longest = np.max(np.abs(step[:, -len(model.ranges) :]), axis=1)
+    return here.theta + step / np.maximum(1.0, longest)[:, None]
 
 
 class _Look(NamedTuple):
-    """Unknowns, log posterior (-inf where there is none), its gradient, and its negative curvature."""
+    """Unknowns (B, P), log posterior (-inf where there is none), its gradient, and its negative curvature."""
 
     theta: Array
-    value: float
+    value: Array
     gradient: Array
     precision: Array
+
+    def take(self, index: NDArray[Any]) -> _Look:
+        """Those at ``index``."""
+        return _Look(*(v[index] for v in self))
+
+    def put(self, index: NDArray[Any], other: _Look) -> None:
+        """Replace those at ``index``."""
+        for mine, theirs in zip(self, other, strict=True):
+            mine[index] = theirs
+
+
+def curvature(model: LossModel, theta: Array, state: CurveState, knobs: Knobs, loosen: float) -> Array:
+    """(B, P, P) Gauss-Newton curvature of -ln p(losses, theta), with the weights of the Student t."""
+    scale = model.error_scale(knobs, len(theta)) * loosen
+    weight = model.weights(state.residual / scale)[0] / scale**2
+    share = expit(theta[:, -len(model.ranges) :])
+    prior = np.concatenate([np.ones((len(theta), theta.shape[1] - share.shape[1])), 2 * share * (1 - share)], axis=1)
+    jacobian = np.swapaxes(state.jacobian * weight[:, :, None], 1, 2) @ state.jacobian
+    return np.asarray(jacobian + prior[:, :, None] * np.eye(theta.shape[1]))
 
 
 def _look(model: LossModel, theta: Array, knobs: Knobs, loosen: float) -> _Look:
     with np.errstate(all="ignore"):
-        state = model.evaluate(theta[None], knobs)
-        values, gradients = model.log_density(theta[None], state, knobs, loosen)
-    value, gradient = float(values[0]), gradients[0]
-    if not (np.isfinite(value) and np.all(np.isfinite(gradient))):
-        return _Look(theta, -np.inf, gradient, np.eye(theta.size))
-    scale = model.error_scale(knobs, 1)[0] * loosen
-    weight = model.weights(state.residual / scale)[0][0] / scale**2
-    share = expit(theta[-len(model.ranges) :])
-    prior = np.concatenate([np.ones(theta.size - share.size), 2 * share * (1 - share)])
-    precision = (state.jacobian[0].T * weight) @ state.jacobian[0] + np.diag(prior)
-    return _Look(theta, value, gradient, precision)
+        state = model.evaluate(theta, knobs)
+        value, gradient = model.log_density(theta, state, knobs, loosen)
+    good = np.isfinite(value) & np.all(np.isfinite(gradient), axis=1)
+    precision = curvature(model, theta, state, knobs, loosen)
+    precision = np.where(good[:, None, None], precision, np.eye(theta.shape[1]))
+    return _Look(theta.copy(), np.where(good, value, -np.inf), np.where(good[:, None], gradient, 0.0), precision)
 
 
 # ---- scales that are not known beforehand ----------------------------------------------------------------------------
 
 
-def scan(model: LossModel, grid: list[Knobs], start: Mode) -> list[Mode]:
+def scan(model: LossModel, grid: list[Knobs], start: Mode, least: float = LEAST_GAIN) -> list[Mode]:
     """The modes at all settings of the scales, each from ``start``."""
-    return [_climb(model, _restart(start, knobs), knobs) for knobs in grid]
+    return climb(model, np.array([restart(model, start, k) for k in grid]), together(grid), least=least)
 
 
 def again(model: LossModel, mode: Mode, knobs: Knobs | None = None) -> Mode:
     """The mode of a model that differs a little from the one that ``mode`` belongs to, or at other scales."""
     knobs = mode.knobs if knobs is None else knobs
-    return _climb(model, _restart(mode, knobs), knobs)
+    return climb(model, restart(model, mode, knobs)[None], knobs)[0]
 
 
-def _restart(mode: Mode, knobs: Knobs) -> Array:
+def together(knobs: Sequence[Knobs]) -> Knobs:
+    """Settings one after the other."""
+    return Knobs(*(np.concatenate([np.atleast_1d(k[i]) for k in knobs]) for i in range(4)))
+
+
+def restart(model: LossModel, mode: Mode, knobs: Knobs) -> Array:
     """The unknowns of a mode in the units of other scales, so that the smooth curve stays where it is."""
     theta = mode.theta.copy()
-    theta[2 : 2 + MODES] *= np.ravel(mode.knobs.roughness)[0] / np.ravel(knobs.roughness)[0]
+    theta[model.curve.free] *= np.ravel(mode.knobs.roughness)[0] / np.ravel(knobs.roughness)[0]
     return theta
 
 
@@ -199,97 +223,3 @@ def knob_grid(
 ) -> list[Knobs]:
     """All combinations; the solver's error is a matter of each range."""
     return [knobs_at(r, g, q, s) for r, g, q, s in product(roughness, nugget, rounding, product(solver, repeat=ranges))]
-
-
-# ---- draws -----------------------------------------------------------------------------------------------------------
-
-
-class Draws(NamedTuple):
-    """Draws from the posterior, the scales included.
-
-    Attributes
-    ----------
-    theta : (M, B, P) unknowns of B chains, each with its own scales
-    knobs : scales of the chains
-    acceptance : mean acceptance
-    """
-
-    theta: Array
-    knobs: Knobs
-    acceptance: float
-
-    def states(self, model: LossModel) -> list[CurveState]:
-        """What the draws mean, one `CurveState` of B vectors per step of the chains."""
-        return [model.evaluate(t, self.knobs) for t in self.theta]
-
-
-def sample(model: LossModel, modes: list[Mode], chains: int, steps: int, seed: int) -> Draws:
-    """Hamiltonian draws: each chain has the scales of one mode, chosen in proportion to the evidences.
-
-    The chain moves in the coordinates in which that mode's curvature is the identity. Raises `DataError` if hardly
-    any step is accepted: the posterior is then not what its mode says.
-    """
-    rng = np.random.default_rng(seed)
-    evidence = np.array([m.evidence for m in modes])
-    share = np.cumsum(np.exp(evidence - logsumexp(evidence)))
-    chosen = np.searchsorted(share, (np.arange(chains) + rng.random()) / chains * share[-1])
-    chosen = np.minimum(chosen, len(modes) - 1)
-    knobs = Knobs(*(np.concatenate([np.asarray(modes[i].knobs[k]) for i in chosen]) for k in range(4)))
-    roots = {i: np.linalg.inv(np.linalg.cholesky(modes[i].precision)).T for i in set(chosen.tolist())}
-    root = np.array([roots[i] for i in chosen])
-    theta = np.array([modes[i].theta for i in chosen])
-    theta = theta + 0.3 * np.einsum("bpq,bq->bp", root, rng.standard_normal(theta.shape))
-    kept, accepted = [], []
-    at = _Chains(theta, *_safe(model, theta, knobs))
-    size = np.full(chains, STEP)
-    for step in range(WARM_UP + steps):
-        at, chance = _leap(model, at, knobs, root, size, rng)
-        if step < WARM_UP:
-            size = size * np.exp(0.15 * (chance - ACCEPT))
-        else:
-            kept.append(at.theta)
-            accepted.append(chance)
-    if np.mean(accepted) < 0.2:
-        raise DataError("the reconstruction's posterior could not be sampled", remedy="check the table of losses")
-    return Draws(np.array(kept), knobs, float(np.mean(accepted)))
-
-
-class _Chains(NamedTuple):
-    """Unknowns (B, P) of all chains, log posterior (B,) and gradient (B, P)."""
-
-    theta: Array
-    value: Array
-    gradient: Array
-
-
-def _leap(
-    model: LossModel, at: _Chains, knobs: Knobs, root: Array, size: Array, rng: np.random.Generator
-) -> tuple[_Chains, Array]:
-    """One Hamiltonian step of all chains, and the chances of acceptance (B,)."""
-    theta, value, gradient = at
-    start = rng.standard_normal(theta.shape)
-    step = (size * (1 + 0.2 * rng.standard_normal(size.size)))[:, None]
-    new, slope = theta, np.einsum("bp,bpq->bq", gradient, root)
-    momentum = start + 0.5 * step * slope
-    leaps = int(rng.integers(LEAPS // 2, LEAPS + 1))
-    for leap in range(leaps):
-        new = new + np.einsum("bpq,bq->bp", root, step * momentum)
-        trial, new_gradient = _safe(model, new, knobs)
-        slope = np.einsum("bp,bpq->bq", new_gradient, root)
-        momentum = momentum + (step if leap < leaps - 1 else 0.5 * step) * slope
-    gain = trial - value - 0.5 * np.sum(momentum**2 - start**2, axis=1)
-    chance = np.exp(np.minimum(0.0, np.where(np.isfinite(gain), gain, -np.inf)))
-    take = rng.random(chance.size) < chance
-    return _Chains(
-        np.where(take[:, None], new, theta),
-        np.where(take, trial, value),
-        np.where(take[:, None], new_gradient, gradient),
-    ), chance
-
-
-def _safe(model: LossModel, theta: Array, knobs: Knobs) -> tuple[Array, Array]:
-    """Value and gradient, with -inf and 0 where a chain ran away."""
-    with np.errstate(all="ignore"):
-        value, gradient = model.log_posterior(theta, knobs)
-    good = np.isfinite(value) & np.all(np.isfinite(gradient), axis=1)
-    return np.where(good, value, -np.inf), np.where(good[:, None], gradient, 0.0)

@@ -1,45 +1,32 @@
-"""The posterior of a measured curve given distances to simulated ones: tabulated simulations, prior, residuals.
+"""The posterior of a measured curve given distances to simulated ones: prior, residuals.
 
-    L_kr = | y_r - F_k(x_r) (1 + error_k) | + error_kr,   y = F_0(x) exp(u(x)) + nugget,   x_r evenly spaced
+    L_kr = | y_r - F_k(x_r) (1 + error_k) | + error_kr,   y = g(x) + nugget,   x_r evenly spaced
 
-k counts the rows of the published table, r its ranges; F_0 is the simulated curve of the first row. The logarithm u of
-the measured over that reference is one smooth curve for all ranges: a straight line plus an integrated Wiener process
-in the deflection, in its Karhunen-Loève form. error_k is the numerical error of the published simulations: shared by
-rows whose curves are equal up to a factor (neo-Hookean rows), since it does not depend on the factor. error_kr, what
-else is wrong with a simulation or a print, has heavy tails: a Student t vector for each material and range, since what
-makes a material hard to simulate is common to its rows. Everything unknown is one vector of numbers with independent
-standard normal priors: the mode is that of a robust least-squares problem. Only the first positions a_r differ:
-they follow one recipe, uniform between zero and a largest one that is common to the ranges and unknown (ln uniform,
-not below the recording step s), in the smooth form p(a) ~ (s^4 + sum_r a_r^4)^(-R/4), and at most one spacing.
+k counts the rows of the published table, r its ranges. g is one curve for all ranges, of a family that says what is
+believed of it before the losses are seen (`families`). error_k is the numerical error of the published simulations:
+shared by rows whose curves are equal up to a factor (neo-Hookean rows), since it does not depend on the factor.
+error_kr, what else is wrong with a simulation or a print, has heavy tails: a Student t vector for each material and
+range, since what makes a material hard to simulate is common to its rows. Everything unknown is one vector of numbers
+with independent standard normal priors: the mode is that of a robust least-squares problem. Only the first positions
+a_r differ: they follow one recipe, uniform between zero and a largest one that is common to the ranges and unknown (ln
+uniform, not below the recording step s), in the smooth form p(a) ~ (s^4 + sum_r a_r^4)^(-R/4), and at most one spacing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 from scipy.special import expit, gammaln
 
-from bayesmembrane.data.published import PublishedTable
-from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.reconstruction.families.base import CurveFamily
+from bayesmembrane.reconstruction.simulations import Simulations
 
-Simulate = Callable[[str, Sequence[float], Array], Array]
-"""(material, parameters, deflection (N,) in m) -> force (N,) in N, nan where there is none."""
-
-STEP = 0.25e-3  # m between the tabulated forces
-NEAREST = 0.05e-3  # m: closer to zero no force can be told from none
-MODES = 20  # of the integrated Wiener process: the next one moves the curve by less than 1e-3 of the first
-LINE = (1.0, 0.3)  # prior standard deviations of u: level, and slope per 10 mm
-LENGTH = 0.010  # m, unit of deflection in the integrated Wiener process
 POWER = 4  # of the smooth maximum in the prior of the first positions
 TAIL = 2.0  # degrees of freedom of the Student t that the losses of one material over one range follow
-SAME = 1e-6  # curves whose ratio is constant to this are one curve up to a factor
 
 
 class Knobs(NamedTuple):
@@ -47,7 +34,7 @@ class Knobs(NamedTuple):
 
     Attributes
     ----------
-    roughness : standard deviation of the integrated Wiener process after 10 mm, times sqrt(3)
+    roughness : size of what is smooth and unknown in the curve; its family says in which unit
     nugget : load-cell noise of a single measured force, N
     solver : (..., n_ranges) error of a simulated force relative to the typical largest one of the range
     rounding : what is left of that error between rows whose simulations are one curve up to a factor
@@ -58,99 +45,9 @@ class Knobs(NamedTuple):
     solver: Array
     rounding: float | Array
 
-    def take(self, index: NDArray[np.intp]) -> Knobs:
+    def take(self, index: NDArray[np.intp] | list[int]) -> Knobs:
         """The settings at ``index``."""
         return Knobs(*(np.asarray(v)[index] for v in self))
-
-
-@dataclass(frozen=True)
-class Simulations:
-    """The simulated curves of all rows as splines: ln F_0 in ln x, ln(F_k / F_0) in x.
-
-    Attributes
-    ----------
-    usable : (K,) False where the forward model has no curve for a row
-    material : (K,) number of the material
-    family : (K,) number of the family of curves that are equal up to a factor, -1 for a curve of its own
-    ends : (R,) m, last deflection of each range
-    typical : (R,) N, median force at the ends
-    """
-
-    reference: CubicSpline
-    ratios: CubicSpline
-    usable: NDArray[np.bool_]
-    material: NDArray[np.intp]
-    family: NDArray[np.intp]
-    ends: Array
-    typical: Array
-
-    def reference_force(self, x: Array) -> tuple[Array, Array]:
-        """F_0 and dF_0/dx at deflections x in m, both of its shape; below 0.05 mm as at 0.05 mm."""
-        x = np.maximum(x, NEAREST)
-        log_x = np.log(x)
-        force = np.exp(self.reference(log_x))
-        return force, force * self.reference(log_x, 1) / x
-
-    def forces(self, x: Array) -> tuple[Array, Array]:
-        """F (..., K) of all rows and dF/dx (..., K) at deflections x (...) in m; below 0.05 mm as at 0.05 mm."""
-        reference, slope = self.reference_force(x)
-        x = np.maximum(x, NEAREST)
-        force = reference[..., None] * np.exp(self.ratios(x))
-        return force, force * ((slope / reference)[..., None] + self.ratios(x, 1))
-
-
-def tabulate(table: PublishedTable, simulate: Simulate) -> Simulations:
-    """Simulate every row once on a fine grid up to the largest end.
-
-    Raises `DataError` if the first row has no curve there: the others are told relative to it.
-    """
-    top = max(table.ends)
-    x = np.concatenate([[NEAREST, 0.1e-3, 0.15e-3, 0.2e-3], np.arange(STEP, top, STEP), [top]])
-    force = np.array([simulate(row.material, row.values, x) for row in table.rows])
-    usable = np.all(np.isfinite(force) & (force > 0), axis=1)
-    if not usable[0]:
-        raise DataError(
-            "the forward model gives no force over the whole range", table.rows[0].label, "put another row first"
-        )
-    logs = np.log(np.where(usable[:, None], force, force[0]))
-    ratios = logs - logs[0]
-    ends = np.array(table.ends)
-    at_ends = np.array([np.interp(ends, x, f) for f in force[usable]])
-    return Simulations(
-        CubicSpline(np.log(x), logs[0]),
-        CubicSpline(x, ratios.T),
-        usable,
-        np.unique([row.material for row in table.rows], return_inverse=True)[1].astype(np.intp),
-        _families(ratios, usable),
-        ends,
-        np.median(at_ends, axis=0),
-    )
-
-
-def _families(ratios: Array, usable: NDArray[np.bool_]) -> NDArray[np.intp]:
-    family = np.full(usable.size, -1, dtype=np.intp)
-    count = 0
-    for k in np.flatnonzero(usable):
-        alike = usable & (np.ptp(ratios - ratios[k], axis=1) < SAME) & (family < 0)
-        if np.count_nonzero(alike) > 1:
-            family[alike] = count
-            count += 1
-    return family
-
-
-@cache
-def wiener_basis(top: float) -> CubicSpline:
-    """Functions of u on [0, top] (m): level, slope, and the first `MODES` of the integrated Wiener process.
-
-    k(a, b) = a^2 (3 b - a) / 6 for a <= b, in units of 10 mm; each mode has the size it has for roughness 1.
-    """
-    x = np.linspace(0.0, top, 1201)
-    s = x / LENGTH
-    low, high = np.minimum(s[:, None], s), np.maximum(s[:, None], s)
-    sizes, modes = np.linalg.eigh(low**2 * (3 * high - low) / 6)
-    modes = modes[:, ::-1][:, :MODES] * np.sqrt(sizes[::-1][:MODES])
-    modes = modes * np.sign(modes[-1])
-    return CubicSpline(x, np.column_stack([np.full(x.size, LINE[0]), LINE[1] * s, modes]))
 
 
 class CurveState(NamedTuple):
@@ -191,6 +88,7 @@ class LossModel:
     Attributes
     ----------
     simulations : the simulated curves
+    curve : the family of the measured curve
     losses : (R, K) printed losses, N
     use : (K,) rows that are believed
     ranges : indices of the ranges looked at
@@ -202,6 +100,7 @@ class LossModel:
     """
 
     simulations: Simulations
+    curve: CurveFamily
     losses: Array
     use: NDArray[np.bool_]
     ranges: tuple[int, ...]
@@ -217,7 +116,7 @@ class LossModel:
         use[row] = False
         return replace(self, use=use)
 
-    # ---- layout of the unknowns: u | nugget | family errors | first positions ----------------------------------------
+    # ---- layout of the unknowns: curve | nugget | family errors | first positions ------------------------------------
 
     @property
     def points(self) -> int:
@@ -232,7 +131,7 @@ class LossModel:
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return 2 + MODES + self.points * (1 + self.families) + len(self.ranges)
+        return self.curve.size + self.points * (1 + self.families) + len(self.ranges)
 
     def blocks(self) -> list[slice]:
         """Where the points of each range stand."""
@@ -258,18 +157,12 @@ class LossModel:
 
     def smooth(self, theta: Array, knobs: Knobs, x: Array) -> tuple[Array, Array, Array]:
         """Smooth force (B, N) at x (B, N), its slope in N/m, and its derivatives (B, N, J) in the first unknowns."""
-        basis = wiener_basis(float(max(self.simulations.ends)))
-        scale = np.ones((theta.shape[0], 1, 2 + MODES))
-        scale[:, 0, 2:] = np.broadcast_to(np.asarray(knobs.roughness, dtype=float), theta.shape[:1])[:, None]
-        shape, coefficients = basis(x) * scale, theta[:, : 2 + MODES]
-        reference, slope = self.simulations.reference_force(x)
-        force = reference * np.exp(np.einsum("bnj,bj->bn", shape, coefficients))
-        du = np.einsum("bnj,bj->bn", basis(x, 1) * scale, coefficients)
-        return force, force * (slope / reference + du), force[:, :, None] * shape
+        size = np.broadcast_to(np.asarray(knobs.roughness, dtype=float), theta.shape[:1])
+        return self.curve.force(theta[:, : self.curve.size], size, x)
 
     def evaluate(self, theta: Array, knobs: Knobs) -> CurveState:
         """Positions, forces, residuals and derivatives for unknowns (B, P)."""
-        nb, n, ranges = 2 + MODES, self.points, len(self.ranges)
+        nb, n, ranges = self.curve.size, self.points, len(self.ranges)
         x, first, dfirst, weight = self.positions(theta[:, -ranges:])
         smooth, slope, shape = self.smooth(theta, knobs, x)
         nugget = np.broadcast_to(np.asarray(knobs.nugget, dtype=float), theta.shape[:1])
@@ -308,7 +201,7 @@ class LossModel:
         return distance - self.losses[self.ranges[i]], jacobian
 
     def _error_columns(self, family: int) -> NDArray[np.intp]:
-        return 2 + MODES + self.points * (1 + family) + np.arange(self.points)
+        return self.curve.size + self.points * (1 + family) + np.arange(self.points)
 
     def log_posterior(self, theta: Array, knobs: Knobs, loosen: float = 1.0) -> tuple[Array, Array]:
         """ln p(losses, theta) (B,) and its gradient (B, P); normalised in the losses."""
@@ -318,12 +211,17 @@ class LossModel:
         """As `log_posterior`, from what the unknowns mean; ``loosen`` multiplies the errors."""
         scale = self.error_scale(knobs, theta.shape[0]) * loosen
         z = state.residual / scale
-        weight, size, total = self.weights(z)
-        constant = gammaln((self.tail + size) / 2) - gammaln(self.tail / 2) - 0.5 * size * np.log(self.tail * np.pi)
         value, gradient = self.log_prior(theta)
-        value = value + np.sum(constant - 0.5 * (self.tail + size) * np.log1p(total / self.tail), axis=1)
-        value = value - np.sum(np.where(self.believed, np.log(scale), 0.0), axis=1)
-        return value, gradient - np.einsum("bm,bmp->bp", weight * z / scale, state.jacobian)
+        slope = np.einsum("bm,bmp->bp", self.weights(z)[0] * z / scale, state.jacobian)
+        return value + self.log_likelihood(state.residual, knobs, loosen), gradient - slope
+
+    def log_likelihood(self, residual: Array, knobs: Knobs, loosen: float) -> Array:
+        """ln p(losses | theta) (B,) from residuals (B, R K); ``loosen`` multiplies the errors."""
+        scale = self.error_scale(knobs, residual.shape[0]) * loosen
+        _, size, total = self.weights(residual / scale)
+        constant = gammaln((self.tail + size) / 2) - gammaln(self.tail / 2) - 0.5 * size * np.log(self.tail * np.pi)
+        value = np.sum(constant - 0.5 * (self.tail + size) * np.log1p(total / self.tail), axis=1)
+        return np.asarray(value - np.sum(np.where(self.believed, np.log(scale), 0.0), axis=1))
 
     @property
     def believed(self) -> NDArray[np.bool_]:

@@ -82,10 +82,41 @@ class LossCheck:
 
 
 @dataclass(frozen=True)
-class Influence:
-    """Forces (N,) in N at the same deflections when one assumption is changed; ln evidence relative to the shipped one.
+class FamilyResult:
+    """What one family of curves says by itself.
 
-    The evidence is None where the data or the measure of the first positions differ too.
+    Attributes
+    ----------
+    name, title : how answers call it, how reports print it
+    probability : after the losses; families are equally probable before them
+    log_evidence : ln p(losses) by Laplace's approximation, relative to the best family
+    force, force_sd : (N,) N, at the deflections of the reconstruction; None for a family that is not mixed
+    """
+
+    name: str
+    title: str
+    probability: float
+    log_evidence: float
+    force: Array | None
+    force_sd: Array | None
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers, N."""
+        return {
+            "title": self.title,
+            "probability": self.probability,
+            "log_evidence": self.log_evidence if np.isfinite(self.log_evidence) else None,
+            "force_N": None if self.force is None else self.force.tolist(),
+            "sd_N": None if self.force_sd is None else self.force_sd.tolist(),
+        }
+
+
+@dataclass(frozen=True)
+class Influence:
+    """Forces (N,) in N at the same deflections if one assumption were changed, and what that does to ln evidence.
+
+    The change is that of the curve with a smooth logarithm, in which all of these assumptions mean something. The
+    evidence is None where the data or the measure of the first positions differ too.
     """
 
     changed: str
@@ -100,12 +131,12 @@ class Reconstruction(Showable):
     Attributes
     ----------
     ranges : one result per range
-    covariance : (N, N) N^2, of the forces of all ranges one after the other: curve, load cell, positions
+    covariance : (N, N) N^2, of the forces of all ranges one after the other: family, curve, load cell, positions
     losses : every printed loss beside the reconstructed one
     suspects : rows that contradict the others, with the smallest corrections
     influence : what other priors and likelihoods would give
     scales : posterior means of roughness, rounding and solver errors
-    acceptance : of the Hamiltonian steps
+    families : what the curve may be, with probabilities; forces and covariance are those of their mixture
     """
 
     ranges: tuple[RangeResult, ...]
@@ -114,7 +145,7 @@ class Reconstruction(Showable):
     suspects: tuple[Suspect, ...]
     influence: tuple[Influence, ...]
     scales: dict[str, float]
-    acceptance: float
+    families: tuple[FamilyResult, ...] = ()
 
     @property
     def deflection(self) -> Array:
@@ -134,12 +165,12 @@ class Reconstruction(Showable):
         ]
         return {
             **{r.name: r.summary() for r in self.ranges},
+            "families": {f.name: f.summary() for f in self.families},
             "suspect_rows": [_suspect(s) for s in self.suspects],
             "covariance_N2": self.covariance.tolist(),
             "losses": [c.summary() for c in self.losses],
             "influence": influence,
             "scales": self.scales,
-            "acceptance": self.acceptance,
         }
 
 

@@ -12,7 +12,8 @@ from scipy.interpolate import CubicSpline
 from bayesmembrane.data.published import PrintedSet, PublishedTable
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.reconstruction.fit import Mode, again, find_mode
-from bayesmembrane.reconstruction.model import LossModel, Simulate
+from bayesmembrane.reconstruction.model import LossModel
+from bayesmembrane.reconstruction.simulations import Simulate
 
 WRONG = 0.05  # prior probability that a row is wrong
 DECADES = 4.0  # a wrong loss is off by any order of magnitude, from the solver's error up: this many decades

@@ -19,6 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from PIL import Image
 
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.report.blocks import Picture
@@ -26,6 +27,8 @@ from bayesmembrane.report.style import INK, MUTED, colour, marker
 
 WIDTH = 9.0  # inches: 900 px at 100 dpi
 DPI = 120
+COLOURS = 256  # of a PNG: those nearest to what was drawn look the same, in a third of the bytes
+MOST_SVG = 60_000  # bytes: a drawing of so many marks is a cloud, and smaller as one
 LINE = 112  # letters of a legend that fit into the width
 _RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -71,14 +74,28 @@ def new_figure(height: float, width: float = WIDTH, layout: Literal["constrained
 
 
 def encoded(figure: Figure, kind: str) -> Picture:
-    """The same figure always gives the same bytes: no date, no random names."""
+    """The same figure always gives the same bytes: no date, no random names. A large SVG becomes a PNG."""
+    if kind == "svg":
+        drawn = _clips_numbered(_PLACE.sub(_rounded, _saved(figure, "svg", {"Date": None})))
+        if len(drawn) <= MOST_SVG:
+            return Picture(drawn, "svg")
+    return Picture(_in_few_colours(_saved(figure, "png", {"Software": None})), "png")
+
+
+def _saved(figure: Figure, kind: str, metadata: dict[str, None]) -> bytes:
     out = io.BytesIO()
-    metadata = {"Date": None} if kind == "svg" else {"Software": None}
     with style():
-        extra: dict[str, Any] = {"pil_kwargs": {"optimize": True}} if kind == "png" else {}
-        figure.savefig(out, format=kind, dpi=DPI, metadata=metadata, **extra)
-    data = out.getvalue()
-    return Picture(_clips_numbered(_PLACE.sub(_rounded, data)) if kind == "svg" else data, kind)
+        figure.savefig(out, format=kind, dpi=DPI, metadata=metadata)
+    return out.getvalue()
+
+
+def _in_few_colours(data: bytes) -> bytes:
+    """A PNG with a palette."""
+    out = io.BytesIO()
+    with Image.open(io.BytesIO(data)) as whole:
+        few = whole.convert("RGB").quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    few.save(out, format="png", optimize=True)
+    return out.getvalue()
 
 
 def legend_columns(names: Sequence[str], most: int) -> int:

@@ -5,13 +5,14 @@ What stands on the page is up to the sections (`report.sections`); here they are
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from bayesmembrane.calibration.run import Run
-from bayesmembrane.ground.errors import SettingsError, StorageError
+from bayesmembrane.ground.errors import BayesmembraneError, SettingsError, StorageError
 from bayesmembrane.ground.files import write_text
 from bayesmembrane.ground.plain import json_text
 from bayesmembrane.ground.registry import components
@@ -26,7 +27,14 @@ PAGE, TWIN = "index.html", "report.json"
 FOOTER = "Bands hold what data and priors leave open if the material is right. Forces in N or mN, lengths in mm."
 
 
-def write_report(found: Sequence[Any], out: Path, title: str | None = None) -> Path:
+def warned(sentence: str) -> None:
+    """The sentence as a warning of Python's."""
+    warnings.warn(sentence, stacklevel=3)
+
+
+def write_report(
+    found: Sequence[Any], out: Path, title: str | None = None, tell: Callable[[str], None] = warned
+) -> Path:
     """Write ``out/index.html`` and ``out/report.json`` about all that was ``found``, and return the page's path.
 
     Parameters
@@ -35,22 +43,29 @@ def write_report(found: Sequence[Any], out: Path, title: str | None = None) -> P
         folders: of a folder all that is stored in it and in those right under it
     out : folder; made if it is missing
     title : of the page; made of the specimens' names unless given
+    tell : is told in a sentence of each stored answer that cannot be read; the page says so, too, and shows the others
 
     A report of an earlier time is replaced, any other file is not: `StorageError`. The same error names a folder that
-    holds nothing to show, or something damaged; `SettingsError` says that there is nothing, or no section for it.
+    holds nothing to show, and says why if nothing of what is stored can be read; `SettingsError` says that there is
+    nothing, or no section for it.
     """
     for name in (PAGE, TWIN):
         _refuse_foreign(out / name)
-    content = compose(gathered(found), title)
+    gathering = gathered(found)
+    for sentence in gathering.left_out:
+        tell(sentence)
+    content = compose(gathering.results, title)
     twin = {
         "generator": GENERATOR,
         "title": content.title,
         "answer": content.answer,
         "warnings": content.warnings,
+        "left_out": gathering.left_out,
         "tables": {b.name: b.records() for p in content.parts for b in p.blocks if isinstance(b, Table)},
     }
     write_text(out / TWIN, json_text(twin, indent=1), "the report")
-    return write_text(out / PAGE, whole_page(generator=GENERATOR, footer=FOOTER, **vars(content)), "the report")
+    around = {"generator": GENERATOR, "footer": FOOTER, "left_out": gathering.left_out}
+    return write_text(out / PAGE, whole_page(**around, **vars(content)), "the report")
 
 
 @dataclass(frozen=True)
@@ -120,16 +135,25 @@ def _named_once(parts: Sequence[Part]) -> list[Part]:
 # ---- what is found -------------------------------------------------------------------------------------------------
 
 
-def gathered(found: Sequence[Any]) -> list[Any]:
+@dataclass(frozen=True)
+class Gathered:
+    """What a page is made of, and a sentence for each stored answer that cannot be read: where, why, how to mend it."""
+
+    results: list[Any]
+    left_out: list[str]
+
+
+def gathered(found: Sequence[Any]) -> Gathered:
     """Results as they are, runs as a report shows them, folders read; raises as `write_report` does."""
     if not found:
         raise SettingsError("a report needs something to show", remedy="name at least one folder with stored answers")
     every = sections()
     known = (Run, Shown, *(kind for s in every for kind in (s.shows, *s.takes) if kind is not None))
     results: list[Any] = []
+    faults: list[tuple[Path, BayesmembraneError]] = []
     for entry in found:
         if isinstance(entry, str | Path):
-            results += _stored(Path(entry), every)
+            results += _stored(Path(entry), every, faults)
         elif isinstance(entry, known):
             results.append(read(entry) if isinstance(entry, Run) else entry)
         else:
@@ -137,22 +161,50 @@ def gathered(found: Sequence[Any]) -> list[Any]:
                 f"no section of the report shows a {type(entry).__name__}",
                 remedy='install the package that brings one under the entry points "bayesmembrane.sections"',
             )
-    return results
+    if faults and not results:
+        raise _nothing(faults)
+    return Gathered(results, [f"Left out: {_placed(place, fault)}" for place, fault in faults])
 
 
-def _stored(folder: Path, every: Sequence[Section]) -> list[Any]:
-    """All that the sections read from a folder and from those right under it."""
+def _stored(folder: Path, every: Sequence[Section], faults: list[tuple[Path, BayesmembraneError]]) -> list[Any]:
+    """All that the sections read from a folder and from those right under it; what cannot be read joins ``faults``."""
     if not folder.is_dir():
         raise StorageError(
             "there is no such folder", str(folder), "name one that holds stored answers, as chains/ does"
         )
     places = [folder, *sorted(p for p in folder.iterdir() if p.is_dir())]
-    results = [result for place in places for section in every if (result := section.reads(place)) is not None]
-    if not results:
+    results, before = [], len(faults)
+    for place, section in ((place, section) for place in places for section in every):
+        try:
+            result = section.reads(place)
+        except BayesmembraneError as fault:
+            faults.append((place, fault))
+            continue
+        if result is not None:
+            results.append(result)
+    if not results and len(faults) == before:
         raise StorageError(
             "nothing that a report can show is stored here", str(folder), "name a folder that a verb wrote with --out"
         )
     return results
+
+
+def _placed(place: Path, fault: BayesmembraneError) -> str:
+    """The sentence of an error, with the folder at which it was met."""
+    said = str(fault)
+    return said if str(place) in said else f"{place}: {said}"
+
+
+def _nothing(faults: Sequence[tuple[Path, BayesmembraneError]]) -> BayesmembraneError:
+    """The error where none of the stored answers can be read: of one its own, of several the first stands for all."""
+    place, first = faults[0]
+    if len(faults) == 1:
+        return first
+    return StorageError(
+        f"none of the {len(faults)} stored answers can be read, the first because {first.what.rstrip('. ')}",
+        first.where or str(place),
+        first.remedy,
+    )
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------

@@ -13,16 +13,20 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import FAILURES
 from bayesmembrane.calibration.predictions import Predictions
-from bayesmembrane.calibration.run import Run, load_run, predictions_of
+from bayesmembrane.calibration.quality import Quality
+from bayesmembrane.calibration.run import Run, load_run, stored_predictions
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.noise.white import White
 from bayesmembrane.report.canvas import Measured
 from bayesmembrane.words.calibration import LOOSE, Case
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import millimetres, spoken_parameter
+
+USUAL = White.name
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +96,7 @@ class Shown:
     cache, crosscheck : tally of the curve cache; what the second solver found
     facts : settings, versions and the like
     replicas : new readings, None where the run stored none
+    quality : how far the draws can be trusted
     """
 
     folder: str
@@ -111,6 +116,7 @@ class Shown:
     crosscheck: Mapping[str, Any]
     facts: Mapping[str, Any]
     replicas: Replicas | None = None
+    quality: Quality | None = None
 
     @property
     def material(self) -> str:
@@ -124,13 +130,18 @@ class Shown:
 
     @property
     def name(self) -> str:
-        """Material and effects, for people."""
-        return spoken(self.hypothesis)
+        """Material and effects, for people; with the noise model where it is not the usual one."""
+        return spoken(self.hypothesis) + ("" if self._noise == USUAL else f" ({self._noise})")
 
     @property
     def key(self) -> str:
-        """A word for anchors and JSON: material, effects, range."""
-        return f"{self.hypothesis.label()}-{1e3 * self.digest.end:.4g}mm".replace("+", "-").replace(".", "_")
+        """A word for anchors and JSON: material, effects, noise unless it is the usual one, range."""
+        words = [self.hypothesis.label(), *([] if self._noise == USUAL else [self._noise])]
+        return "-".join([*words, f"{1e3 * self.digest.end:.4g}mm"]).replace("+", "-").replace(".", "_")
+
+    @property
+    def _noise(self) -> str:
+        return self.hypothesis.noise.name
 
     @cached_property
     def case(self) -> Case:
@@ -205,21 +216,40 @@ MOST_TRACED, MOST_REPLICAS = 300, 1000  # draws of an ensemble in a trace, new r
 _SHOWN_APART = ("hypothesis", "sampling", "data", "code", "versions", "seed", "fingerprint")
 
 
-def read(run: Run | Path | str) -> Shown:
-    """A run, or the folder that holds one, as a report shows it.
+def read(run: Run | Path | str, predictions: Predictions | None = None) -> Shown:
+    """A run, or the folder that holds one, as a report shows it; ``predictions`` are those stored with it unless given.
 
-    Of a run that was interrupted before its predictions were stored they are made here, once; of a run that is not
-    stored itself, every time. Raises `StorageError` if the folder holds no run.
+    Raises `StorageError` if the folder holds no run, a damaged one, or one without predictions: none are made here.
     """
     if not isinstance(run, Run):
         folder = Path(run)
         if not folder.is_dir():
             raise StorageError("there is no such run folder", str(folder), "name a folder under chains/")
         run = load_run(folder)
+    try:
+        found = predictions or stored_predictions(run)
+        if found is not None:
+            return _shown(run, found)
+    except (KeyError, AttributeError) as error:
+        raise StorageError(
+            f"another version wrote the run ({type(error).__name__}: {error})", _place(run), "sample again"
+        ) from None
+    raise StorageError(
+        "no predictions are stored with the run, and a report solves no films",
+        _place(run),
+        "ask for the same again (sample, compare or loop), which keeps the draws and predicts from them",
+    )
+
+
+def _place(run: Run) -> str:
+    return run.name if run.path is None else str(run.path)
+
+
+def _shown(run: Run, found: Predictions) -> Shown:
     m, h = run.measurement, run.hypothesis
     p = m.provenance
     return Shown(
-        folder=run.name if run.path is None else str(run.path),
+        folder=_place(run),
         hypothesis=h,
         film=ShownFilm(
             m.specimen.name,
@@ -230,7 +260,7 @@ def read(run: Run | Path | str) -> Shown:
             p.notes,
         ),
         data_hash=m.data_hash,
-        digest=predictions_of(run),
+        digest=found,
         x=run.draws(),
         natural=_stacked(run.data.posterior, h.natural_names),
         prior=_stacked(run.data.prior, h.names) if "prior" in run.data.groups() else np.empty((0, len(h.names))),
@@ -243,6 +273,7 @@ def read(run: Run | Path | str) -> Shown:
         crosscheck=run.status["crosscheck"],
         facts=_facts(run),
         replicas=_replicas(run.data),
+        quality=run.quality,
     )
 
 

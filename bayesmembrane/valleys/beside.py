@@ -11,9 +11,9 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.mechanics.api import unaided
 from bayesmembrane.valleys.follow import RISE, between, valleys
 from bayesmembrane.valleys.result import Between, Valley, Valleys
-from bayesmembrane.valleys.surface import unaided
 
 
 @dataclass(frozen=True, eq=False, repr=False)

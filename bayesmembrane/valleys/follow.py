@@ -19,6 +19,7 @@ from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.convexity import FREE, MODES
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.mechanics.api import unaided
 from bayesmembrane.valleys.between import closest_approach
 from bayesmembrane.valleys.next_tests import rank
 from bayesmembrane.valleys.posterior import (
@@ -32,7 +33,7 @@ from bayesmembrane.valleys.posterior import (
 )
 from bayesmembrane.valleys.profile import LossProfile, floor, optimum, pair_maps, profiles
 from bayesmembrane.valleys.result import Between, Metric, PublishedPoint, Spectrum, Valley, Valleys, metric_of
-from bayesmembrane.valleys.surface import Surface, unaided
+from bayesmembrane.valleys.surface import Surface
 
 RISE = 0.1
 """The valley holds what fits within this part of the least loss, unless asked otherwise."""

@@ -14,10 +14,11 @@ from bayesmembrane.calibration.objective import Objective
 from bayesmembrane.calibration.prior import JointPrior
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.convexity import RESTRICTING, ConvexityMode
+from bayesmembrane.physics.form_error import traces
 from bayesmembrane.physics.noise.base import NoiseLikelihood, force_scale
 from bayesmembrane.valleys.surface import Surface
 
-NOISE_NODES = {1: (161,), 2: (41, 13)}
+NOISE_NODES = {1: (161,), 2: (41, 13), 3: (21, 7, 5)}
 REACH = 4.0  # prior standard deviations of the noise's coordinates
 ROUNDS, ITERATIONS = 4, 60
 
@@ -60,7 +61,9 @@ def grid(surface: Surface, z: Array) -> Grid:
             margins[mode.name][good] = mode.margin(prediction, h.material)
         ok = np.isfinite(loss[good])
         part = good[ok]
-        likelihood = _integrated(h.noise.bind(surface.measurement), surface, y - prediction.force[ok])
+        noise, force = h.noise.bind(surface.measurement), prediction.force[ok]
+        shown = traces(surface.objective.forward, x[part], force) if noise.traced else None
+        likelihood = _integrated(noise.at(force, shown), surface, y - force)
         prior = np.sum([p.prior.log_density(x[part, i]) for i, p in enumerate(surface.objective.parameters)], axis=0)
         slopes = np.linalg.slogdet(surface.coordinate_slopes(x[part], flat[part]))[1]
         stretch = np.sum(np.log(np.abs(surface.chart.stretch(flat[part]))), axis=1)
@@ -154,15 +157,17 @@ class NormalPosterior:
         )
         x = np.clip(surface.chart.coordinates(start[None, :]), self.objective.low, self.objective.high)
         for _ in range(ROUNDS):
-            self.noise_covariance = self._noise(self.objective.batch(x)[0][0])
+            self.noise_covariance = self._noise(x)
             self.whitening = np.linalg.inv(np.linalg.cholesky(self.noise_covariance))
             x, _ = descend(self._residuals, x, (self.objective.low, self.objective.high), ITERATIONS)
         self.x = x[0]
 
-    def _noise(self, residual: Array) -> Array:
-        """Sigma (N, N) at the most probable noise for this residual (N,)."""
+    def _noise(self, x: Array) -> Array:
+        """Sigma (N, N) at the most probable noise for the residual of x (1, k)."""
         h, m = self.surface.hypothesis, self.surface.measurement
-        bound = h.noise.bind(m)
+        residual = self.objective.batch(x)[0][0]
+        bound, force = h.noise.bind(m), (m.force + residual)[None, :]
+        bound = bound.at(force, traces(self.objective.forward, x, force) if bound.traced else None)
         nodes, weights = _noise_nodes(self.surface)
         if not len(nodes):
             return bound.covariance(np.empty(0))

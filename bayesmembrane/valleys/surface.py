@@ -16,9 +16,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
-from bayesmembrane.physics.mechanics.request import Request
-from bayesmembrane.physics.mechanics.ritz import solver as ritz
-from bayesmembrane.physics.mechanics.solution import Curves
+from bayesmembrane.physics.mechanics.api import unaided
 
 DRAWS, CENTRAL = 4096, (0.001, 0.999)
 WIDE = 2.0  # a parameter is followed over this many times the central range of its prior
@@ -26,14 +24,6 @@ ITERATIONS = 60
 ROUND_OFF = 1e-12  # relative change of a parameter at which its root is found
 SECANTS = 12
 PROBE, NOT_HIGHER = 1e-4, 1e-7  # first step of the secant method, and how much higher a root's loss may be, relative
-
-
-def unaided(asked: Request) -> Curves:
-    """`mechanics.api.solve` by the Ritz method alone: a film that it cannot resolve to 1e-6 stays without a force.
-
-    A map asks for many films that are no sensible ones, and shooting at each of them takes a thousand times longer.
-    """
-    return ritz.solve(asked)
 
 
 @dataclass(frozen=True, eq=False)

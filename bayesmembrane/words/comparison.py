@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.comparison.convexity_modes import ByMode, Missing
+from bayesmembrane.comparison.convexity_modes import WITHIN, ByMode, Missing
 from bayesmembrane.comparison.evidence.estimate import WIDEST, Disagreement, Evidence
 from bayesmembrane.comparison.prior_widths import Unknown, Widened
 from bayesmembrane.comparison.result import Comparison, Row
+from bayesmembrane.words import noises
 from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.noises import best_noise
 from bayesmembrane.words.sampling import sentences as quality_sentences
 
+SEEN = 0.05  # of ln Z, below which a change is not named
 DECIDED = 2.0  # standard errors of a difference, below which it is none
 
 
@@ -24,8 +27,12 @@ def document(found: Comparison) -> dict[str, Any]:
         **answer,
         "table": [_row(row, r) for row, r in zip(answer["table"], found.rows, strict=True)],
         "reason": no_ranking(found),
-        "sentence": preferred(found),
-        "prior_sensitivity": survival(found),
+        "sentence": preferred(best_noise(found)),
+        "prior_sensitivity": survival(best_noise(found)),
+        "out_of_reach": left_out(found),
+        "beyond_the_range": beyond_range(found),
+        "covered": covered(found),
+        **noises.document(found),
     }
 
 
@@ -48,8 +55,14 @@ def _row(answer: Mapping[str, Any], row: Row) -> dict[str, Any]:
 
 
 def sentences(found: Comparison) -> list[str]:
-    """All that is to be said of one range: why there is no ranking, what is preferred, whether that survives."""
-    return [s for s in (no_ranking(found), preferred(found), survival(found)) if s]
+    """All that is to be said of one range: why there is no ranking, what is preferred, whether that survives.
+
+    Then what the convexity prior asks beyond the range fitted, and what the search for modes has covered. Judged under
+    several noise models, what is preferred and whether it survives is said of the most probable one.
+    """
+    best = best_noise(found)
+    told = (no_ranking(found), preferred(best), left_out(found), survival(best), beyond_range(found), covered(found))
+    return [s for s in (*told, noises.of_noise(found)) if s]
 
 
 def called(row: Row) -> str:
@@ -71,6 +84,11 @@ def doubt(evidence: Evidence) -> str:
     match evidence.disagreement:
         case Disagreement.NOT_FINITE:
             return "One of the two estimates of ln Z is not a finite number."
+        case Disagreement.MISSED:
+            return (
+                "A search from points that fill the prior has found a mode that the draws have missed: with it ln Z is "
+                f"larger by {evidence.missed:.1f} at least. Sample again with another seed."
+            )
         case Disagreement.WIDE:
             return f"The joint standard error of ln Z, {evidence.total_sd:.2f}, is above {WIDEST:g}."
         case Disagreement.APART:
@@ -119,6 +137,54 @@ def no_ranking(found: Comparison) -> str:
     return f"There is no ranking, because ln Z is not known well enough of {len(doubtful)} of them. {told}"
 
 
+def left_out(found: Comparison) -> str:
+    """Which hypotheses have no place although there is a ranking; "" if all have one."""
+    unsure = [r for r in found.fitted if r.evidence is not None and not r.evidence.agreed]
+    if not found.agreed or not unsure:
+        return ""
+    told = " ".join(f"{called(r)}: {doubt(r.evidence)}" for r in unsure if r.evidence)
+    return f"Too far behind for its ln Z to matter, and without a place in the ranking: {told}"
+
+
+def beyond_range(found: Comparison) -> str:
+    """That the convexity prior looks farther than the points fitted, and what that changes; "" if it does not."""
+    changes = [(r, c) for r in found.fitted if (c := _change_within(r)) is not None]
+    if not changes:
+        return ""
+    mode = changes[0][0].hypothesis.convexity
+    start = (
+        f'The convexity prior "{mode}" looks to the end of the whole measured range, also where only a part of it is '
+        "fitted"
+    )
+    row, change = max(changes, key=lambda c: abs(c[1]))
+    if abs(change) < SEEN:
+        return f"{start}; asked within the part alone, no ln Z would change by {SEEN:g} or more."
+    more = "larger" if change > 0 else "smaller"
+    return f"{start}; asked within the part alone, ln Z would be {more} by {abs(change):.2f} for {called(row)}" + (
+        ", and by less for the others." if len(changes) > 1 else "."
+    )
+
+
+def _change_within(row: Row) -> float | None:
+    """ln Z with convexity within the fitted range alone, minus ln Z as it is; None if that is not known."""
+    by_mode = {m.mode: m.log_evidence for m in row.modes}
+    there, here = by_mode.get(WITHIN), by_mode.get(row.hypothesis.convexity.name)
+    return None if there is None or here is None else there - here
+
+
+def covered(found: Comparison) -> str:
+    """What the searches for modes have covered; "" if there were none."""
+    known = [r.evidence.coverage for r in found.rows if r.evidence is not None and r.evidence.coverage is not None]
+    if not known:
+        return ""
+    least = min(known, key=lambda c: c.points)
+    return (
+        f"Modes were searched for from {least.points} points that fill the prior of each hypothesis, independent of "
+        f"its draws, with {min(c.ascents for c in known)} ascents at least: one that is higher than its surroundings "
+        f"on {100 * least.volume:.2g} % of the prior would have been met with 99 %, a smaller one perhaps not."
+    )
+
+
 # ---- what is preferred -----------------------------------------------------------------------------------------------
 
 
@@ -135,7 +201,9 @@ def preferred(found: Comparison) -> str:
             f"The evidence gives no ranking; leave-one-out prefers {called(predicts)} to {called(next_best)} by "
             f"{gap:.1f} +- {se:.1f}{_weak(gap, se)}."
         )
-    by_z = sorted(both, key=lambda r: -_best(r)[0])
+    by_z = [r for r in found.ranking if r.loo is not None]
+    if len(by_z) < 2:
+        return f"Only of {called(by_z[0])} is the evidence known, and the others are far behind." if by_z else ""
     gap = _best(by_z[0])[0] - _best(by_z[1])[0]
     sd = float(np.hypot(_best(by_z[0])[1], _best(by_z[1])[1]))
     names = f"{called(by_z[0])} to {called(by_z[1])}"
@@ -159,7 +227,7 @@ def preferred(found: Comparison) -> str:
 
 def survival(found: Comparison) -> str:
     """Whether the first of the ranking stays first when any one prior is half or twice as wide."""
-    fitted = sorted(found.fitted, key=lambda r: -_best(r)[0])
+    fitted = sorted((r for r in found.fitted if r.evidence and r.evidence.agreed), key=lambda r: -_best(r)[0])
     if len(fitted) < 2:
         return ""
     first, second = fitted[:2]

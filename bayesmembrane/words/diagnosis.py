@@ -265,7 +265,13 @@ def _ambiguous(found: Diagnosis) -> str:
     names = "; or ".join(_member(j, found) for j in found.members)
     nexts = found.experiments
     advice = f" To tell them apart: {experiment_sentence(nexts[0])}." if nexts else ""
-    return f"{_misses(found)}this measurement cannot tell which of these it is: {names}. {_error(found)}{advice}"
+    units = _units(found)
+    foreign = "" if found.foreign is None else f" {foreign_sentence(found.foreign, units)}"
+    other = "; or something foreign" if foreign else ""
+    return (
+        f"{_misses(found)}this measurement cannot tell which of these it is: {names}{other}. {_error(found)}{advice}"
+        f"{foreign}"
+    )
 
 
 def _member(j: Judged, found: Diagnosis) -> str:
@@ -293,7 +299,7 @@ def _unknown(found: Diagnosis) -> str:
         )
     if found.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{_misses(found)}no effect is needed, and none of the energies has this form. {shape}"
-    return f"{_misses(found)}no few explanations stand out: too many are about as probable. {shape}"
+    return f"{_misses(found)}more explanations are about as probable than this measurement can part. {shape}"
 
 
 _ANSWERS = {

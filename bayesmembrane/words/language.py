@@ -81,7 +81,9 @@ def short(name: str) -> str:
     """``yeoh.c1`` -> ``c1``; the noise and the effects keep what tells them from the material."""
     block, _, own = name.partition(".")
     if block == "noise":
-        return {"sd": "extra noise", "ln_sd": "ln extra noise"}.get(own, f"noise {own}")
+        spoken = {"sd": "extra noise", "eta": "form error of the energy", "eta_law": "form error of the laws"}
+        spoken |= {f"ln_{key}": f"ln {text}" for key, text in spoken.items()}
+        return spoken.get(own, f"noise {own}")
     return own or block
 
 

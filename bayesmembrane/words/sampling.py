@@ -16,7 +16,12 @@ def document(run: Run) -> dict[str, Any]:
 
 def sentences(quality: Quality) -> tuple[str, ...]:
     """What a reader must know before trusting the numbers; none if all is well."""
-    said = (convergence_sentence(quality), failure_sentence(quality), noise_sentence(quality))
+    said = (
+        convergence_sentence(quality),
+        failure_sentence(quality),
+        noise_sentence(quality),
+        smooth_sentence(quality),
+    )
     return tuple(sentence for sentence in said if sentence)
 
 
@@ -49,4 +54,15 @@ def noise_sentence(quality: Quality) -> str:
     return (
         f"The inferred extra noise ({1e3 * quality.extra_noise:.3g} mN) exceeds what the measurement states "
         f"({1e3 * quality.own_noise:.3g} mN): the model misses something, and its misfit is counted as noise."
+    )
+
+
+def smooth_sentence(quality: Quality) -> str:
+    """That the misfit is smooth along the path, and what would allow for it; "" if it is not."""
+    if not quality.smooth:
+        return ""
+    remedy = ", nor does a form error" if quality.noise == "form" else "; a form error would allow for it: --noise form"
+    return (
+        f"The misfit is smooth: neighbouring residuals are alike (correlation {quality.alike:.2f}, "
+        f"p = {quality.alike_p:.2g}), which this noise does not explain{remedy}."
     )

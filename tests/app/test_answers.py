@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -18,10 +18,16 @@ from bayesmembrane.app.answers import Asked, asked, kept
 from bayesmembrane.app.folders import lying
 from bayesmembrane.calibration.fit import fit as least_squares
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.motion import Motion
+from bayesmembrane.ground import registry
 from bayesmembrane.ground.errors import SettingsError, StorageError
+from bayesmembrane.ground.parameters import Array, HalfNormal
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.stored import answer, read
+from bayesmembrane.physics.effects.base import EffectParameter, Sensor
+from bayesmembrane.physics.effects.force_gain import ForceGain
 from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.materials.yeoh import Yeoh
 
 PLAIN = hypothesis("neo_hookean")
 
@@ -59,6 +65,58 @@ def test_what_was_asked_decides_the_folder(curve: Measurement) -> None:
     ]
     assert len(set(several)) == len(several)
     assert named(curve) == several[0]
+
+
+@dataclass(frozen=True)
+class Squeak(Sensor):
+    """An effect that another package brings."""
+
+    name: ClassVar[str] = "squeak"
+    coordinates: ClassVar[tuple[EffectParameter, ...]] = (
+        EffectParameter("size", "N", "size", HalfNormal(0.03), (0.0, 1.0), 0.0),
+    )
+
+    def read(self, p: Array, force: Array, path: Motion) -> Array:
+        return force + p[:, :1]
+
+
+@dataclass(frozen=True)
+class Renamed(Yeoh):
+    """An energy that another package brings."""
+
+    name: ClassVar[str] = "renamed"
+
+
+@pytest.mark.parametrize("verb", ["diagnose", "loop", "fit"])
+def test_what_seeks_in_the_library_is_asked_anew_when_the_library_is_another(
+    curve: Measurement, monkeypatch: pytest.MonkeyPatch, verb: str
+) -> None:
+    """A stored diagnosis is not the answer any more once there is one more effect, or energy, that could explain it."""
+    names = list[str]()
+
+    def nothing(*_: Any, **__: Any) -> None:
+        return None
+
+    nothing.__module__ = getattr(analyses, f"run_{verb}").__module__
+    monkeypatch.setattr(analyses, f"run_{verb}", nothing)
+    monkeypatch.setattr(analyses, "document", lambda _: {})
+    monkeypatch.setattr(analyses, "kept", lambda _kind, _found, _document, what, _out: names.append(what.name))
+
+    def known(group: str, **more: type[Any]) -> None:
+        found, before = {**registry.components(group), **more}, registry._discover
+        monkeypatch.setattr(registry, "_discover", lambda asked: found if asked == group else before(asked))
+        getattr(analyses, verb)(curve, PLAIN, Work())
+
+    known("effects")
+    known("effects", squeak=Squeak)
+    known("materials", renamed=Renamed)
+    known("importers", other=object)
+    known("effects", squeak=Squeak, force_gain=ForceGain)
+    monkeypatch.setattr(ForceGain, "coordinates", tuple(replace(p, bounds=(-9.0, 9.0)) for p in ForceGain.coordinates))
+    known("effects")
+    first, effect, energy, importer, same, prior = names
+    assert energy == importer == same
+    assert len({first, effect, energy, prior}) == (1 if verb == "fit" else 4)
 
 
 def test_a_name_never_grows_beyond_what_a_disk_takes(curve: Measurement) -> None:

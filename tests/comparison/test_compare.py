@@ -11,12 +11,12 @@ from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.comparison import jobs as comparison_jobs
 from bayesmembrane.comparison.compare import claimed, compare, ranges_of
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, Disagreement, together
-from bayesmembrane.comparison.evidence.target import EvidenceEstimate
+from bayesmembrane.comparison.evidence.target import Coverage, EvidenceEstimate
 from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.leave_out.score import LeaveOneOut
 from bayesmembrane.comparison.parts import kept
 from bayesmembrane.comparison.prior_widths import Unknown, Widened
-from bayesmembrane.comparison.result import Row, ranked
+from bayesmembrane.comparison.result import Row, probabilities, ranked
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
@@ -162,9 +162,52 @@ def test_no_ranking_without_agreement():
     assert all(r.posterior_probability is None for r in found.rows)
 
 
+def test_the_error_of_a_probability_is_that_of_drawn_evidences():
+    z, sd = np.array([0.0, -0.7, -2.0]), np.array([0.03, 0.05, 0.1])
+    p, error = probabilities(z, sd)
+    drawn = z + sd * np.random.default_rng(406).standard_normal((40_000, 3))
+    drawn = np.exp(drawn) / np.sum(np.exp(drawn), axis=1, keepdims=True)
+    assert p == pytest.approx(drawn.mean(axis=0), abs=0.005)
+    assert error == pytest.approx(drawn.std(axis=0), rel=0.05)
+
+
+def test_one_far_behind_does_not_block_the_ranking_of_the_others():
+    found = ranked([row("one", -10, 5), row("other", -12, 3), row("far", -50, 1, off=5.0)])
+    assert found.agreed
+    assert [r.label for r in found.ranking] == ["one", "other"]
+    assert not found.rows[2].evidence.agreed
+    assert found.rows[2].posterior_probability < 1e-12
+    assert sum(r.posterior_probability for r in found.rows) == pytest.approx(1.0)
+    assert not found.summary()["table"][2]["agreed"]
+    # It does where the upper of its two estimates is within reach, or no other is known.
+    assert not ranked([row("one", -10, 5), row("far", -50, 1, off=35.0)]).agreed
+    assert not ranked([row("far", -50, 1, off=5.0)]).agreed
+    lost = together({NESTED: EvidenceEstimate(np.nan, 0.1, 1, 1.0), BRIDGE: EvidenceEstimate(-50.0, 0.1, 1, 1.0)})
+    assert not ranked([row("one", -10, 5), replace(row("far", -50, 1), evidence=lost)]).agreed
+
+
+def test_a_mode_that_the_draws_have_missed_is_a_disagreement():
+    pair = {
+        NESTED: EvidenceEstimate(-10.0, 0.1, 1, 1.0, (), Coverage(1024, 30, 2, 0.0045)),
+        BRIDGE: EvidenceEstimate(-10.0, 0.01, 1, 1.0, (), Coverage(1024, 20, 1, 0.0045), 2.3),
+    }
+    found = together(pair)
+    assert found.disagreement is Disagreement.MISSED
+    assert (found.coverage.points, found.coverage.ascents, found.coverage.modes) == (2048, 50, 2)
+    assert found.coverage.volume == pytest.approx(4.6 / 2048, rel=0.01)
+    # What may be much larger than it seems blocks a ranking.
+    behind = replace(row("behind", -22, 1), evidence=found)
+    assert not ranked([row("one", -5, 5), behind]).agreed
+
+
 def test_probabilities_follow_the_evidence():
     rows = ranked([row("one", -10, 5), row("other", -11, 3)]).rows
-    assert rows[0].posterior_probability == pytest.approx(1 / (1 + np.exp(-1)), abs=0.01)
+    p = rows[0].posterior_probability
+    assert p == pytest.approx(1 / (1 + np.exp(-1)), abs=0.01)
+    # Two of them: sd(p) = p (1 - p) sd(ln Z1 - ln Z2).
+    sd = np.hypot(rows[0].evidence.best[1], rows[1].evidence.best[1])
+    assert rows[0].posterior_probability_sd == pytest.approx(p * (1 - p) * sd, rel=1e-9)
+    assert rows[1].posterior_probability_sd == pytest.approx(rows[0].posterior_probability_sd)
     unknown = replace(row("third", -9, 1), evidence=None, failure="it cannot be fitted")
     with_unknown = ranked([*rows, unknown])
     assert with_unknown.agreed
@@ -209,3 +252,10 @@ def test_ranges_are_parts_of_the_whole():
     assert found["up to 30 mm"].whole is whole
     assert found["up to 60 mm"].whole is None
     assert len(found["up to 30 mm"].measurement) == 5
+
+
+def test_auto_judges_each_hypothesis_under_every_noise() -> None:
+    found = claimed("yeoh,gent", "friction", "auto", "reached")
+    assert [(h.label(), h.noise.name) for h in found] == [
+        (f"{m}+friction", n) for m in ("yeoh", "gent") for n in ("white", "ar1", "form")
+    ]

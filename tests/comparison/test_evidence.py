@@ -1,5 +1,8 @@
 """Both estimators against closed forms, and the rules by which their answers are put together."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -208,3 +211,15 @@ def test_a_population_is_led_to_the_wanted_distribution():
     assert np.var(x, axis=0) == pytest.approx([0.2, 0.2], abs=0.03)
     exact = 2 * (0.5 * np.log(0.2) - 0.5 * 9 / 1.25)
     assert found.log_ratio == pytest.approx(exact, abs=0.25)
+
+
+def test_the_page_on_evidence_has_an_example_that_runs():
+    """What stands in docs/evidence.md as python is what a reader will copy."""
+    text = (Path(__file__).parents[2] / "docs" / "evidence.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    known: dict = {}
+    exec(compile(block, "docs/evidence.md", "exec"), known)
+    assert known["found"].agreed
+    for name in (NESTED, BRIDGE):
+        error = known["found"].log_evidence[name] - known["exact"]
+        assert abs(error) < 6 * known["found"].log_evidence_sd[name] + 0.01

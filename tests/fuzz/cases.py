@@ -41,9 +41,8 @@ class Case:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in self.files:
             (folder / name).write_text(text, encoding="utf-8")
-        out = ["--out", str(folder / "chains")] if self.verb == "sample" else []
-        where = [str(folder / CURVE), "--specimen", str(folder / SPECIMEN)]
-        return [self.verb, *where, *self.options, *out, "--json"]
+        where = [str(folder / CURVE), "--specimen", str(folder / SPECIMEN), "--out", str(folder / "chains")]
+        return [self.verb, *where, *self.options, "--json"]
 
 
 def case(seed: int) -> Case:

@@ -124,7 +124,14 @@ def test_every_verb_takes_it_and_the_page_shows_it(place: Path) -> None:
     diagnosed = run(place, "diagnose", *STRIP_FILES, *MATERIAL, "--out", "more")
     assert diagnosed["verdict"] == "adequate"
     assert diagnosed["sentence"].startswith("Isihara describes the curve")
+    looped = run(place, "loop", *STRIP_FILES, *MATERIAL, *BESIDE, "--ess", "50", "--out", "more", "--report", "looped")
+    (first,) = looped["rounds"]
+    assert first["verdict"] == "adequate"
+    assert {"c3", "light_disc.weight", "noise.sd"} <= set(first["before"]["posterior"])
+    assert (place / looped["report"]).is_file()
     run(place, "report", "answers", "more", "--out", "page")
-    page = next(place.glob("**/index.html")).read_text()
+    page = (place / "page" / "index.html").read_text()
     for said in ("Isihara", "weight of disc or grip", "proportional", "Secant stiffness", "pulled half as far"):
         assert said in page, said
+    assert "Left out" not in page
+    assert "What was missing: Isihara with weight of disc or grip" in page

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import bayesmembrane as bm
 from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.calibration.prediction_store import FILE
 from bayesmembrane.calibration.run import Run, predictions_of
@@ -67,7 +68,6 @@ def reconstruction() -> Reconstruction:
         (suspect,),
         (Influence("curve twice as rough", f + 0.01, 0.1),),
         {},
-        0.8,
     )
 
 
@@ -225,7 +225,7 @@ def test_folders_with_nothing_to_show_are_named(tmp_path: Path, stored: Run) -> 
 def test_a_run_that_is_not_stored_has_a_page_all_the_same(tmp_path: Path, stored: Run) -> None:
     free = replace(stored, path=None)
     assert free.name in repr(free)
-    page = write_report([free], tmp_path / "report").read_text()
+    page = bm.report(free, out=tmp_path / "report").read_text()
     assert "<figure>" in page
     assert "Curves and residuals" in page
 

@@ -170,3 +170,32 @@ class Cut:
     def log_likelihood(self, x: Array) -> Array:
         assert np.all(x > 0), "the likelihood is asked only where the prior is not zero"
         return np.sum(stats.norm.logpdf(-0.5, x, 0.4), axis=1)
+
+
+class Uneven(Box):
+    """Two normal modes far apart, the main one in a tiny part of the prior: ln Z = -ln V.
+
+    sd, weight : of the main mode; the other has the rest of the weight and the sd 1
+    """
+
+    def __init__(self, dimension: int, sd: float, weight: float = 0.9) -> None:
+        super().__init__(dimension, -10.0, 10.0)
+        self.sd, self.weight, self.exact = sd, weight, -self.log_volume
+
+    def log_likelihood(self, x: Array) -> Array:
+        main = np.log(self.weight) + np.sum(stats.norm.logpdf(x, 4.0, self.sd), axis=1)
+        other = np.log1p(-self.weight) + np.sum(stats.norm.logpdf(x, -4.0, 1.0), axis=1)
+        return np.logaddexp(main, other)
+
+
+class SpikeAndSlab(Box):
+    """A narrow normal within a wide one, with nearly all of the weight: ln Z = -ln V."""
+
+    def __init__(self, dimension: int, sd: float = 0.1, weight: float = 0.99, beside: float = 0.0) -> None:
+        super().__init__(dimension, -10.0, 10.0)
+        self.sd, self.weight, self.beside, self.exact = sd, weight, beside, -self.log_volume
+
+    def log_likelihood(self, x: Array) -> Array:
+        spike = np.log(self.weight) + np.sum(stats.norm.logpdf(x, self.beside, self.sd), axis=1)
+        slab = np.log1p(-self.weight) + np.sum(stats.norm.logpdf(x, 0.0, 1.0), axis=1)
+        return np.logaddexp(spike, slab)

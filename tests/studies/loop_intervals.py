@@ -6,7 +6,7 @@ import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
-from bayesmembrane.diagnosis.candidates.search import Search, effective_weight
+from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.physics.mechanics import api
 from tests.generator.datasets import Dataset
@@ -20,8 +20,7 @@ def covered(found: Diagnosis, candidate: Candidate, measurement: Measurement, da
 
     Intervals are those of Laplace's approximation. Ogden's terms may change places, so only its forces are judged.
     """
-    weight = effective_weight(found.noise.white(candidate.residual))
-    covariance = Search(measurement, found.noise, weight=weight).covariance(candidate)
+    covariance = Search(measurement, found.noise).covariance(candidate)
     rng = np.random.default_rng(data.truth["seed"])
     draws = rng.multivariate_normal(candidate.x, covariance, DRAWS, method="eigh")
     films = candidate.hypothesis.films(draws)

@@ -107,9 +107,9 @@ def answer_of(found: Diagnosis, data: Dataset) -> dict[str, Any]:
             {
                 "label": j.candidate.label,
                 "ln_k": j.log_evidence - null,
+                "probability": j.probability,
                 "unexplained": j.unexplained,
-                "ratio": j.fit.ratio,
-                "p": j.fit.p_value,
+                "reduced_chi2": j.reduced_chi2,
                 "at_bound": list(j.candidate.at_bound),
             }
             for j in found.ranking[:SHOWN]

@@ -24,6 +24,8 @@ from typing import Any
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.explanation.case import Question
+from bayesmembrane.diagnosis.explanation.total import set_name
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.errors import BayesmembraneError
 from bayesmembrane.ground.registry import materials
@@ -31,6 +33,7 @@ from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.words.diagnosis import document
 from tests.generator.datasets import Dataset, generate
 from tests.generator.film import NoSolutionError
+from tests.generator.protocols import Protocol
 from tests.generator_two.datasets import Dataset as SecondDataset
 from tests.generator_two.membrane import LockedError
 from tests.studies import reliability_plan, second_plan
@@ -86,13 +89,23 @@ def run_case(case: Case, energy: str, source: str, half: str) -> Row:
         found = diagnosed(measurement, None if energy == NONE else case.material)
     except BayesmembraneError as error:
         return head | {"verdict": "error", "effects": [], "sentence": str(error), "probabilities": None}
-    row = head | {"seconds": time.process_time() - begun} | answer_row(document(found))
+    row = head | {"seconds": time.process_time() - begun} | answer_row(document(found)) | {"terms": terms(found)}
     return row | intervals(row, found, measurement, data)
 
 
 def diagnosed(measurement: Measurement, material: str | None) -> Diagnosis:
     """The answer with an energy declared, or with none."""
-    return diagnose(measurement, None if material is None else Hypothesis(materials()[material]))  # type: ignore[arg-type]
+    asked = Hypothesis(materials()[material or min(materials())])
+    return diagnose(measurement, Question(asked, declared=material is not None))
+
+
+def terms(found: Diagnosis) -> list[tuple[str, str, float]]:
+    """(energy, set of effects, ln Z) of every hypothesis: enough to weigh them by other beliefs."""
+    given = found.null.names
+    return [
+        (j.candidate.hypothesis.material.name, set_name(j.candidate, given), round(j.log_evidence, 3))
+        for j in found.ranking
+    ]
 
 
 def intervals(row: Row, found: Diagnosis, measurement: Measurement, data: Dataset | SecondDataset) -> dict[str, Any]:
@@ -109,7 +122,8 @@ def key(case: Case, energy: str) -> str:
 
 def warmed() -> None:
     """What is compiled on first use is no part of a case's time."""
-    data = generate("friction+clamp_slip", "neo_hookean", "two_speeds", seed=1)
+    short = Protocol("short", (0.015, 0.030), (1e-3,) * 2, 80)
+    data = generate("friction", "neo_hookean", short, "white", 2.0, seed=11)
     with tempfile.TemporaryDirectory() as folder:
         diagnosed(read_measurement(*data.write(Path(folder))), "neo_hookean")
 

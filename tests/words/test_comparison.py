@@ -6,20 +6,24 @@ import numpy as np
 import pytest
 
 from bayesmembrane.calibration.prior import Mass
-from bayesmembrane.comparison.convexity_modes import ByMode, Missing
+from bayesmembrane.comparison.convexity_modes import WITHIN, ByMode, Missing
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, Evidence, together
-from bayesmembrane.comparison.evidence.target import EvidenceEstimate
+from bayesmembrane.comparison.evidence.target import Coverage, EvidenceEstimate
 from bayesmembrane.comparison.leave_out.score import LeaveOneOut
 from bayesmembrane.comparison.prior_widths import Unknown, Widened
 from bayesmembrane.comparison.result import Row, ranked
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.words.comparison import (
+    beyond_range,
+    covered,
     document,
     doubt,
+    left_out,
     missing_mode,
     no_ranking,
     preferred,
     remark,
+    sentences,
     survival,
     unknown_width,
 )
@@ -45,6 +49,43 @@ def test_why_ln_z_is_not_known_is_said_with_its_numbers():
     )
     assert doubt(pair(-10.0, 0.3, -10.1, 0.1)) == "The joint standard error of ln Z, 0.32, is above 0.3."
     assert "not a finite number" in doubt(pair(-np.inf, 0.1, -10.0, 0.1))
+
+
+def test_a_missed_mode_is_said_with_what_it_holds():
+    found = together(
+        {NESTED: EvidenceEstimate(-10, 0.1, 1, 1.0), BRIDGE: EvidenceEstimate(-10, 0.01, 1, 1.0, (), None, 2.34)}
+    )
+    assert "a mode that the draws have missed: with it ln Z is larger by 2.3 at least" in doubt(found)
+
+
+def test_one_out_of_reach_is_named_beside_the_ranking():
+    found = ranked([row("one", -10, 5), row("other", -12, 3), row("far", -50, 1, off=5.0)])
+    assert no_ranking(found) == ""
+    assert left_out(found).startswith("Too far behind for its ln Z to matter, and without a place in the ranking: far")
+    assert preferred(found).startswith("The evidence prefers one to other by 2.0")
+    assert left_out(found) in sentences(found)
+    assert document(found)["out_of_reach"] == left_out(found)
+    assert left_out(ranked([row("one", -10, 5), row("other", -12, 3)])) == ""
+
+
+def test_how_far_convexity_looks_is_said_with_what_it_changes():
+    def modes(within: float) -> tuple[ByMode, ...]:
+        return tuple(ByMode(m, z, 0.1, 0.5, 0.01, 500.0, None) for m, z in (("reached", -10.0), (WITHIN, within)))
+
+    one, other = replace(row("one", -10, 5), modes=modes(-10.47)), replace(row("other", -12, 3), modes=modes(-10.01))
+    said = beyond_range(ranked([one, other]))
+    assert said.startswith('The convexity prior "reached" looks to the end of the whole measured range')
+    assert said.endswith("ln Z would be smaller by 0.47 for one, and by less for the others.")
+    assert beyond_range(ranked([other])).endswith("no ln Z would change by 0.05 or more.")
+    assert beyond_range(ranked([row("one", -10, 5)])) == ""
+
+
+def test_what_the_search_has_covered_is_said():
+    searched = replace(row("one", -10, 5).evidence, coverage=Coverage(4096, 34, 1, 0.001124))
+    found = ranked([replace(row("one", -10, 5), evidence=searched), row("other", -12, 3)])
+    assert "from 4096 points that fill the prior" in covered(found)
+    assert "34 ascents at least: one that is higher than its surroundings on 0.11 % of the prior" in covered(found)
+    assert covered(ranked([row("one", -10, 5)])) == ""
 
 
 def test_no_ranking_is_said_with_every_hypothesis_in_doubt():

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from bayesmembrane.app.options import (
     CurveOptions,
-    HypothesisOptions,
+    HypothesisOptionsWeighed,
     MaterialsOption,
     OutputOptions,
     RangeOption,
@@ -32,7 +32,7 @@ COLUMNS = {
 def verb(
     curve: CurveOptions,
     materials: MaterialsOption,
-    beside: HypothesisOptions,
+    beside: HypothesisOptionsWeighed,
     used: RangeOption,
     several: RangesOption,
     sampling: SamplingOptions,
@@ -56,7 +56,7 @@ def verb(
 
 def show(found: dict[str, Comparison]) -> None:
     """Evidence and prediction of each range, on the terminal."""
-    from bayesmembrane.report.sections.evidence.tables import evidence_table
+    from bayesmembrane.report.sections.evidence.tables import evidence_table, noises_table
     from bayesmembrane.words.comparison import remark, sentences
 
     for name, comparison in found.items():
@@ -65,6 +65,8 @@ def show(found: dict[str, Comparison]) -> None:
             columns = [i for i, c in enumerate(shown.columns) if c.key in part]
             rows = [[row[i] for i in columns] for row in shown.cells()]
             table(f"{name}: {text}", [shown.columns[i].head for i in columns], rows)
+        if (sums := noises_table({name: comparison})) is not None:
+            table(f"{name}: whatever the noise", [c.head for c in sums.columns[1:]], [r[1:] for r in sums.cells()])
         for row in comparison.rows:
             if not row.fitted:
                 say(f"{row.label}: {remark(row)}")

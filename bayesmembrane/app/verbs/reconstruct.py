@@ -48,6 +48,8 @@ def show(document: dict[str, Any]) -> None:
             f"the first at {first['mean']:.2f} +- {first['sd']:.2f} mm"
         )
         table(title, ["deflection, mm", "force, N", "sd, N"], cells)
+    cells = [[f["title"], f"{f['probability']:.3f}"] for f in document["families"].values()]
+    table("What the curve may be", ["family", "probability"], cells)
     for row in document["suspect_rows"]:
         changes = "; ".join(f"{c['entry']}: {c['printed']} -> {c['consistent']}" for c in row["corrections"])
         say(f"{row['material']}, {row['column']}: {row['reason']} Consistent would be {changes}.")

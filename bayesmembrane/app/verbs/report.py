@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from bayesmembrane.app.options import OutputOptions
-from bayesmembrane.app.terminal import answer, say
+from bayesmembrane.app.terminal import answer, note, say
 
 place = 11
 
@@ -26,9 +26,13 @@ def verb(
     from bayesmembrane.report.page import write_report
 
     found = lying(folders)
-    page = write_report(folders, page_folder, title)
+    left_out: list[str] = []
+    page = write_report(folders, page_folder, title, left_out.append)
+    for sentence in left_out:
+        note(sentence)
     document = {
         "report": str(page),
+        "left_out": left_out,
         "runs": [str(f.folder) for f in found if f.kind == RUN],
         "answers": [{"folder": str(f.folder), "kind": f.kind} for f in found if f.kind != RUN],
     }

@@ -10,6 +10,7 @@ from scipy.special import logsumexp
 from bayesmembrane.calibration.sampling.convergence import effective_steps
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture, reweighted
 from bayesmembrane.comparison.evidence.population import from_prior
+from bayesmembrane.comparison.evidence.search import Modes, search
 from bayesmembrane.comparison.evidence.target import EvidenceEstimate, Problem, Target
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
@@ -33,7 +34,9 @@ def bridge(
 
     g is a mixture of t-distributions fitted to one half of the draws, and the other half is what it is compared with;
     then the halves change places, and ln Z is the mean of both. s1 : s2 are the effective numbers of draws and
-    proposals. Where ``draws`` is None, two independent populations are led from the prior to the posterior first.
+    proposals. Where ``draws`` is None, two independent populations are led to the posterior first: half of each from
+    the prior, half from the modes that a `search` from points that fill the prior has found. Where there are draws, the
+    search tells whether they have ``missed`` a mode.
 
     Parameters
     ----------
@@ -48,9 +51,10 @@ def bridge(
     Raises `SettingsError` for draws of another shape, fewer than 200 of them, or ones that the posterior rules out.
     """
     problem, rng = Problem(target), np.random.default_rng([seed, 4])
+    modes = search(problem, np.random.default_rng([seed, 10]))
     check: tuple[float, float] | None = None
     if draws is None:
-        halves, check = _own(problem, rng)
+        halves, check = _own(problem, modes, rng)
     else:
         halves = _halves(problem, np.asarray(draws, dtype=float), effective, log_posterior)
     first, second = halves
@@ -59,7 +63,8 @@ def bridge(
     if check is not None:
         # The way from the prior gives an estimate of its own, less exact: a gross difference is an error of either.
         sd = max(sd, 0.5 * (abs(value - check[0]) - 2.0 * check[1]))
-    return EvidenceEstimate(value, sd, problem.evaluations, problem.seconds, tuple(z for z, _ in found))
+    parts, missed = tuple(z for z, _ in found), modes.beyond(value, sd)
+    return EvidenceEstimate(value, sd, problem.evaluations, problem.seconds, parts, modes.coverage, missed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +98,10 @@ class _Half:
         return float(np.clip(min(ratios, default=1.0), 1.0, self.log_p.size))
 
 
-def _own(problem: Problem, rng: np.random.Generator) -> tuple[list[_Half], tuple[float, float]]:
+def _own(problem: Problem, modes: Modes, rng: np.random.Generator) -> tuple[list[_Half], tuple[float, float]]:
     """Two independent populations, and the mean of their stepping stones with its error."""
     walkers = max(WALKERS, 80 * problem.size)
-    led = [from_prior(problem, r, walkers, SNAPSHOTS) for r in rng.spawn(2)]
+    led = [from_prior(problem, modes, r, walkers, SNAPSHOTS) for r in rng.spawn(2)]
     halves = [_Half(p.x, p.log_base + p.log_added, None) for p in led]
     a, b = (p.log_ratio for p in led)
     sd = max(np.hypot(led[0].sd, led[1].sd), abs(a - b)) / 2

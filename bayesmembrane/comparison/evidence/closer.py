@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
+from bayesmembrane.comparison.evidence.search import Modes, joined
 from bayesmembrane.comparison.evidence.target import Problem
 from bayesmembrane.ground.parameters import Array
 
@@ -20,17 +21,18 @@ class Closer(Problem):
     """The integral of L p0 with a mixture q in the place of the prior, and L p0 / q in that of the likelihood.
 
     q holds a mixture of t-distributions for each group (n, k) of ``points``: of the posterior, as well as that is
-    known, and of places that must not be overlooked. Any q gives the same Z: what it looks like has a part only in how
-    long a run takes, and one that leaves out a mode makes it unlikely to be found.
+    known, of places that must not be overlooked, and of the ``modes`` that a search has found, with half of the weight,
+    if there are any. Any q gives the same Z: what it looks like has a part only in how long a run takes, and one that
+    leaves out a mode makes it unlikely to be found.
     """
 
-    def __init__(self, problem: Problem, points: Sequence[Array], rng: np.random.Generator) -> None:
+    def __init__(self, problem: Problem, points: Sequence[Array], modes: Modes, rng: np.random.Generator) -> None:
         self.target, self.problem = problem.target, problem
-        fitted = [around(x[rng.permutation(len(x))[:MOST]], rng) for x in points]
-        share = np.cumprod([1.0, *([BESIDES] * (len(points) - 1))])
-        weights = [g.log_weights + np.log(s / np.sum(share)) for g, s in zip(fitted, share, strict=True)]
-        means, roots = (np.concatenate([getattr(g, n) for g in fitted]) for n in ("means", "roots"))
-        self.q = Mixture(np.concatenate(weights), means, WIDER * roots, DEGREES)
+        fitted = [around(x[rng.permutation(len(x))[:MOST]], rng) for x in (*points, *modes.clouds)]
+        given = np.array([BESIDES**i for i in range(len(points))])
+        share = np.concatenate([given / np.sum(given), modes.weights])
+        g = joined(fitted, share)
+        self.q = Mixture(g.log_weights, g.means, WIDER * g.roots, DEGREES)
 
     def from_cube(self, u: Array) -> tuple[Array, Array]:
         x = from_cube(self.q, u)

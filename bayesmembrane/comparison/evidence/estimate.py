@@ -9,7 +9,10 @@ from enum import Enum
 import numpy as np
 
 from bayesmembrane.calibration.prior import Mass
-from bayesmembrane.comparison.evidence.target import EvidenceEstimate
+from bayesmembrane.comparison.evidence.bridge import bridge
+from bayesmembrane.comparison.evidence.nested import nested
+from bayesmembrane.comparison.evidence.target import Coverage, EvidenceEstimate, Target, covered
+from bayesmembrane.ground.parameters import Array
 
 NESTED, BRIDGE = "nested", "bridge"
 SIGMAS, WIDEST = 2.0, 0.3
@@ -21,6 +24,7 @@ class Disagreement(Enum):
     NOT_FINITE = "not finite"
     WIDE = "joint standard error too large"
     APART = "estimators too far apart"
+    MISSED = "the draws have missed a mode"
 
 
 @dataclass(frozen=True)
@@ -32,9 +36,11 @@ class Evidence:
     log_evidence, log_evidence_sd : by estimator, ``nested`` and ``bridge``; divided by the prior's mass, whose error is
         in the standard errors
     difference, joint_sd : of the two, and its standard error; the mass, which both share, has no part in it
-    disagreement : None if they differ by at most two joint standard errors, and that of both, with the mass, is at most
-        0.3; or why they do not agree
+    disagreement : None if they differ by at most two joint standard errors, that of both, with the mass, is at most
+        0.3, and no mode is known that the draws have missed; or why they do not agree
     evaluations, seconds : by estimator
+    coverage : what the searches for modes of both have covered together
+    missed : by how much ln Z is larger at least, by modes that the draws have missed; 0 if none is known
     """
 
     log_evidence: Mapping[str, float]
@@ -44,6 +50,8 @@ class Evidence:
     disagreement: Disagreement | None
     evaluations: Mapping[str, int]
     seconds: Mapping[str, float]
+    coverage: Coverage | None = None
+    missed: float = 0.0
 
     @property
     def agreed(self) -> bool:
@@ -54,6 +62,11 @@ class Evidence:
     def total_sd(self) -> float:
         """Joint standard error of both, that of the mass included."""
         return float(np.hypot(self.log_evidence_sd[NESTED], self.log_evidence_sd[BRIDGE]))
+
+    @property
+    def most(self) -> float:
+        """The largest ln Z that either estimator leaves open, by five standard errors and the modes missed."""
+        return max(z + 5 * self.log_evidence_sd[name] for name, z in self.log_evidence.items()) + self.missed
 
     @property
     def best(self) -> tuple[float, float]:
@@ -67,6 +80,30 @@ class Evidence:
         return float(w @ z), float(np.min(sd))
 
 
+def evidence(
+    target: Target,
+    seed: int = 0,
+    *,
+    mass: Mass | None = None,
+    draws: Array | None = None,
+    effective: float | None = None,
+    log_posterior: Array | None = None,
+) -> Evidence:
+    """ln Z = ln of the integral of likelihood x prior, by nested sampling and by bridge sampling.
+
+    Parameters
+    ----------
+    target : anything with the four members of `Target`
+    mass : the part of the normalised prior that its cut leaves: Z is divided by it, for a prior that is cut integrates
+        to its mass and not to one
+    draws, effective, log_posterior : what `bridge` stands on; without draws it makes its own
+
+    Raises what `nested` and `bridge` raise.
+    """
+    bridged = bridge(target, draws, seed=seed, effective=effective, log_posterior=log_posterior)
+    return together({NESTED: nested(target, seed), BRIDGE: bridged}, mass)
+
+
 def together(found: Mapping[str, EvidenceEstimate], mass: Mass | None = None) -> Evidence:
     """The estimates of one target, divided by the mass of its prior, and whether they agree."""
     mass = mass or Mass(1.0, 0.0)
@@ -75,14 +112,18 @@ def together(found: Mapping[str, EvidenceEstimate], mass: Mass | None = None) ->
     sd = {name: float(np.hypot(e.sd, log_mass_sd)) for name, e in found.items()}
     a, b = found[NESTED], found[BRIDGE]
     difference, joint = abs(a.log_evidence - b.log_evidence), float(np.hypot(a.sd, b.sd))
+    missed = max(a.missed, b.missed)
+    wrong = _disagreement(difference, joint, float(np.hypot(sd[NESTED], sd[BRIDGE])))
     return Evidence(
         z,
         sd,
         difference,
         joint,
-        _disagreement(difference, joint, float(np.hypot(sd[NESTED], sd[BRIDGE]))),
+        Disagreement.MISSED if missed and wrong is not Disagreement.NOT_FINITE else wrong,
         {n: e.evaluations for n, e in found.items()},
         {n: e.seconds for n, e in found.items()},
+        covered([a.coverage, b.coverage]),
+        missed,
     )
 
 

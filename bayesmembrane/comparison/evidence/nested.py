@@ -14,13 +14,15 @@ from dynesty.internal_samplers import InternalSampler, SamplerReturn, tune_slice
 from scipy.special import logsumexp
 
 from bayesmembrane.comparison.evidence.closer import Closer
+from bayesmembrane.comparison.evidence.layers import log_integral
+from bayesmembrane.comparison.evidence.search import search
 from bayesmembrane.comparison.evidence.target import EvidenceEstimate, Problem, Target
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 
 PILOT_LIVE, PILOT_PER_DIMENSION = 150, 30
 LEAST_LIVE, PER_DIMENSION, MOST_LIVE = 80, 15, 4000
-TOLERANCE = 0.13
+TOLERANCE, LEAST_SD = 0.13, 1e-3
 PILOTS, THEN, MOST_RUNS = 2, 1, 12
 FROM_DRAWS = 6  # runs at least, where none climbs from the prior: their scatter says what H / N leaves out
 REMAINING, NEAR = 0.2, 0.5  # ln Z that may be left in the live points when they are added: from the prior, and from q
@@ -49,29 +51,36 @@ def nested(
     the others climb L p0 / q: Z is the same, but the way is shorter, and the error smaller with it (X. Chen,
     M. P. Hobson, S. Das, P. Gelderblom, Stat. Comput. 29 (2019) 835). They hold as many live points as a standard error
     of ``tolerance`` takes; more runs follow while the scatter between all says that it was not enough. A run of N live
-    points has the error sqrt(H / N) for information H; their mean weighs them by it, and its error is inflated by the
-    root of chi^2 / (R - 1) of R runs where that is above 1.
+    points has an error of about sqrt(H / N) for information H; their mean weighs them by it, and its error is inflated
+    by the root of chi^2 / (R - 1) of R runs where that is above 1.
 
     Where points (n, k) ``around`` all of the posterior are known, q is made of them, and nothing climbs from the prior:
     draws of it first, then places that draws may have missed.
 
+    Half of q stands on the modes that a `search` from points that fill the prior finds, which knows nothing of the
+    draws or of those that climb; a run from the prior whose ln Z is less than that of these modes has missed one, and
+    does not count.
+
     Each run replaces its worst live point by one drawn from the prior above its likelihood: uniformly from ellipsoids
     around the live points (bounds enlarged by bootstrap) while that is efficient, by random slices otherwise.
 
-    ln Z is the mean over ln X of its posterior, -i/N at step i, and not ln E[X], which lies higher by H / 2N.
+    ln Z of a run and its error come from the layers between its likelihoods (`log_integral`).
 
     J. Skilling, Bayesian Anal. 1 (2006) 833; F. Feroz, M. P. Hobson, M. Bridges, MNRAS 398 (2009) 1601; J. S. Speagle,
     MNRAS 493 (2020) 3132. Raises `SettingsError` if prior and likelihood nowhere meet.
     """
     problem, own = Problem(target), np.random.default_rng([seed, 8])
     rngs = np.random.default_rng([seed, 5]).spawn(MOST_RUNS)
+    modes = search(problem, np.random.default_rng([seed, 9]))
     found: list[_Run] = []
     least = PILOTS + THEN if around is None else FROM_DRAWS
     if around is None:
         from_prior = max(PILOT_LIVE, PILOT_PER_DIMENSION * problem.size)
-        found = [_run(problem, from_prior, rng, REMAINING) for rng in rngs[:PILOTS]]
-        around = [np.concatenate([r.drawn(own) for r in found])]
-    near = Closer(problem, around, own)
+        pilots = [_run(problem, from_prior, rng, REMAINING) for rng in rngs[:PILOTS]]
+        around = [np.concatenate([r.drawn(own) for r in pilots])]
+        # What has missed a mode on its way up says nothing of Z, and its part in q does no harm.
+        found = [r for r in pilots if not modes.beyond(r.log_evidence, r.sd)]
+    near = Closer(problem, around, modes, own)
     live = max(LEAST_LIVE, PER_DIMENSION * problem.size)
     for i, rng in enumerate(rngs[PILOTS:]):
         if i > 0:  # the first tells what it takes
@@ -82,7 +91,10 @@ def nested(
             tell(f"nested sampling, run {len(found)}: {value:.2f} +- {sd:.2f}")
         if len(found) >= least and sd <= tolerance:
             break
-    return EvidenceEstimate(value, sd, problem.evaluations, problem.seconds, tuple(r.log_evidence for r in found))
+    # Weighed draws of the modes are an estimate of their own that is never too high: a gross difference is an error.
+    sd = max(sd, 0.5 * modes.beyond(value, sd))
+    parts = tuple(r.log_evidence for r in found)
+    return EvidenceEstimate(value, sd, problem.evaluations, problem.seconds, parts, modes.coverage)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,14 +156,11 @@ def _run(problem: Problem, live: int, rng: np.random.Generator, remaining: float
         )
         sampler.run_nested(dlogz=remaining, print_progress=False, save_bounds=False)
     r = sampler.results
-    information = float(r.information[-1])
-    value = float(r.logz[-1] + np.log(start.part) - 0.5 * information / live)
+    value, error = log_integral(np.asarray(r.logl), np.asarray(r.logvol[: len(r.logl) - live]), live)
+    # Where only a part of q or of the prior counts, its share is known as well as this many draws tell.
+    value += float(np.log(start.part))
     weight = np.exp(r.logwt - logsumexp(r.logwt))
-    # The square of dynesty's own error is up to twice too large: it takes the last live points for runs of their own.
-    # What they hold is a mean over them, with the error of one.
-    last = np.exp(r.logl[-live:] - np.max(r.logl[-live:]))
-    left = float(np.sum(weight[-live:])) * float(np.std(last) / np.mean(last))
-    sd = float(np.sqrt((information + left**2) / live + start.log_part_sd**2))
+    sd = max(float(np.hypot(error, start.log_part_sd)), LEAST_SD)
     return _Run(value, sd, np.asarray(r.samples), weight)
 
 

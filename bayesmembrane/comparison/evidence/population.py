@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesmembrane.calibration.sampling.convergence import effective_draws
+from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
+from bayesmembrane.comparison.evidence.search import Modes, joined
 from bayesmembrane.comparison.evidence.target import Problem
 from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array
@@ -39,12 +41,45 @@ class Population:
     sd: float
 
 
-def from_prior(problem: Problem, rng: np.random.Generator, walkers: int, snapshots: int) -> Population:
-    """Populations of p(x | y) ~ p0 L by way of p0 L^b; ``log_ratio`` is then an estimate of ln Z."""
-    start = problem.prior_draws(rng, walkers)
-    found = lead(problem.terms, start.x[:walkers], rng, snapshots)
-    sd = float(np.hypot(found.sd, start.log_part_sd))
-    return replace(found, log_ratio=found.log_ratio + float(np.log(start.part)), sd=sd)
+def from_prior(problem: Problem, modes: Modes, rng: np.random.Generator, walkers: int, snapshots: int) -> Population:
+    """Populations of p(x | y) ~ g^(1-b) (p0 L)^b with g half the prior and half the modes that are known.
+
+    ``log_ratio`` is then an estimate of ln Z. Without any mode g is the prior.
+    """
+    if not modes.clouds:
+        start = problem.prior_draws(rng, walkers)
+        found = lead(problem.terms, start.x[:walkers], rng, snapshots)
+        sd = float(np.hypot(found.sd, start.log_part_sd))
+        return replace(found, log_ratio=found.log_ratio + float(np.log(start.part)), sd=sd)
+    beside = joined([around(x, rng) for x in modes.clouds], modes.weights)
+
+    def terms(x: Array) -> tuple[Array, Array]:
+        log_prior, log_likelihood = problem.terms(x)
+        base = np.logaddexp(log_prior, beside.log_density(x)) - np.log(2.0)
+        # Where the prior is cut there is nothing, whatever g says.
+        return np.where(log_prior > -np.inf, base, -np.inf), log_likelihood + log_prior - base
+
+    x, part, sd = _spread_out(problem, beside, rng, walkers)
+    found = lead(terms, x, rng, snapshots)
+    return replace(found, log_ratio=found.log_ratio + float(np.log(part)), sd=float(np.hypot(found.sd, sd)))
+
+
+def _spread_out(
+    problem: Problem, beside: Mixture, rng: np.random.Generator, walkers: int
+) -> tuple[Array, float, float]:
+    """Draws (walkers, k) of half the prior and half ``beside`` where the posterior is not zero.
+
+    With the part of such draws among all, and the standard error of its logarithm.
+    """
+    prior = problem.prior_draws(rng, walkers)
+    y = beside.draw(rng, 4 * walkers)
+    y = y[np.isfinite(problem.log_posterior(y))]
+    share = len(y) / (4 * walkers)
+    part = 0.5 * (prior.part + share)
+    near = rng.random(walkers) < 0.5 * share / part
+    x = np.where(near[:, None], y[rng.integers(len(y), size=walkers)], prior.x[:walkers]) if len(y) else prior.x
+    error = 0.5 * np.hypot(prior.part * prior.log_part_sd, np.sqrt(share * (1 - share) / (4 * walkers))) / part
+    return x[:walkers], part, float(error)
 
 
 def lead(terms: Base, start: Array, rng: np.random.Generator, snapshots: int) -> Population:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -12,6 +13,9 @@ from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 
+SURE = 0.99
+POINTS = 1 << 15  # of the prior from which modes are searched
+FILMS = 1 << 11  # the same for films, which take a millisecond each
 HOPELESS = 50_000  # draws of the prior of which none is possible
 
 
@@ -26,7 +30,8 @@ class Target(Protocol):
     prior_transform : the x (B, k) of u (B, k) uniform in the unit cube; distributed as p0 before anything is cut away
 
     A target whose two logarithms come out of one computation may also have ``evaluate(x)``, which returns an object
-    with ``log_prior`` and ``log_likelihood``, (B,) each.
+    with ``log_prior`` and ``log_likelihood``, (B,) each. One that is slow may say by ``points`` from how many points of
+    the prior its modes are to be searched, a power of two; `POINTS` otherwise.
     """
 
     @property
@@ -47,6 +52,7 @@ class PosteriorTarget:
     """
 
     posterior: Posterior
+    points: int = FILMS
 
     @property
     def dimension(self) -> int:
@@ -67,10 +73,28 @@ class PosteriorTarget:
 
 
 @dataclass(frozen=True)
+class Coverage:
+    """What a search has covered.
+
+    points : that filled the prior
+    ascents, modes : from how many of them the way up was followed, and how many places it led to
+    volume : the smallest part of the prior that one of the points still falls into with 99 % probability: where a mode
+        is higher than its surroundings on as much of it, the search has met it
+    """
+
+    points: int
+    ascents: int
+    modes: int
+    volume: float
+
+
+@dataclass(frozen=True)
 class EvidenceEstimate:
     """ln Z of one estimator with its standard error, and what it cost.
 
     parts : ln Z of independent runs or halves, from whose scatter the standard error was checked
+    coverage : what the search for modes has covered that went before it
+    missed : by how much ln Z is larger at least, by modes that this search has found and the draws given have missed
     """
 
     log_evidence: float
@@ -78,6 +102,8 @@ class EvidenceEstimate:
     evaluations: int
     seconds: float
     parts: tuple[float, ...] = ()
+    coverage: Coverage | None = None
+    missed: float = 0.0
 
 
 def averaged(a: EvidenceEstimate, b: EvidenceEstimate) -> EvidenceEstimate:
@@ -86,7 +112,30 @@ def averaged(a: EvidenceEstimate, b: EvidenceEstimate) -> EvidenceEstimate:
     z = np.array([a.log_evidence, b.log_evidence])
     mean = float(w @ z / np.sum(w))
     sd = float(np.sqrt(max(1.0, float(w @ (z - mean) ** 2)) / np.sum(w)))
-    return EvidenceEstimate(mean, sd, a.evaluations + b.evaluations, a.seconds + b.seconds, (*a.parts, *b.parts))
+    return EvidenceEstimate(
+        mean,
+        sd,
+        a.evaluations + b.evaluations,
+        a.seconds + b.seconds,
+        (*a.parts, *b.parts),
+        covered([a.coverage, b.coverage]),
+        max(a.missed, b.missed),
+    )
+
+
+def covered(parts: Sequence[Coverage | None]) -> Coverage | None:
+    """What independent searches have covered together; None without any."""
+    known = [c for c in parts if c is not None]
+    if not known:
+        return None
+    points = sum(c.points for c in known)
+    modes = max(c.modes for c in known)
+    return Coverage(points, sum(c.ascents for c in known), modes, smallest(points))
+
+
+def smallest(points: int) -> float:
+    """The part of the prior that one of so many points falls into with 99 % probability: 1 - 0.01^(1/n)."""
+    return float(-np.expm1(np.log1p(-SURE) / points))
 
 
 class Problem:
@@ -100,6 +149,11 @@ class Problem:
     def size(self) -> int:
         """k"""
         return int(self.target.dimension)
+
+    @property
+    def points(self) -> int:
+        """From how many points of the prior modes are searched."""
+        return int(getattr(self.target, "points", POINTS))
 
     @property
     def seconds(self) -> float:

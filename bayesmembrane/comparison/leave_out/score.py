@@ -19,6 +19,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.quiet import arviz
+from bayesmembrane.physics.form_error import ENERGY, LAW, traces
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.noise.base import force_scale
@@ -143,22 +144,25 @@ def leave_range_out(posterior: Posterior, draws: Array, whole: Measurement, solv
     points. S is the covariance of the whole measurement, its own noise and the inferred one.
 
     Raises `SettingsError` if nothing is left out, or the noise model has coordinates other than the logarithms of a
-    standard deviation and a length.
+    standard deviation, a length and relative errors.
     """
     fitted = whole.deflection <= np.max(posterior.measurement.deflection) * (1 + 1e-9)
     if np.all(fitted):
         raise SettingsError("the fit has used the whole range, and nothing is left to be predicted")
     if np.count_nonzero(fitted) != len(posterior.measurement):
         raise SettingsError("the run was not made from the first part of this measurement")
-    force = Forward(posterior.hypothesis, whole, whole.deflection, solve)(draws, reached=False).force
+    forward = Forward(posterior.hypothesis, whole, whole.deflection, solve)
+    force = forward(draws, reached=False).force
     noise = _carried(posterior, draws, whole)
     model = posterior.hypothesis.noise.bind(whole)
+    shown = traces(forward, draws, force) if model.traced else None
     held = np.flatnonzero(~fitted)
     log_p = np.full((len(draws), held.size), -np.inf)
     mean, variance = np.full((len(draws), held.size), np.nan), np.full((len(draws), held.size), np.nan)
     good = np.flatnonzero(np.all(np.isfinite(force), axis=1))
     for b in good:
-        residual, covariance = whole.force - force[b], model.covariance(noise[b])
+        own = model.at(force[b : b + 1], None if shown is None else shown[b : b + 1])
+        residual, covariance = whole.force - force[b], own.covariance(noise[b])
         shift, conditional = _conditional(covariance, residual, fitted)
         mean[b], variance[b] = force[b, held] + shift, np.diag(conditional)
         log_p[b] = _sequential(conditional, residual[held] - shift)
@@ -215,6 +219,8 @@ def _carried(posterior: Posterior, draws: Array, whole: Measurement) -> Array:
     shifts = {
         "ln_sd": np.log(force_scale(part) / force_scale(whole)),
         "ln_length": np.log(_median_step(part) / _median_step(whole)),
+        ENERGY.name: 0.0,
+        LAW.name: 0.0,
     }
     names = [p.name for p in posterior.hypothesis.noise.coordinates]
     unknown = [n for n in names if n not in shifts]

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bayesmembrane.calibration.descent import descend
+from bayesmembrane.calibration.descent import Patience, descend
 from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
@@ -64,7 +64,7 @@ class Search:
 
     def quick(self, asked: Request) -> Curves:
         """The solver without its last resort: films that only shooting resolves cost a hundred times as much."""
-        return self.solve(replace(asked, solver="ritz_alone"))
+        return api.unaided(asked, self.solve)
 
     def material_starts(self, hypothesis: Hypothesis) -> list[Array]:
         """Starts (k,) from draws of the material's prior brought to their best modulus, without any effect.
@@ -94,7 +94,7 @@ class Search:
         objective = Objective(found.hypothesis, self.measurement, "euclidean", self.quick)
         axes = standard(found.hypothesis, self.measurement)
         u, size = self._descended(
-            objective, axes, self._freeing(found), axes.to_u(found.x)[None, :], SEARCH.last_iterations
+            objective, axes, self._freeing(found, False), axes.to_u(found.x)[None, :], SEARCH.last_iterations
         )
         if not np.isfinite(size[0]):
             return found
@@ -109,16 +109,25 @@ class Search:
         """The linear model of a candidate in the coordinates of `standard`, each over the sd of its local prior."""
         axes = standard(candidate.hypothesis, self.measurement)
         u = axes.to_u(candidate.x)
-        spread, _ = axes.local(u)
+        spread = axes.local(u)
         own = self.noise.white(candidate.slopes * (axes.slope(u) * spread))
         data = self.noise.white(candidate.residual) + own @ (u / spread)
         return Linear(data, (Block(own), *self._forms(candidate)), self.scale_sd)
+
+    def adapted(self, candidate: Candidate) -> Array:
+        """(N,) N: the residual once the coordinates have taken what they can of it, to first order, without form error.
+
+        By least squares: what a user would call the best fit of this model.
+        """
+        white = self.noise.white(np.column_stack([candidate.slopes, candidate.residual]))
+        taken = np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=SEARCH.rank)[0]
+        return np.asarray(candidate.residual - candidate.slopes @ taken)
 
     def steepness(self, candidate: Candidate) -> Array:
         """(k,) dx over the coefficients of `linear`."""
         axes = standard(candidate.hypothesis, self.measurement)
         u = axes.to_u(candidate.x)
-        return np.asarray(axes.slope(u) * axes.local(u)[0])
+        return np.asarray(axes.slope(u) * axes.local(u))
 
     @property
     def scale_sd(self) -> float:
@@ -142,12 +151,14 @@ class Search:
                 out.append(Block(self.noise.white(trace[:, None] * self.factors.progress), _moments(LAW)))
         return out
 
-    def _freeing(self, parent: Candidate | None) -> Freeing:
+    def _freeing(self, parent: Candidate | None, capped: bool = True) -> Freeing:
         if parent is None:
             force = np.abs(self.measurement.force)[:, None]
             columns = float(np.exp(_moments(ENERGY)[0])) * self.noise.white(force * self.factors.state)
         else:
-            eta = np.exp(parent.theta[1:])
+            # A poor parent's form error is large, and would take what the coordinates are to explain.
+            usual = np.array([b.ln_eta[0] for b in self._forms(parent) if b.ln_eta is not None])
+            eta = np.exp(np.minimum(parent.theta[1:], usual) if capped else parent.theta[1:])
             columns = np.column_stack([e * b.columns for e, b in zip(eta, self._forms(parent), strict=True)])
         q, s, _ = np.linalg.svd(columns, full_matrices=False)
         keep = s > SEARCH.least_form
@@ -169,7 +180,8 @@ class Search:
                 np.concatenate([j * axes.slope(u)[:, None, :], diagonal], axis=1),
             )
 
-        return descend(residuals, starts, axes.bounds, most, behind=SEARCH.given_up, slow_below=SEARCH.slow_below)
+        patience = Patience(SEARCH.given_up, SEARCH.slow_below)
+        return descend(residuals, starts, axes.bounds, most, patience=patience)
 
     def _candidate(self, objective: Objective, axes: Standard, u: Array) -> Candidate:
         x = axes.to_x(u)
@@ -187,13 +199,15 @@ class Search:
     def _weighed(self, found: Candidate, axes: Standard, u: Array) -> Candidate:
         model = self.linear(found)
         z = weighed(model, found.theta)
-        spread, larger = axes.local(u)
+        spread = axes.local(u)
         mean, covariance = model.coefficients(z.theta)
         low, high = (b / spread for b in axes.bounds)
         k = u.size
         inside = log_inside(mean[:k], covariance[:k, :k], np.where(axes.one_sided, 0.0, low), high)
+        own = mean[:k] * spread, np.diag(covariance)[:k] * spread**2
+        replaced = axes.log_replaced(u, *own)
         form = self._coloured(found, mean[k:])
-        return replace(found, log_evidence=z.log_evidence + larger + inside, theta=z.theta, theta_sd=z.sd, form=form)
+        return replace(found, log_evidence=z.log_evidence + replaced + inside, theta=z.theta, theta_sd=z.sd, form=form)
 
     def _coloured(self, found: Candidate, coefficients: Array) -> Array:
         """(N,) N: the form error with these coefficients."""

@@ -14,6 +14,8 @@ from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal
 from bayesmembrane.physics.effects.base import EffectParameter
 from bayesmembrane.physics.hypothesis import Hypothesis
 
+FAR = 1e4
+"""Times the expected size: what a Cauchy prior has beyond is nothing."""
 EDGE = 1e-9
 """Of a probability: as near to 0 or 1 a quantile is taken, so that it is a number."""
 
@@ -73,7 +75,8 @@ class Shape:
             case Normal(mean, sd):
                 return np.asarray((x - mean) / sd)
             case LogNormal(median, spread):
-                return np.asarray(np.log(x / median) / spread)
+                with np.errstate(divide="ignore"):  # a bound at zero is far away
+                    return np.asarray(np.log(x / median) / spread)
             case HalfNormal(scale, origin):
                 return np.asarray((x - origin) / scale)
             case Uniform(low, high):
@@ -142,17 +145,43 @@ class Standard:
             steep = np.where(np.abs(u) > 1e-6, 2 * u / ((1 + u * u) * root), np.sqrt(2.0))
         return np.where(self.heavy, root, u), np.where(self.heavy, steep, 1.0)
 
-    def local(self, u: Array) -> tuple[Array, float]:
-        """((k,) standard deviations s of normal priors about 0 that stand for the priors near u (k,), ln of what the
-        true density is larger at u, summed).
+    def local(self, u: Array) -> Array:
+        """(k,) standard deviations s of normal priors about 0 that stand for the priors near u (k,).
 
         For a Cauchy density s^2 = (1 + u^2) / 2, which has its slope at u.
         """
-        s = np.where(self.heavy, np.sqrt(0.5 * (1 + u * u)), 1.0)
-        cauchy = -np.log(np.pi) - np.log1p(u * u)
-        normal = -0.5 * (u / s) ** 2 - np.log(s * np.sqrt(2 * np.pi))
-        larger = np.where(self.heavy, cauchy - normal, 0.0) + np.where(self.one_sided, np.log(2.0), 0.0)
-        return s, float(np.sum(larger))
+        return np.where(self.heavy, np.sqrt(0.5 * (1 + u * u)), 1.0)
+
+    def log_replaced(self, u: Array, mean: Array, variance: Array) -> float:
+        """ln Z with the priors less ln Z with the normal ones of `local`, posterior ``mean`` and ``variance`` (k,).
+
+        Of a Cauchy prior p, the integral of p L over that of N(0, s^2) L along its coordinate, with the likelihood
+        L ~ N(mean, variance) / N(0, s^2), and p normalised within its bounds; of a half-normal one 2, for it is normal
+        on its side.
+        """
+        s = self.local(u)
+        out = np.log(2.0) * float(np.sum(self.one_sided))
+        for i in np.flatnonzero(self.heavy):
+            low = 0.0 if self.one_sided[i] else max(float(self.bounds[0][i]), -FAR)
+            grid = _grid(float(mean[i]), float(np.sqrt(variance[i])), low, min(float(self.bounds[1][i]), FAR))
+            precision = max(1 / float(variance[i]) - 1 / float(s[i]) ** 2, 0.0)
+            middle = float(mean[i] / variance[i]) / precision if precision > 0 else 0.0
+            log_likelihood = -0.5 * precision * (grid - middle) ** 2
+            log_likelihood -= np.max(log_likelihood)
+            within = float(np.arctan(grid[-1]) - np.arctan(grid[0])) * (2 if self.one_sided[i] else 1)
+            cauchy = 1 / (within * (1 + grid**2))
+            normal = np.exp(-0.5 * (grid / s[i]) ** 2) / (s[i] * np.sqrt(2 * np.pi))
+            top, bottom = (float(np.trapezoid(p * np.exp(log_likelihood), grid)) for p in (cauchy, normal))
+            if top > 0 and bottom > 0:
+                out += float(np.log(top / bottom))
+        return float(out)
+
+
+def _grid(mean: float, sd: float, low: float, high: float) -> Array:
+    """Points from ``low`` to ``high``, close about the mean of what is integrated and about zero, where priors peak."""
+    near = mean + sd * np.linspace(-9.0, 9.0, 181)
+    wide = np.sinh(np.linspace(np.arcsinh(low), np.arcsinh(high), 181))
+    return np.unique(np.clip(np.concatenate([near, wide, [low, high]]), low, high))
 
 
 def standard(hypothesis: Hypothesis, measurement: Measurement) -> Standard:

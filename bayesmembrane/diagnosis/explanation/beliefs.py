@@ -13,10 +13,19 @@ class Beliefs:
     How large the error of forms may be stands in `physics.form_error`.
     """
 
-    effects: tuple[float, ...] = (0.45, 0.45, 0.08, 0.02)
+    effects: tuple[float, ...] = (0.40, 0.40, 0.15, 0.05)
     """Of none, one, two and three effects beyond those given; sets of one size are equally probable."""
+    counts: float = 0.5
+    """Of every ln Bayes factor: real laws differ from the library's in more ways than the form error knows, so that
+    factors as they come are too sure. Chosen by the log score of the calibration half of `make study-reliability`."""
     foreign: float = 0.15
     """Of something that no effect of the library describes, on top of whatever else is at work."""
+    supported: float = 1.0
+    """ln of the Bayes factor that a further effect needs to count as seen: below it, the set counts as the one without
+    it."""
+    takes: float = 15.0
+    """Squares, in those of the noise, that it must take away to count all the same, where it is only that the form
+    error could take them too."""
     declared: float = 0.5
     """Of the energy that was declared; the others share the rest. Without one, all are equally probable."""
 

@@ -57,9 +57,11 @@ class Grown:
         return list(best.values())
 
     def polish(self, size: int) -> None:
-        """The most probable of this size searched on with the form error that they show themselves."""
-        for c in self.of_size(size)[: GROWTH.polished]:
-            self.add(self.search.polished(c))
+        """The best of each set of this size searched on with its own form error: all that may matter."""
+        every = self.best_of_each_set(size)[: GROWTH.polished]
+        for c in every:
+            if every[0].log_evidence - c.log_evidence < GROWTH.polish_reach:
+                self.add(self.search.polished(c))
 
     def renew(self) -> None:
         """Noise from the best candidate, and all of them weighed under it."""
@@ -185,5 +187,5 @@ def _worth_more(out: Grown, size: int) -> bool:
 
 def _mass(out: Grown, candidates: Iterable[Candidate] | Sequence[Candidate], size: int) -> float:
     visible = len(out.case.visible)
-    every = [c.log_evidence for c in candidates]
+    every = [BELIEFS.counts * c.log_evidence for c in candidates]
     return float(np.logaddexp.reduce(every)) + BELIEFS.log_set(size, visible) if every else -np.inf

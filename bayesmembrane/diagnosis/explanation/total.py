@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from bayesmembrane.diagnosis.explanation.foreign import Foreign, foreign, kinds_
 from bayesmembrane.diagnosis.explanation.growth import Grown
 from bayesmembrane.diagnosis.thresholds import FOREIGN
 from bayesmembrane.ground.parameters import Array
+
+Key = TypeVar("Key")
 
 NOTHING = "none"
 """No effect; nothing foreign."""
@@ -64,17 +67,19 @@ class Total:
 
     ranking : every hypothesis, the most probable first
     probabilities : summed
+    joint : by (set of effects, kind of what is foreign), the most probable first
     foreign : what was found of each kind beside the models where it was looked for, the most probable first
     """
 
     ranking: tuple[Judged, ...]
     probabilities: Probabilities
+    joint: Mapping[tuple[str, str], float]
     foreign: tuple[Foreign, ...]
 
 
 def set_name(candidate: Candidate, given: Sequence[str]) -> str:
     """The effects of a candidate beyond those given, in alphabetical order, joined by "+"."""
-    return "+".join(sorted(set(candidate.names) - set(given))) or NOTHING
+    return _joined(frozenset(candidate.names) - set(given))
 
 
 def summed(grown: Grown) -> Total:
@@ -86,17 +91,26 @@ def summed(grown: Grown) -> Total:
     def weight(c: Candidate) -> float:
         size = len(c.names) - len(given)
         energy = BELIEFS.log_energy(c.hypothesis.material.name, case.question.energy, len(case.plain))
-        return c.log_evidence + BELIEFS.log_set(size, visible) + energy
+        return BELIEFS.counts * c.log_evidence + BELIEFS.log_set(size, visible) + energy
 
     every.sort(key=weight, reverse=True)
     found = _foreign(grown, every, given)
     kinds = kinds_of(found)
     nothing = BELIEFS.log_foreign(0) if kinds else 0.0
     terms = [(c, NOTHING, weight(c) + nothing) for c in every]
-    terms += [(f.base, f.kind, weight(f.base) + f.gain + BELIEFS.log_foreign(kinds)) for f in found]
+    # What the data do not speak for is neither seen nor excluded, like a further effect that is idle.
+    seen = [f for f in found if BELIEFS.counts * f.gain > BELIEFS.supported]
+    terms += [(f.base, f.kind, weight(f.base) + BELIEFS.counts * f.gain + BELIEFS.log_foreign(kinds)) for f in seen]
     p = _normalised(np.array([w for _, _, w in terms]))
     judged = [_judged(grown, c, float(q)) for (c, kind, _), q in zip(terms, p, strict=True) if kind == NOTHING]
-    return Total(tuple(judged), _added_up(terms, p, given), tuple(found))
+    owners = _owners(grown, [c for c, kind, _ in terms if kind == NOTHING])
+    joint, energies = defaultdict[tuple[str, str], float](float), defaultdict[str, float](float)
+    for (c, kind, _), q in zip(terms, p, strict=True):
+        joint[owners[set_name(c, given)], kind] += float(q)
+        energies[c.hypothesis.material.name] += float(q)
+    both = _falling(joint)
+    marginal = Probabilities(_summed_out(both, 0), _falling(energies), _summed_out(both, 1))
+    return Total(tuple(judged), marginal, both, tuple(found))
 
 
 def _foreign(grown: Grown, every: Sequence[Candidate], given: Sequence[str]) -> list[Foreign]:
@@ -116,13 +130,46 @@ def _normalised(log_weights: Array) -> Array:
     return np.asarray(p / np.sum(p))
 
 
-def _added_up(terms: Sequence[tuple[Candidate, str, float]], p: Array, given: Sequence[str]) -> Probabilities:
-    effects, energies, kinds = (defaultdict[str, float](float) for _ in range(3))
-    for (c, kind, _), q in zip(terms, p, strict=True):
-        effects[set_name(c, given)] += float(q)
-        energies[c.hypothesis.material.name] += float(q)
-        kinds[kind] += float(q)
-    return Probabilities(*(dict(sorted(d.items(), key=lambda i: -i[1])) for d in (effects, energies, kinds)))
+def _falling(p: Mapping[Key, float]) -> dict[Key, float]:
+    return dict(sorted(p.items(), key=lambda i: -i[1]))
+
+
+def _summed_out(joint: Mapping[tuple[str, str], float], kept: int) -> dict[str, float]:
+    """The probabilities of one part of a pair, summed over the other."""
+    out = defaultdict[str, float](float)
+    for key, q in joint.items():
+        out[key[kept]] += q
+    return _falling(out)
+
+
+def _owners(grown: Grown, every: Sequence[Candidate]) -> dict[str, str]:
+    """{set of effects: the part of it that the data speak for}.
+
+    A further effect that the data do not support, and that takes nothing away, is not seen to be there, nor seen to be
+    absent: such a set says no more than the set without it.
+    """
+    given = set(grown.case.null.names)
+    best: dict[frozenset[str], Candidate] = {}
+    for c in every:
+        own = frozenset(c.names) - given
+        if own not in best or c.log_evidence > best[own].log_evidence:
+            best[own] = c
+    squares = {own: _excess(grown, c) for own, c in best.items()}
+    out: dict[frozenset[str], frozenset[str]] = {}
+    for own in sorted(best, key=len):
+        smaller = [own - {e} for e in own if own - {e} in best]
+        out[own] = own
+        if smaller:
+            less = max(smaller, key=lambda s: best[s].log_evidence)
+            gain = best[own].log_evidence - best[less].log_evidence
+            idle = BELIEFS.counts * gain < BELIEFS.supported
+            if idle and squares[less] - squares[own] < BELIEFS.takes:
+                out[own] = out[less]
+    return {_joined(own): _joined(owner) for own, owner in out.items()}
+
+
+def _joined(names: frozenset[str]) -> str:
+    return "+".join(sorted(names)) or NOTHING
 
 
 def _judged(grown: Grown, c: Candidate, probability: float) -> Judged:
@@ -140,5 +187,5 @@ def _judged(grown: Grown, c: Candidate, probability: float) -> Judged:
 
 def _excess(grown: Grown, c: Candidate) -> float:
     """Squares beyond those of noise, over its variance; 0 or more."""
-    white = grown.search.noise.white(c.residual)
+    white = grown.search.noise.white(grown.search.adapted(c))
     return max(float(white @ white) - (c.residual.size - c.x.size), 0.0)

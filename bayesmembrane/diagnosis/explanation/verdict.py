@@ -43,37 +43,40 @@ def adequate(case: OpenCase) -> Verdict:
 def decided(case: OpenCase, total: Total) -> Verdict:
     """The verdict of a sum over hypotheses, of a model that misses something."""
     p, given = total.probabilities, case.null.names
-    foreign = total.foreign[0] if total.foreign and p.foreign.get(NOTHING, 1.0) < 0.5 else None
-    if foreign is not None:
-        kinds = sorted(((q, k) for k, q in p.foreign.items() if k != NOTHING), reverse=True)
-        foreign = next(f for f in total.foreign if f.kind == kinds[0][1])
+    held = _smallest(total)
+    kinds = [kind for _, kind in held if kind != NOTHING]
+    foreign = next((f for f in total.foreign if kinds and f.kind == kinds[0]), None)
+    if p.foreign.get(NOTHING, 1.0) < 0.5:
         return Verdict("unknown", (), total.ranking, p, foreign)
-    members = _smallest(total, given)
-    if members is None:
-        return Verdict("unknown", (), total.ranking, p)
-    names = {set_name(m.candidate, given) for m in members}
-    if names == {NOTHING}:
-        return _without_effects(case, total, members)
-    verdict = "named" if len(members) == 1 else "ambiguous"
-    return Verdict(verdict, members, total.ranking, p)
-
-
-def _smallest(total: Total, given: tuple[str, ...]) -> tuple[Judged, ...] | None:
-    """The best of each of the fewest sets of effects that hold `VERDICT.sure`; None if there are too many."""
     best: dict[str, Judged] = {}
     for j in total.ranking:
         best.setdefault(set_name(j.candidate, given), j)
+    members = tuple(best[name] for name, kind in held if kind == NOTHING and name in best)
+    if not members or len(members) > VERDICT.most_members:
+        return Verdict("unknown", (), total.ranking, p, foreign)
+    if all(name == NOTHING for name, _ in held) and foreign is None:
+        return _without_effects(case, total, members)
+    if any(_carried(m.candidate) for m in members[:1]):
+        return Verdict("unknown", (), total.ranking, p, foreign)
+    single = len(members) == 1 and foreign is None
+    return Verdict("named" if single else "ambiguous", members, total.ranking, p, foreign)
+
+
+def _smallest(total: Total) -> list[tuple[str, str]]:
+    """The fewest (set of effects, kind of what is foreign) that hold `VERDICT.sure` together."""
     held, out = 0.0, []
-    for name, q in total.probabilities.effects.items():
-        if name not in best:
-            continue
-        out.append(best[name])
+    for key, q in total.joint.items():
+        out.append(key)
         held += q
         if held >= VERDICT.sure:
-            return tuple(out)
-        if len(out) == VERDICT.most_members:
-            return None
-    return tuple(out)
+            break
+    return out
+
+
+def _carried(candidate: Candidate) -> bool:
+    """True if it is not the effects that explain the curve, but errors of their laws or of the energy."""
+    law = max(candidate.law_errors.values(), default=0.0)
+    return candidate.energy_error > VERDICT.carried or law > VERDICT.law_carried
 
 
 def _without_effects(case: OpenCase, total: Total, members: tuple[Judged, ...]) -> Verdict:
@@ -91,11 +94,16 @@ def _without_effects(case: OpenCase, total: Total, members: tuple[Judged, ...]) 
 def _first_order(case: OpenCase) -> Probabilities:
     """Probabilities of single effects beside the energies, from their traces alone."""
     count, visible = len(case.plain), case.visible
-    log_energy = {n: c.log_evidence + BELIEFS.log_energy(n, case.question.energy, count) for n, c in case.plain.items()}
+    log_energy = {
+        name: BELIEFS.counts * c.log_evidence + BELIEFS.log_energy(name, case.question.energy, count)
+        for name, c in case.plain.items()
+    }
     none = float(np.logaddexp.reduce(list(log_energy.values())))
     sets = {NOTHING: BELIEFS.log_set(0, len(visible))}
     for e in visible:
-        sets[e.name] = BELIEFS.log_set(1, len(visible)) + first_order(case.search, case.null, e)
+        gain = BELIEFS.counts * first_order(case.search, case.null, e)
+        if gain > BELIEFS.supported:
+            sets[e.name] = BELIEFS.log_set(1, len(visible)) + gain
     return Probabilities(_shares(sets), _shares({n: w - none for n, w in log_energy.items()}), {NOTHING: 1.0})
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,9 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.form_error import FormFactors, traces
 from bayesmembrane.physics.forward import Forward
 
+Rivals = Sequence[tuple[Candidate, float]]
+"""Candidates, each with ln of what is believed of it before the data."""
+
 
 @dataclass(frozen=True)
 class Misfit:
@@ -25,14 +29,14 @@ class Misfit:
     reduced_chi2: float
 
 
-def misfit_of(residual: Array, noise_sd: Array, parameters: int = 0) -> Misfit:
-    """The misfit of residuals (N,) with the noise's standard deviations (N,); ``parameters`` were fitted to them."""
+def misfit_of(residual: Array, noise_sd: Array, parameters: int = 0, white: Array | None = None) -> Misfit:
+    """The misfit of residuals (N,) with the noise's standard deviations (N,); ``parameters`` were fitted to them.
+
+    ``white`` (N,) are the residuals freed of noise, where neighbours are correlated.
+    """
     dof = max(residual.size - parameters, 1)
-    return Misfit(
-        float(np.sqrt(np.mean(residual**2))),
-        float(np.max(np.abs(residual))),
-        float(np.sum((residual / noise_sd) ** 2) / dof),
-    )
+    freed = residual / noise_sd if white is None else white
+    return Misfit(float(np.sqrt(np.mean(residual**2))), float(np.max(np.abs(residual))), float(np.sum(freed**2) / dof))
 
 
 def held_out(measurement: Measurement) -> NDArray[np.bool_]:
@@ -72,15 +76,18 @@ class HeldOut:
     covered_after: float
 
 
-def validate(search: Search, before: Candidate, after: Candidate, rivals: list[Candidate]) -> HeldOut | None:
-    """Fit to the points that are not held out, and predict those that are; None where there are none, or no film."""
+def validate(search: Search, before: Candidate, after: Candidate, rivals: Rivals) -> HeldOut | None:
+    """Fit to the points that are not held out, and predict those that are; None where there are none, or no film.
+
+    ``rivals`` come with ln of what is believed of each before the data.
+    """
     whole = search.measurement
     mask = held_out(whole)
     if not np.any(mask):
         return None
     part = _on_the_others(search, mask)
     fits = {}
-    for candidate in {c.label: c for c in (before, after, *rivals)}.values():
+    for candidate in {c.label: c for c in (before, after, *(c for c, _ in rivals))}.values():
         found = part.fit(candidate.hypothesis, [candidate.x], candidate.at(~mask))
         if found is not None:
             fits[candidate.label] = found
@@ -88,7 +95,8 @@ def validate(search: Search, before: Candidate, after: Candidate, rivals: list[C
         return None
     first, covered_first = _predicted(part, fits[before.label], search, mask)
     last, covered_last = _predicted(part, fits[after.label], search, mask)
-    chosen = max(fits, key=lambda label: fits[label].log_evidence)
+    belief = {c.label: value for c, value in rivals}
+    chosen = max(fits, key=lambda label: fits[label].log_evidence + belief.get(label, -np.inf))
     cycles = np.unique(whole.cycle)
     return HeldOut(int(cycles[-1]), cycles.size, first, last, chosen, covered_first, covered_last)
 

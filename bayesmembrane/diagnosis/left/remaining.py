@@ -36,11 +36,12 @@ def remaining(search: Search, model: Candidate, plain: Candidate) -> Remaining:
     """What ``model`` leaves, beside what the ``plain`` one does."""
     white = search.noise.white
     dof = max(model.residual.size - model.x.size, 1)
-    left, before = _beyond(white(model.residual), model), _beyond(white(plain.residual), plain)
+    adapted = search.adapted(model)
+    left, before = _beyond(white(adapted), model), _beyond(white(search.adapted(plain)), plain)
     rest = _beyond(white(model.residual - model.form), model)
     return Remaining(
         share=float(np.clip(left / before, 0.0, 1.0)) if before > 0 else 0.0,
-        reduced_chi2=float(np.sum(white(model.residual) ** 2)) / dof,
+        reduced_chi2=float(np.sum(white(adapted) ** 2)) / dof,
         carried=1 - min(rest / left, 1.0) if left > 0 else 0.0,
         rms=float(np.sqrt(np.mean(model.form**2))),
         energy_error=model.energy_error,

@@ -108,9 +108,13 @@ class Whitened:
 
 
 def whitened(residual: Array, slopes: Array, smooth: Array, noise: OwnNoise) -> Whitened:
-    """Of a model's ``residual`` (N,) N, its ``slopes`` (N, k) and the smooth reference (N, p)."""
+    """Of a model's ``residual`` (N,) N, its ``slopes`` (N, k) and the smooth reference (N, p).
+
+    What its own slopes could take of the residual, to first order, is no misfit.
+    """
     known = orthonormal(noise.white(np.column_stack([smooth, slopes])))
-    return Whitened(noise, noise.white(residual), known, slopes.shape[1])
+    own, white = orthonormal(noise.white(slopes)), noise.white(residual)
+    return Whitened(noise, white - own @ (own.T @ white), known, slopes.shape[1])
 
 
 def divided(values: Array, profile: Array) -> Array:

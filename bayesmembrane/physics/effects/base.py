@@ -68,7 +68,6 @@ class Effect(ABC):
     needs_clamp : True if it only occurs on rigs that clamp the film all round
     needs_time : True if it means nothing without times
     absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
-    law_varies : part of its evidence by which real ones may differ from this law; as a rival it is out only beyond that
     exact : True if it has no law that could be off: an offset is an offset
     rank : orders effects within a stage; equal ranks go by name
     """
@@ -81,7 +80,6 @@ class Effect(ABC):
     needs_clamp: ClassVar[bool] = False
     needs_time: ClassVar[bool] = False
     absorbed: ClassVar[str] = ""
-    law_varies: ClassVar[float] = 0.0
     exact: ClassVar[bool] = False
     rank: ClassVar[int] = 0
     stage: ClassVar[str]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -24,7 +25,7 @@ Solve = Callable[[Request], Curves]
 SOLVERS: MappingProxyType[str, Solve] = MappingProxyType(
     {"ritz": fallback.solve, "ritz_alone": ritz.solve, "shooting": shooting.solve}
 )
-__all__ = ["SOLVERS", "Request", "Solve", "Spared", "force_curve", "profile", "request", "ritz", "solve"]
+__all__ = ["SOLVERS", "Request", "Solve", "Spared", "force_curve", "profile", "request", "ritz", "solve", "unaided"]
 
 
 def solve(request: Request) -> Curves:
@@ -35,6 +36,15 @@ def solve(request: Request) -> Curves:
     if request.solver not in SOLVERS:
         raise unknown_name("solver", request.solver, SOLVERS)
     return SOLVERS[request.solver](request)
+
+
+def unaided(asked: Request, solve: Solve = solve) -> Curves:
+    """What ``solve`` gives by the Ritz method alone: a film that it cannot resolve to 1e-6 stays without a force.
+
+    For maps and first searches, which ask for many films that are no sensible ones: shooting at each of them takes a
+    hundred to a thousand times longer.
+    """
+    return solve(replace(asked, solver="ritz_alone"))
 
 
 def force_curve(

@@ -101,6 +101,9 @@ class AR1Likelihood(NoiseLikelihood):
             out[:, i] = phi[:, i - 1] * out[:, i - 1] + np.sqrt(1 - phi[:, i - 1] ** 2) * out[:, i]
         return out * (np.exp(x[:, 0]) * self.scale)[:, None]
 
+    def sd(self, x: Array) -> Array:
+        return np.asarray(np.sqrt(self.variance + (np.exp(x[:, :1]) * self.scale) ** 2))
+
     def covariance(self, x: Array) -> Array:
         tau = float(np.exp(x[0])) * self.scale
         given = np.diag(self.variance) if self.given is None else self.given

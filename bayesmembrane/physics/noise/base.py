@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.motion import Motion
+from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array, Natural, Normal, Parameter
+
+if TYPE_CHECKING:
+    from bayesmembrane.physics.effects.base import Effect
 
 MEDIAN_SHARE, SPREAD = 3e-3, 2.0
 
@@ -34,11 +40,35 @@ def force_scale(measurement: Measurement) -> float:
     return float(np.max(np.abs(measurement.force)))
 
 
+@dataclass(frozen=True, eq=False)
+class Elsewhere:
+    """Other points of the same film on the same rig.
+
+    path : how the disc gets there
+    force : (B, G) N, the curves of B draws
+    traces : (B, E, G) N, what each effect changes of them; None where nothing asks for it
+    """
+
+    path: Motion
+    force: Array
+    traces: Array | None = None
+
+
 class NoiseLikelihood(ABC):
     """A noise model bound to one measurement of N points; ``x`` (B, k) are its coordinates, ``residual`` (B, N) y - F.
 
-    What does not depend on the coordinates (eigenvalues of a covariance, gaps) is computed once, when it is made.
+    What does not depend on the coordinates (eigenvalues of a covariance, gaps) is computed once, when it is made. What
+    the readings scatter by knows nothing of F; a model that does says so in `at`.
     """
+
+    @property
+    def traced(self) -> bool:
+        """Whether `at` asks for traces."""
+        return False
+
+    def at(self, force: Array, traces: Array | None = None) -> NoiseLikelihood:
+        """The same for draws whose curves are ``force`` (B, N) N, with ``traces`` (B, E, N) N of their effects."""
+        return self
 
     @abstractmethod
     def log_likelihood(self, residual: Array, x: Array) -> Array:
@@ -65,6 +95,30 @@ class NoiseLikelihood(ABC):
         roots = (np.linalg.cholesky(self.covariance(row)) for row in x)
         return np.stack([root @ rng.standard_normal(len(root)) for root in roots])
 
+    def sd(self, x: Array) -> Array:
+        """(B, N) N: the root of the diagonal of Sigma(x)."""
+        return np.stack([np.sqrt(np.diag(self.covariance(row))) for row in x])
+
+    # ---- another test of the same film on the same rig ---------------------------------------------------------------
+
+    def fresh(self, x: Array, rng: np.random.Generator) -> Array:
+        """(B, N) N: a draw of what differs in another test of the same film on the same rig, by the noise alone."""
+        return self.draw(x, rng)
+
+    def recurring(self, residual: Array, x: Array, rng: np.random.Generator, there: Elsewhere | None = None) -> Array:
+        """(B, N) N: a draw, given ``residual``, of what would be the same in that other test; noise is not.
+
+        With ``there`` (B, G): the same at those points.
+        """
+        return np.zeros_like(residual if there is None else there.force)
+
+    def stated(self, residual: Array, x: Array) -> Array | None:
+        """(B,) r^T S^-1 r with S the noise that the measurement states beside what would be the same in another test.
+
+        None if it states none, or nothing would be the same: S is then its own noise alone.
+        """
+        return None
+
 
 @dataclass(frozen=True)
 class Noise(ABC):
@@ -81,6 +135,10 @@ class Noise(ABC):
     name: ClassVar[str]
     title: ClassVar[str]
 
+    def beside(self, effects: Sequence[Effect]) -> Noise:
+        """The same for a hypothesis with these ``effects``: what is inferred may depend on what they are."""
+        return self
+
     @property
     @abstractmethod
     def coordinates(self) -> tuple[Parameter, ...]:
@@ -94,6 +152,18 @@ class Noise(ABC):
     @abstractmethod
     def natural(self, x: Array, scale: float) -> Array:
         """The ``natural_parameters`` (B, n) of coordinates x (B, k), with the largest force ``scale`` in N."""
+
+    @property
+    def inferred(self) -> bool:
+        """Whether a part of the noise is inferred, on top of what the measurement states."""
+        return True
+
+    @classmethod
+    def stated_only(cls) -> Noise:
+        """The model with nothing inferred; raises `SettingsError` if it cannot do without, as most cannot."""
+        raise SettingsError(
+            f'the noise model "{cls.name}" always infers a part of the noise', remedy='use "white" to do without'
+        )
 
     @abstractmethod
     def bind(self, measurement: Measurement) -> NoiseLikelihood:

@@ -33,6 +33,14 @@ class White(Noise):
     def natural(self, x: Array, scale: float) -> Array:
         return np.exp(x) * scale
 
+    @property
+    def inferred(self) -> bool:
+        return self.extra
+
+    @classmethod
+    def stated_only(cls) -> White:
+        return cls(extra=False)
+
     def bind(self, measurement: Measurement) -> WhiteLikelihood:
         if not self.extra and measurement.force_sd is None:
             raise SettingsError(
@@ -76,6 +84,10 @@ class WhiteLikelihood(NoiseLikelihood):
     def draw(self, x: Array, rng: np.random.Generator) -> Array:
         z = rng.standard_normal((len(x), self.variance.size)) * np.sqrt(self._total(x))
         return z if self.axes is None else np.asarray(z @ self.axes.T)
+
+    def sd(self, x: Array) -> Array:
+        variance = self._total(x)
+        return np.sqrt(variance if self.axes is None else variance @ (self.axes**2).T)
 
     def _total(self, x: Array) -> Array:
         """Variances (B, N) along the axes; never below what a double can hold."""

@@ -80,6 +80,10 @@ def _blocks(found: Reconstruction) -> list[Block]:
     ]
     if found.suspects:
         blocks += [Heading("Printed entries that contradict the rest"), Points(tuple(map(suspect, found.suspects)))]
+    if found.families:
+        caption = "What the curve may be, and how probable each is; forces and errors are those of all together."
+        kinds = {f.title: f"{f.probability:.3f}" for f in found.families}
+        blocks.append(facts_table("reconstruction families", caption, kinds))
     influence = {i.changed: f"{1e3 * float(np.max(np.abs(i.force - found.force))):.3g} mN" for i in found.influence}
     if influence:
         caption = "Largest change of any recovered force (mN) when one assumption of the reconstruction is changed."

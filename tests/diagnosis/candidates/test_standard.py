@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.stats import cauchy, norm
 
 from bayesmembrane.diagnosis.candidates.standard import standard
@@ -43,8 +44,30 @@ def test_pulls_are_roots_of_the_prior_and_local_normals_have_its_value_and_slope
     assert 0.5 * pull**2 == pytest.approx(at_zero - log_prior)
     h = 1e-6
     assert steep == pytest.approx((axes.pull(u + h)[0] - axes.pull(u - h)[0]) / (2 * h), rel=1e-5)
-    spread, larger = axes.local(u)
-    halves = np.log(2.0) * np.sum(axes.one_sided)
-    assert larger + np.sum(norm.logpdf(u, 0, spread)) - halves == pytest.approx(np.sum(log_prior))
     slope = np.where(axes.heavy, -2 * u / (1 + u * u), -u)
-    assert -u / spread**2 == pytest.approx(slope)
+    assert -u / axes.local(u) ** 2 == pytest.approx(slope)
+
+
+@pytest.mark.parametrize("sd", [0.01, 0.5, 30.0])
+@pytest.mark.parametrize("at", [0.0, 0.6, 4.0])
+def test_a_size_is_integrated_under_its_own_prior(at, sd) -> None:
+    """Of a normal likelihood of one size, against the integral."""
+    axes = standard(Hypothesis(materials()["neo_hookean"], (components("effects")["friction"](),)), CURVE)
+    u = np.array([0.0, at, 0.0])
+    s = axes.local(u)
+    precision = 1 / s**2 + np.array([0.0, 1 / sd**2, 0.0])
+    mean = np.array([0.0, at / sd**2, 0.0]) / precision
+    inside = norm.logcdf(mean[1] * np.sqrt(precision[1]))
+
+    def likelihood(v: float) -> float:
+        return float(norm.pdf(v, at, sd))
+
+    local = quad(lambda v: likelihood(v) * norm.pdf(v, 0, s[1]), -np.inf, np.inf, points=None)[0]
+    near = (max(at - 9 * sd, 0.0), at + 9 * sd)
+    near = (near[0], min(near[1], axes.bounds[1][1]))
+    within = cauchy.cdf(axes.bounds[1][1]) - 0.5
+    exact = quad(lambda v: likelihood(v) * cauchy.pdf(v), *near, limit=200)[0] / within
+    if sd < 1:
+        local = norm.pdf(at, 0, np.hypot(s[1], sd))
+    found = np.log(local) + inside + axes.log_replaced(u, mean, 1 / precision)
+    assert found == pytest.approx(np.log(exact), abs=0.01)

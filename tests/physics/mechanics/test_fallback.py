@@ -10,6 +10,7 @@ import pytest
 from bayesmembrane.physics.materials.ogden import Ogden
 from bayesmembrane.physics.materials.yeoh import Yeoh
 from bayesmembrane.physics.mechanics import Status, fallback, request, solve
+from bayesmembrane.physics.mechanics.api import unaided
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
 from bayesmembrane.physics.mechanics.shooting import solver as shooting
 from tests.physics.mechanics.films import FIFTEEN, RADII, asked, every_material, prior_draws, silicone
@@ -56,3 +57,17 @@ def test_it_is_what_solve_does_by_default():
     np.testing.assert_array_equal(
         solve(request(Yeoh, p, FIFTEEN, **RADII)).force, fallback.solve(asked(Yeoh, p, FIFTEEN)).force
     )
+
+
+def test_unaided_is_the_ritz_method_alone_whatever_stands_in_front_of_it():
+    question, seen = asked(Yeoh, prior_draws(Yeoh, 20, seed=404), FIFTEEN), []
+
+    def listening(put):
+        seen.append(put.solver)
+        return solve(put)
+
+    alone = ritz.solve(question)
+    for curves in (unaided(question), unaided(question, listening)):
+        np.testing.assert_array_equal(curves.force, alone.force)
+        np.testing.assert_array_equal(curves.status, alone.status)
+    assert seen == ["ritz_alone"]

@@ -1,6 +1,7 @@
 """Noise models: every likelihood against SciPy's multivariate normal with the covariance written out."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.noise.ar1 import AR1
-from bayesmembrane.physics.noise.base import SD, Noise
+from bayesmembrane.physics.noise.base import SD, Elsewhere, Noise, NoiseLikelihood
+from bayesmembrane.physics.noise.form import Form
 from bayesmembrane.physics.noise.white import White
 from bayesmembrane.physics.rigs.annulus import Annulus
 
@@ -43,7 +45,15 @@ def draws(noise: Noise, count: int = 5) -> np.ndarray:
     return np.stack([rng.normal(p.prior.quantile(0.5), 1.0, count) for p in noise.coordinates], axis=1)
 
 
-MODELS = [components("noise")[name]() for name in components("noise")]
+def told(noise: Noise, bound: NoiseLikelihood, rows: int | slice = slice(None), count: int = 5) -> NoiseLikelihood:
+    """The noise at some of ``count`` curves with two traces each."""
+    rng = np.random.default_rng(SEED + 5)
+    force, traces = 1.0 + rng.uniform(0, 2, (count, N)), 0.2 * rng.standard_normal((count, 2, N))
+    rows = slice(rows, rows + 1) if isinstance(rows, int) else rows
+    return bound.at(force[rows], traces[rows] if bound.traced else None)
+
+
+MODELS = [*(components("noise")[name]() for name in components("noise")), Form(laws=True)]
 GIVEN = ["none", "sd", "covariance"]
 
 
@@ -55,9 +65,9 @@ def test_likelihood_is_that_of_its_covariance(noise: Noise, given: str, time: bo
     bound, x = noise.bind(m), draws(noise)
     residual = 0.05 * np.random.default_rng(SEED + 2).standard_normal((len(x), N))
     expected = [
-        multivariate_normal(np.zeros(N), bound.covariance(a)).logpdf(r) for a, r in zip(x, residual, strict=True)
+        multivariate_normal(np.zeros(N), told(noise, bound, b).covariance(x[b])).logpdf(residual[b]) for b in range(5)
     ]
-    assert bound.log_likelihood(residual, x) == pytest.approx(np.array(expected), rel=1e-9)
+    assert told(noise, bound).log_likelihood(residual, x) == pytest.approx(np.array(expected), rel=1e-9)
 
 
 @pytest.mark.parametrize("noise", MODELS, ids=lambda n: n.name)
@@ -65,9 +75,9 @@ def test_likelihood_is_that_of_its_covariance(noise: Noise, given: str, time: bo
 def test_pointwise_is_the_density_given_all_other_points(noise: Noise, given: str) -> None:
     bound, x = noise.bind(measurement(given)), draws(noise, 2)
     residual = 0.05 * np.random.default_rng(SEED + 3).standard_normal((2, N))
-    got = bound.pointwise(residual, x)
+    got = told(noise, bound, count=2).pointwise(residual, x)
     for b in range(2):
-        sigma = bound.covariance(x[b])
+        sigma = told(noise, bound, b, count=2).covariance(x[b])
         whole = multivariate_normal(np.zeros(N), sigma).logpdf(residual[b])
         for i in range(N):
             rest = np.delete(np.arange(N), i)
@@ -78,9 +88,10 @@ def test_pointwise_is_the_density_given_all_other_points(noise: Noise, given: st
 @pytest.mark.parametrize("noise", MODELS, ids=lambda n: n.name)
 @pytest.mark.parametrize("given", GIVEN)
 def test_draws_have_the_covariance(noise: Noise, given: str) -> None:
-    bound = noise.bind(measurement(given))
+    bound = told(noise, noise.bind(measurement(given)), 0)
     x = np.repeat(draws(noise, 1), 20000, axis=0)
     sigma = bound.covariance(x[0])
+    assert bound.sd(x[:1])[0] == pytest.approx(np.sqrt(np.diag(sigma)))
     z = bound.draw(x, np.random.default_rng(SEED + 4))
     root = np.sqrt(np.diag(sigma))
     assert np.max(np.abs(np.cov(z.T) - sigma) / np.outer(root, root)) < 0.04
@@ -90,7 +101,7 @@ def test_draws_have_the_covariance(noise: Noise, given: str) -> None:
 def test_given_noise_is_a_floor(noise: Noise) -> None:
     m = measurement("covariance")
     assert m.covariance is not None
-    added = noise.bind(m).covariance(draws(noise, 1)[0]) - m.covariance
+    added = told(noise, noise.bind(m), 0).covariance(draws(noise, 1)[0]) - m.covariance
     assert np.min(np.linalg.eigvalsh(added)) > 0
 
 
@@ -148,3 +159,95 @@ def test_a_filter_of_readings_is_found_where_the_speed_changes() -> None:
     values, others = (b.log_likelihood(np.tile(r, (101, 1)), x) for b in (by_reading, by_time))
     assert np.exp(-np.exp(-lengths[np.argmax(values)])) == pytest.approx(0.5, abs=0.1)
     assert values.max() > others.max() + 5
+
+
+@pytest.mark.parametrize("name", sorted(components("noise")))
+def test_a_model_keeps_to_the_stated_noise_or_says_that_it_cannot(name: str) -> None:
+    kind = components("noise")[name]
+    assert kind().inferred == bool(kind().coordinates)
+    if kind.stated_only.__func__ is Noise.stated_only.__func__:
+        with pytest.raises(SettingsError, match=name):
+            kind.stated_only()
+        return
+    without = kind.stated_only()
+    assert not without.inferred
+    assert without.coordinates == without.natural_parameters == ()
+    found = without.bind(measurement("sd")).covariance(np.empty(0))
+    np.testing.assert_allclose(found, measurement("sd").noise_covariance, rtol=1e-14)
+
+
+def test_white_noise_can_do_without_its_own() -> None:
+    assert White.stated_only() == White(extra=False)
+
+
+# ---- form error ------------------------------------------------------------------------------------------------------
+
+
+def smooth_part(bound: NoiseLikelihood, x: np.ndarray) -> np.ndarray:
+    """The covariance of the form error alone."""
+    none = np.array([-25.0, *x[1:]])
+    return bound.covariance(none) - bound.covariance(np.full(len(x), -25.0))
+
+
+@pytest.mark.parametrize("given", GIVEN)
+def test_no_form_error_is_white_noise(given: str) -> None:
+    m = measurement(given)
+    residual = 0.03 * np.random.default_rng(SEED).standard_normal((5, N))
+    x = np.column_stack([np.full(5, -3.0), np.full(5, -40.0), np.full(5, -40.0)])
+    white, form = White().bind(m), told(Form(laws=True), Form(laws=True).bind(m))
+    assert form.log_likelihood(residual, x) == pytest.approx(white.log_likelihood(residual, x[:, :1]), rel=1e-12)
+    assert form.pointwise(residual, x) == pytest.approx(white.pointwise(residual, x[:, :1]), rel=1e-9)
+
+
+def test_effects_without_a_trace_have_no_form_error() -> None:
+    bound, x = Form(laws=True).bind(measurement("sd")), draws(Form(laws=True))
+    force, residual = np.full((5, N), 2.0), 0.03 * np.random.default_rng(SEED).standard_normal((5, N))
+    without = Form().bind(measurement("sd")).at(force).log_likelihood(residual, x[:, :2])
+    assert bound.at(force, np.zeros((5, 2, N))).log_likelihood(residual, x) == pytest.approx(without, rel=1e-12)
+
+
+@pytest.mark.parametrize("given", GIVEN)
+def test_what_recurs_is_the_form_error_given_the_residual(given: str) -> None:
+    """S_s S^-1 r and S_s - S_s S^-1 S_s, at the readings, and at other points where they are the same ones."""
+    m, x = measurement(given), draws(Form(laws=True), 1)[0]
+    bound = told(Form(laws=True), Form(laws=True).bind(m), 0)
+    sigma, smooth = bound.covariance(x), smooth_part(bound, x)
+    residual = 0.3 * np.random.default_rng(SEED).standard_normal(N)
+    gain = smooth @ np.linalg.inv(sigma)
+    many = np.repeat(x[None], 4000, axis=0)
+    same = Elsewhere(m.path, np.repeat(bound.force, 4000, axis=0), np.repeat(bound.traces, 4000, axis=0))
+    for there in (None, same):
+        z = bound.recurring(np.tile(residual, (4000, 1)), many, np.random.default_rng(SEED + 7), there)
+        left = smooth - gain @ smooth
+        root = np.sqrt(np.diag(left))
+        assert np.max(np.abs(np.mean(z, axis=0) - gain @ residual) / root) < 0.1
+        assert np.max(np.abs(np.cov(z.T) - left) / np.outer(root, root)) < 0.12
+
+
+def test_far_from_the_readings_the_form_error_is_that_of_the_prior() -> None:
+    m, x = measurement("sd"), np.array([[-7.0, np.log(0.05)]])
+    bound = Form().bind(m).at(np.ones((1, N)))
+    far = Elsewhere(replace(m.path, deflection=m.deflection + 4 * m.full_range), np.ones((1, N)))
+    one = (np.zeros((1, N)), x, np.random.default_rng(SEED))
+    near, away = (np.std([bound.recurring(*one, there)[0] for _ in range(400)]) for there in (None, far))
+    assert away == pytest.approx(0.05, rel=0.25)
+    assert near < 0.7 * away
+
+
+def test_chi_square_counts_the_form_error_beside_the_stated_noise() -> None:
+    m, x = measurement("covariance"), draws(Form(laws=True), 1)
+    bound = told(Form(laws=True), Form(laws=True).bind(m), 0)
+    r = 0.03 * np.random.default_rng(SEED).standard_normal(N)
+    expected = r @ np.linalg.solve(m.covariance + smooth_part(bound, x[0]), r)
+    assert bound.stated(r[None], x) == pytest.approx(expected, rel=1e-6)
+    assert Form().bind(measurement("none")).stated(r[None], draws(Form(), 1)) is None
+
+
+def test_twenty_thousand_readings_need_no_square_of_that() -> None:
+    n = 20_000
+    d = np.linspace(1e-3, 0.04, n)
+    m = Measurement(d, 50 * d, Annulus(0.01, 0.035), Specimen("film", 5e-5))
+    bound = Form().bind(m)
+    found = bound.log_likelihood(np.full((1, n), 1e-3), np.array([[-6.0, -6.0]]))
+    assert np.isfinite(found[0])
+    assert sum(a.nbytes for a in (bound.factors.state, bound.factors.progress)) < 40 * 8 * n

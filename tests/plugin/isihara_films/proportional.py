@@ -44,12 +44,16 @@ class ProportionalLikelihood(NoiseLikelihood):
         self.share = LEAST + (1 - LEAST) * np.abs(measurement.force) / self.scale
         given = measurement.noise_covariance
         self.given = np.zeros((len(measurement),) * 2) if given is None else given
+        self.independent = measurement.covariance is None
 
     def covariance(self, x: Array) -> Array:
         tau = float(np.exp(x[0])) * self.scale
         return np.asarray(self.given + np.diag((tau * self.share) ** 2))
 
     def log_likelihood(self, residual: Array, x: Array) -> Array:
+        if self.independent:
+            variance = np.diag(self.given) + (np.exp(x[:, :1]) * self.scale * self.share) ** 2
+            return np.asarray(-0.5 * np.sum(residual**2 / variance + np.log(2 * np.pi * variance), axis=1))
         out = np.empty(len(x))
         for b, row in enumerate(x):
             root = np.linalg.cholesky(self.covariance(row))

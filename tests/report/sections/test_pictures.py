@@ -1,12 +1,15 @@
 """Every picture can be drawn, twice the same, whatever is missing."""
 
+import io
 from collections.abc import Callable
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from PIL import Image
 
 from bayesmembrane.report.blocks import Picture
-from bayesmembrane.report.canvas import Interval, Measured
+from bayesmembrane.report.canvas import COLOURS, DPI, MOST_SVG, Interval, Measured, encoded, new_figure
 from bayesmembrane.report.runs import Replicas
 from bayesmembrane.report.sections.break_points import break_picture
 from bayesmembrane.report.sections.calibrations import forest_picture
@@ -156,3 +159,32 @@ def test_the_same_numbers_give_the_same_bytes(name: str) -> None:
 def test_places_among_readings_are_drawn_twice_the_same() -> None:
     same = replicas(12)
     assert calibration_picture(same, "yeoh").data == calibration_picture(same, "yeoh").data
+
+
+def drawn(points: int, colours: int) -> Figure:
+    """A cloud over a field of so many colours."""
+    figure = new_figure(3.0)
+    ax = figure.subplots()
+    ax.imshow(np.linspace(0, 1, colours)[None, :], aspect="auto", cmap="viridis", extent=(0.0, 1.0, 0.0, 1.0))
+    ax.plot(*np.random.default_rng(1).uniform(size=(2, points)), "o", markersize=2)
+    return figure
+
+
+def pixels(data: bytes) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
+
+
+def test_a_picture_in_few_colours_looks_like_the_one_that_was_drawn() -> None:
+    figure, whole = drawn(50, 2000), io.BytesIO()
+    made = encoded(figure, "png")
+    figure.savefig(whole, format="png", dpi=DPI)
+    assert len(np.unique(pixels(made.data).reshape(-1, 3), axis=0)) <= COLOURS
+    assert np.max(np.abs(pixels(made.data) - pixels(whole.getvalue()))) <= 16  # of 255
+    assert len(made.data) < 0.7 * len(whole.getvalue())
+
+
+@pytest.mark.parametrize(("points", "kind"), [(20, "svg"), (5000, "png")])
+def test_a_drawing_is_a_cloud_where_it_has_many_marks(points: int, kind: str) -> None:
+    made = encoded(drawn(points, 2), "svg")
+    assert made.kind == kind
+    assert len(made.data) <= MOST_SVG

@@ -29,8 +29,8 @@ class Emulated(Protocol):
     def evaluate(self, x: Array) -> Evaluation:
         """Prior, likelihood, force and outcome of x (B, k)."""
 
-    def given(self, force: Array, x: Array) -> Array:
-        """(B,) ln prior + ln likelihood of x (B, k) if their curves were ``force`` (B, N)."""
+    def given(self, curves: Array, x: Array, /) -> Array:
+        """(B,) ln prior + ln likelihood of x (B, k) if theirs were ``curves`` (B, N), as an `Evaluation` has them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Emulator:
     posterior : turns curves into densities
     centre, root, inverse : x = centre + root z whitens the draws
     terms : (T, degree) indices of the factors of each monomial; k stands for a factor one
-    coefficients : (T, N) F^ = monomials(z) coefficients
+    coefficients : (T, N) F^ = monomials(z) coefficients, of all curves that the likelihood is made of
     level : ln of the height that the wide density is given at the centre
     archive : (M, k) draws whose differences are steps
     """
@@ -89,14 +89,15 @@ def emulate(posterior: Emulated, x: Array, rng: np.random.Generator) -> Emulator
     x = np.unique(x, axis=0)
     x = x[rng.permutation(len(x))[:LEARN_FROM]]
     found = posterior.evaluate(x)
-    ok = np.isfinite(found.log_posterior) & np.all(np.isfinite(found.force), axis=1)
-    x, force, truth = x[ok], found.force[ok], found.log_posterior[ok]
+    curves = found.curves
+    ok = np.isfinite(found.log_posterior) & np.all(np.isfinite(curves), axis=1)
+    x, curves, truth = x[ok], curves[ok], found.log_posterior[ok]
     if len(x) < LEAST_DRAWS:
         return None
     centre, root = np.mean(x, axis=0), _root(x)
     inverse: Array = np.asarray(np.linalg.inv(root), dtype=float)
     z = (x - centre) @ inverse.T
-    terms, coefficients = _best(z, force, lambda f, held: _misfit(posterior.given(f, x[held]), truth[held]))
+    terms, coefficients = _best(z, curves, lambda f, held: _misfit(posterior.given(f, x[held]), truth[held]))
     emulator = Emulator(posterior, centre, root, inverse, terms, coefficients, -np.inf, x)
     level = float(np.median(emulator.log_density(x) - _log_t(z)) + np.log(DOUBT))
     return Emulator(posterior, centre, root, inverse, terms, coefficients, level, x)

@@ -77,7 +77,9 @@ def ranking_table(d: Diagnosis, name: str) -> Table:
     )
     members = {j.candidate.label for j in d.members} if d.verdict != "unknown" else set()
     rows = []
-    for j in d.ranking[:MOST_CANDIDATES]:
+    first = d.ranking[:MOST_CANDIDATES]
+    null = [j for j in d.ranking[MOST_CANDIDATES:] if j.candidate.label == d.null.label]
+    for j in (*first, *null):
         c = j.candidate
         rows.append(
             (

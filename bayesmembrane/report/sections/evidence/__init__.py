@@ -12,7 +12,13 @@ from bayesmembrane.ground.stored import read
 from bayesmembrane.report.blocks import Block, Figure, Points
 from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
 from bayesmembrane.report.sections.evidence.figures import comparison_picture
-from bayesmembrane.report.sections.evidence.tables import evidence_table, modes_table, ranking_table, widths_table
+from bayesmembrane.report.sections.evidence.tables import (
+    evidence_table,
+    modes_table,
+    noises_table,
+    ranking_table,
+    widths_table,
+)
 from bayesmembrane.words import comparison as words
 from bayesmembrane.words.beside_paper import PaperLosses, order_sentences, paper_losses
 from bayesmembrane.words.comparison import called
@@ -46,7 +52,13 @@ class EvidenceSection(Section):
             "expected log predictive density of points left out, minus that of the best. Both without unit, to scale "
             "within 3 and logarithmic beyond; whiskers are two standard errors.",
         )
-        tables = (evidence_table(found), ranking_table(found, paper), modes_table(found), widths_table(found))
+        tables = (
+            evidence_table(found),
+            noises_table(found),
+            ranking_table(found, paper),
+            modes_table(found),
+            widths_table(found),
+        )
         return [Points(tuple(sentences(found, paper))), figure, *(t for t in tables if t is not None)]
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:

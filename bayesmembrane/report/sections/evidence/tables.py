@@ -7,12 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED
+from bayesmembrane.comparison.noises import noises_of, over_noises, several
 from bayesmembrane.comparison.result import Comparison, Row
 from bayesmembrane.physics.convexity import MODES
 from bayesmembrane.report.blocks import Column, Table, Value
 from bayesmembrane.words.beside_paper import PaperLosses
 from bayesmembrane.words.comparison import called, remark
-from bayesmembrane.words.hypothesis import material_title
+from bayesmembrane.words.hypothesis import material_title, spoken
 
 _EVIDENCE = (
     Column("range", "range"),
@@ -22,11 +23,13 @@ _EVIDENCE = (
     Column("bridge", "ln Z, bridge", ".2f"),
     Column("bridge_sd", "+-", ".2f"),
     Column("probability", "posterior probability", "p"),
+    Column("probability_sd", "+-", "p"),
     Column("elpd_loo", "elpd, leave one out", ".1f"),
     Column("loo_se", "+-", ".1f"),
     Column("refits", "refits", ".0f"),
     Column("held_rmse", "rms error of the rest (N)", ".3g"),
     Column("mass", "prior mass", ".3f"),
+    Column("mass_sd", "+-", ".3f"),
     Column("reason", "remark"),
 )
 
@@ -52,13 +55,46 @@ def _evidence(name: str, row: Row) -> tuple[Value, ...]:
         e.log_evidence[BRIDGE] if e else None,
         e.log_evidence_sd[BRIDGE] if e else None,
         row.posterior_probability,
+        row.posterior_probability_sd,
         loo.elpd if loo else None,
         loo.se if loo else None,
         len(loo.refitted) if loo else None,
         row.rest.rmse_N if row.rest else None,
         row.prior_mass.value if row.prior_mass else None,
+        row.prior_mass.sd if row.prior_mass else None,
         remark(row) or "-",
     )
+
+
+def noises_table(found: Mapping[str, Comparison]) -> Table | None:
+    """What each hypothesis is worth whatever the noise, and under each; None if there is one noise model alone."""
+    some = {name: c for name, c in found.items() if several(c)}
+    models = list(dict.fromkeys(n for c in some.values() for n in noises_of(c)))
+    columns = (
+        Column("range", "range"),
+        Column("hypothesis", "hypothesis"),
+        Column("probability", "posterior probability", "p"),
+        Column("log_evidence", "ln Z", ".2f"),
+        Column("sd", "+-", ".2f"),
+        *(Column(n, f"ln Z, {n}", ".2f") for n in models),
+    )
+    rows: list[tuple[Value, ...]] = [
+        (
+            name,
+            spoken(s.hypothesis),
+            s.posterior_probability,
+            s.log_evidence,
+            s.sd,
+            *(s.by_noise.get(n) for n in models),
+        )
+        for name, c in some.items()
+        for s in over_noises(c)
+    ]
+    caption = (
+        "Each hypothesis whatever the noise: ln of the mean evidence over the noise models, which are equally probable "
+        "before, and the posterior probability that all of them give it together; then ln Z under each."
+    )
+    return Table("evidence whatever the noise", caption, columns, tuple(rows)) if rows else None
 
 
 def modes_table(found: Mapping[str, Comparison]) -> Table | None:

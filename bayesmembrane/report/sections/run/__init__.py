@@ -26,7 +26,7 @@ from bayesmembrane.report.sections.run.tables import coordinates_table, paramete
 from bayesmembrane.words.calibration import convergence, describes, extrapolation, unknown, verdict, warnings
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed, newtons, percent, spoken_parameter
-from bayesmembrane.words.sampling import sentences
+from bayesmembrane.words.sampling import sentences, smooth_sentence
 
 MOST_CORNER = 4000  # draws in a corner plot
 TRUSTED = 0.7  # tail of the weights up to which a prediction without a point can be told from one with it
@@ -105,7 +105,8 @@ def _blocks(s: Shown, compared: Compared | None) -> list[Block]:
 
 
 def _sentences(s: Shown) -> list[str]:
-    told = [describes([s.case]), unknown([s.case]), extrapolation([s.case]), convergence([s.case])]
+    smooth = smooth_sentence(s.quality) if s.quality is not None else ""
+    told = [describes([s.case]), smooth, unknown([s.case]), extrapolation([s.case]), convergence([s.case])]
     return [t for t in told if t]
 
 

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
@@ -83,11 +83,16 @@ def _corner_margins(figure: Figure, m: int, size: float, logarithmic: Sequence[b
         row, column = divmod(i, m)
         if row < column:
             continue
-        if not logarithmic[column]:
+        # Of decades side by side only the whole ones have room for their numbers.
+        if logarithmic[column]:
+            ax.xaxis.set_minor_formatter(NullFormatter())
+        else:
             ax.xaxis.set_major_locator(MaxNLocator(3, prune="both"))
         ax.xaxis.set_label_coords(0.5, -0.72 / panel)
         if row > column:
-            if not logarithmic[row]:
+            if logarithmic[row]:
+                ax.yaxis.set_minor_formatter(NullFormatter())
+            else:
                 ax.yaxis.set_major_locator(MaxNLocator(3, prune="both"))
             ax.yaxis.set_label_coords(-0.72 / panel, 0.5)
 

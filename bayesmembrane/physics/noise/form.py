@@ -1,0 +1,286 @@
+"""White noise, and smooth relative errors of the energy and of the laws of effects: see `physics/form_error.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numba
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.parameters import Array, Natural, Parameter
+from bayesmembrane.physics.form_error import ENERGY, LAW, FormFactors, form_factors, joint_factors
+from bayesmembrane.physics.noise.base import LN_SD, SD, Elsewhere, Noise, NoiseLikelihood, conditional, force_scale
+
+if TYPE_CHECKING:
+    from bayesmembrane.physics.effects.base import Effect
+
+TINY = 1e-12
+"""Least part of a point's variance that all others leave open, beyond which a double cannot tell."""
+
+
+@dataclass(frozen=True)
+class Form(Noise):
+    """Sigma = Sigma_given + tau^2 I + eta_a^2 D_F K_u D_F + sum_e eta_e^2 D_te K_v D_te, with eta_e the same for all e.
+
+    laws : whether there are effects whose law may be off; without, eta_e is not inferred
+    """
+
+    laws: bool = False
+
+    name: ClassVar[str] = "form"
+    title: ClassVar[str] = "white noise and smooth form errors"
+
+    def beside(self, effects: Sequence[Effect]) -> Form:
+        return replace(self, laws=any(not e.exact for e in effects))
+
+    @property
+    def coordinates(self) -> tuple[Parameter, ...]:
+        return (LN_SD, ENERGY, LAW) if self.laws else (LN_SD, ENERGY)
+
+    @property
+    def natural_parameters(self) -> tuple[Natural, ...]:
+        found = (SD, Natural("eta", "-", ENERGY.meaning.removeprefix("log of the ")))
+        return (*found, Natural("eta_law", "-", LAW.meaning.removeprefix("log of the "))) if self.laws else found
+
+    def natural(self, x: Array, scale: float) -> Array:
+        return np.asarray(np.exp(x) * np.array([scale, *(1.0,) * (x.shape[1] - 1)]))
+
+    def bind(self, measurement: Measurement) -> FormLikelihood:
+        return FormLikelihood(measurement, self.laws)
+
+
+class FormLikelihood(NoiseLikelihood):
+    """O(N r^2) a draw, with r columns of all factors: Sigma = Lambda + U U^T, and M = 1 + U^T Lambda^-1 U is r x r.
+
+    r^T Sigma^-1 r = (r - U a)^T Lambda^-1 (r - U a) + a^T a with a = M^-1 U^T Lambda^-1 r, the most probable errors,
+    and |Sigma| = |Lambda| |M| (M. A. Woodbury, Princeton SRG Memo 42, 1950). A covariance that the measurement states
+    is turned to its axes first, O(N^2 r).
+
+    Until it is told of curves (`at`), those measured stand for them, and effects have no trace.
+    """
+
+    def __init__(self, measurement: Measurement, laws: bool) -> None:
+        self.measurement, self.laws = measurement, laws
+        self.scale = force_scale(measurement)
+        self.factors = form_factors(measurement)
+        self.axes: Array | None = None
+        self.own = np.zeros(len(measurement))
+        if measurement.covariance is not None:
+            self.own, self.axes = np.linalg.eigh(measurement.covariance)
+        elif measurement.force_sd is not None:
+            self.own = measurement.force_sd**2
+        self.force = measurement.force[None, :]
+        self.traces = np.zeros((1, 0, len(measurement)))
+        self.kept = np.zeros(0, dtype=np.int64)
+
+    @property
+    def traced(self) -> bool:
+        return self.laws
+
+    def at(self, force: Array, traces: Array | None = None) -> FormLikelihood:
+        """The same for these curves; `covariance` is then that of the first."""
+        told = copy(self)
+        told.force = force
+        if traces is not None:
+            told.kept = np.flatnonzero(np.any(traces != 0, axis=(0, 2)))
+            told.traces = traces[:, told.kept]
+        return told
+
+    def log_likelihood(self, residual: Array, x: Array) -> Array:
+        power, eta, law = self._sizes(x)
+        square, log_det = self._squares(residual, self.own + power[:, None], eta, law)
+        return np.asarray(-0.5 * (square + log_det + residual.shape[1] * np.log(2 * np.pi)))
+
+    def stated(self, residual: Array, x: Array) -> Array | None:
+        if not np.any(self.own):
+            return None
+        _, eta, law = self._sizes(x)
+        return self._squares(residual, np.broadcast_to(self.own, residual.shape), eta, law)[0]
+
+    def _squares(self, residual: Array, variance: Array, eta: Array, law: Array) -> tuple[Array, Array]:
+        force, traces = self._curves(len(residual))
+        axes = np.empty((0, 0)) if self.axes is None else self.axes
+        r = residual if self.axes is None else residual @ self.axes
+        parts = (r, force, traces, np.maximum(variance, 1e-300))
+        square, log_det = _squares(*(np.ascontiguousarray(p, dtype=float) for p in parts), eta, law, *self._roots, axes)
+        return square, log_det
+
+    def covariance(self, x: Array) -> Array:
+        power, eta, law = self._sizes(x[None, :])
+        u = self._columns(self.factors, self.force[0], self.traces[0], float(eta[0]), float(law[0]))
+        own = np.diag(self.own) if self.axes is None else (self.axes * self.own) @ self.axes.T
+        return np.asarray(own + power[0] * np.eye(len(own)) + u @ u.T)
+
+    def sd(self, x: Array) -> Array:
+        power, eta, law = self._sizes(x)
+        force, traces = self._curves(len(x))
+        own = self.own if self.axes is None else (self.axes**2) @ self.own
+        smooth = (eta[:, None] * force) ** 2 + law[:, None] ** 2 * np.sum(traces**2, axis=1)
+        return np.asarray(np.sqrt(own + power[:, None] + smooth))
+
+    def pointwise(self, residual: Array, x: Array) -> Array:
+        out = np.empty_like(residual)
+        for b, (u, variance, root) in enumerate(self._each(x)):
+            r, w = residual[b], solve_triangular(root, (u / variance[:, None]).T, lower=True, check_finite=False)
+            a = _mean(u, variance, root, self._turned(r))
+            pull, share = (self._turned(r) - u @ a) / variance, np.sum(w * w, axis=0) * variance
+            precision = np.maximum(1 - share, TINY) / variance
+            if self.axes is not None:
+                pull = self.axes @ pull
+                least = TINY * ((self.axes**2) @ (1 / variance))
+                precision = np.maximum((self.axes**2) @ (1 / variance) - np.sum((w @ self.axes.T) ** 2, axis=0), least)
+            out[b] = conditional(pull, precision)
+        return out
+
+    def draw(self, x: Array, rng: np.random.Generator) -> Array:
+        force, traces = self._curves(len(x))
+        _, eta, law = self._sizes(x)
+        out = self.fresh(x, rng)
+        for b in range(len(x)):
+            u = self._columns(self.factors, force[b], traces[b], eta[b], law[b])
+            out[b] += u @ rng.standard_normal(u.shape[1])
+        return out
+
+    def fresh(self, x: Array, rng: np.random.Generator) -> Array:
+        power, _, _ = self._sizes(x)
+        z = rng.standard_normal((len(x), self.own.size)) * np.sqrt(self.own + power[:, None])
+        return z if self.axes is None else np.asarray(z @ self.axes.T)
+
+    def recurring(self, residual: Array, x: Array, rng: np.random.Generator, there: Elsewhere | None = None) -> Array:
+        """(B, N) or (B, G) N: U a with a ~ N(M^-1 U^T Lambda^-1 r, M^-1), the errors of this energy and these laws."""
+        n = len(self.measurement)
+        joint = self.factors if there is None else joint_factors(self.measurement, there.path)
+        here = FormFactors(joint.state[:n], joint.progress[:n])
+        force, traces = self._curves(len(x)) if there is None else self._shown(there)
+        beyond = slice(0, n) if there is None else slice(n, None)
+        away = FormFactors(joint.state[beyond], joint.progress[beyond])
+        _, eta, law = self._sizes(x)
+        out = np.empty(force.shape)
+        for b, (u, variance, root) in enumerate(self._each(x, here)):
+            a = _mean(u, variance, root, self._turned(residual[b]))
+            a += solve_triangular(root, rng.standard_normal(len(a)), lower=True, trans="T", check_finite=False)
+            out[b] = self._columns(away, force[b], traces[b], eta[b], law[b]) @ a
+        return out
+
+    # ---- pieces ------------------------------------------------------------------------------------------------------
+
+    @property
+    def _roots(self) -> tuple[Array, Array]:
+        return self.factors.state, self.factors.progress
+
+    def _sizes(self, x: Array) -> tuple[Array, Array, Array]:
+        """tau^2 (N^2), eta_a and eta_e of x (B, k), (B,) each."""
+        law = np.exp(x[:, 2]) if self.laws else np.zeros(len(x))
+        return (np.exp(x[:, 0]) * self.scale) ** 2, np.exp(x[:, 1]), law
+
+    def _curves(self, count: int) -> tuple[Array, Array]:
+        """Forces (B, N) and traces (B, E, N)."""
+        if len(self.force) == count == len(self.traces):
+            return self.force, self.traces
+        n = len(self.measurement)
+        return np.broadcast_to(self.force, (count, n)), np.broadcast_to(self.traces, (count, self.traces.shape[1], n))
+
+    def _shown(self, there: Elsewhere) -> tuple[Array, Array]:
+        """Forces (B, G) elsewhere, and traces (B, E, G) of the effects that have one here."""
+        if there.traces is None:
+            return there.force, np.zeros((len(there.force), len(self.kept), there.force.shape[1]))
+        return there.force, there.traces[:, self.kept]
+
+    def _turned(self, residual: Array) -> Array:
+        return residual if self.axes is None else residual @ self.axes
+
+    def _columns(self, factors: FormFactors, force: Array, traces: Array, eta: float, law: float) -> Array:
+        """U (N, r) of one draw, before it is turned."""
+        parts = [eta * force[:, None] * factors.state]
+        return np.concatenate([*parts, *(law * t[:, None] * factors.progress for t in traces)], axis=1)
+
+    def _each(self, x: Array, factors: FormFactors | None = None) -> Iterator[tuple[Array, Array, Array]]:
+        """U (N, r) and Lambda (N,) on the axes, and the root of M (r, r), draw by draw."""
+        force, traces = self._curves(len(x))
+        power, eta, law = self._sizes(x)
+        for b in range(len(x)):
+            u = self._columns(factors or self.factors, force[b], traces[b], eta[b], law[b])
+            u = u if self.axes is None else self.axes.T @ u
+            variance = np.maximum(self.own + power[b], 1e-300)
+            yield u, variance, _root(np.ascontiguousarray(u / np.sqrt(variance)[:, None]))
+
+
+def _mean(u: Array, variance: Array, root: Array, r: Array) -> Array:
+    """a = M^-1 U^T Lambda^-1 r."""
+    half = solve_triangular(root, u.T @ (r / variance), lower=True, check_finite=False)
+    return np.asarray(solve_triangular(root, half, lower=True, trans="T", check_finite=False))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _root(w):  # type: ignore[no-untyped-def]
+    """Lower triangular root of 1 + w^T w, whose pivots are at least 1 however large w is."""
+    size = w.shape[1]
+    m = np.dot(np.ascontiguousarray(w.T), w)
+    for j in range(size):
+        pivot = m[j, j] + 1.0
+        for k in range(j):
+            pivot -= m[j, k] * m[j, k]
+        m[j, j] = np.sqrt(max(pivot, 1.0))
+        for i in range(j + 1, size):
+            s = m[i, j]
+            for k in range(j):
+                s -= m[i, k] * m[j, k]
+            m[i, j] = s / m[j, j]
+            m[j, i] = 0.0
+    return m
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _squares(residual, force, traces, variance, eta, law, state, progress, axes):  # type: ignore[no-untyped-def]
+    """(r^T Sigma^-1 r (B,), ln |Sigma| (B,)); residual and variance on the axes, if there are any."""
+    draws, n = residual.shape
+    r, q = state.shape[1], progress.shape[1]
+    effects = traces.shape[1] if np.any(law > 0.0) else 0
+    size = r + effects * q
+    w = np.empty((n, size))
+    square, log_det = np.empty(draws), np.empty(draws)
+    a = np.empty(size)
+    for b in range(draws):
+        for i in range(n):
+            for j in range(r):
+                w[i, j] = eta[b] * force[b, i] * state[i, j]
+            for e in range(effects):
+                for j in range(q):
+                    w[i, r + e * q + j] = law[b] * traces[b, e, i] * progress[i, j]
+        if axes.size:
+            w[:, :] = np.dot(np.ascontiguousarray(axes.T), w)
+        for i in range(n):
+            scale = 1.0 / np.sqrt(variance[b, i])
+            for j in range(size):
+                w[i, j] *= scale
+        root = _root(w)
+        a[:] = 0.0
+        for i in range(n):
+            z = residual[b, i] / np.sqrt(variance[b, i])
+            for j in range(size):
+                a[j] += w[i, j] * z
+        for j in range(size):
+            for k in range(j):
+                a[j] -= root[j, k] * a[k]
+            a[j] /= root[j, j]
+        for j in range(size - 1, -1, -1):
+            for k in range(j + 1, size):
+                a[j] -= root[k, j] * a[k]
+            a[j] /= root[j, j]
+        total, logs = 0.0, 0.0
+        for i in range(n):
+            z = residual[b, i] / np.sqrt(variance[b, i])
+            for j in range(size):
+                z -= w[i, j] * a[j]
+            total += z * z
+            logs += np.log(variance[b, i])
+        for j in range(size):
+            total += a[j] * a[j]
+            logs += 2.0 * np.log(root[j, j])
+        square[b], log_det[b] = total, logs
+    return square, log_det

@@ -1,0 +1,140 @@
+"""Evidence of fits: an effect of no use gains nothing, and Laplace's approximation equals importance sampling."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+from scipy.stats import cauchy, multivariate_t, norm
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
+from bayesmembrane.diagnosis.candidates.evidence import log_inside
+from bayesmembrane.diagnosis.candidates.search import Search, starts_with
+from bayesmembrane.diagnosis.candidates.standard import standard
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.form_error import traces
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.annulus import Annulus
+from tests.diagnosis.curves import triangle, white_noise
+from tests.generator.film import Film
+
+SD, N = 0.004, 90
+PLAIN = hypothesis("neo_hookean")
+EFFECTS = sorted(n for n, e in components("effects").items() if not e.absorbed)
+
+
+def curve(path: Array, seed: int) -> Measurement:
+    film = Film("neo_hookean", (8.0,), 0.010, 0.035, 0.04)
+    force = film.force(path) + SD * np.random.default_rng(seed).standard_normal(path.size)
+    return Measurement(path, force, Annulus(0.010, 0.035), Specimen("film", 5e-5), time=np.arange(1.0, path.size + 1))
+
+
+@pytest.fixture(scope="module")
+def single() -> tuple[Search, Candidate]:
+    m = curve(np.linspace(0.0, 0.03, N + 1)[1:], 3)
+    search = Search(m, white_noise(m, SD, 80.0))
+    found = search.fit(PLAIN, search.material_starts(PLAIN))
+    assert found is not None
+    return search, found
+
+
+def beside(search: Search, plain: Candidate, name: str) -> Candidate:
+    effect = components("effects")[name]()
+    claim = with_effects(plain.hypothesis, [effect])
+    scale = standard(claim, search.measurement).axes[plain.x.size].slope(np.zeros(1))[0]
+    found = search.fit(claim, starts_with([plain.x], effect, float(scale)), plain)
+    assert found is not None
+    return search.polished(found)
+
+
+@pytest.mark.parametrize("name", ["mullins", "permanent_set", "tearing", "clamp_slip"])
+def test_an_effect_that_leaves_no_trace_gains_and_loses_nothing(single, name) -> None:
+    """On a single loading these change nothing, or what the energy's own error has as well."""
+    search, plain = single
+    assert beside(search, plain, name).log_evidence - plain.log_evidence < 0.7
+
+
+def test_softening_on_a_single_loading_has_the_evidence_of_none(single) -> None:
+    search, plain = single
+    assert beside(search, plain, "mullins").log_evidence == pytest.approx(plain.log_evidence, abs=0.05)
+
+
+@pytest.fixture(scope="module")
+def cyclic() -> tuple[Search, Candidate]:
+    m = curve(triangle(N, (0.02, 0.03)), 4)
+    search = Search(m, white_noise(m, SD, 80.0))
+    found = search.fit(PLAIN, search.material_starts(PLAIN))
+    assert found is not None
+    return search, found
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_evidence_equals_importance_sampling(cyclic, name) -> None:
+    """At the size of noise and form error that the fit shows; draws of a wide t about the linear model's posterior."""
+    search, plain = cyclic
+    if not components("effects")[name].occurs_on(search.measurement.rig):
+        pytest.skip("does not occur on this rig")
+    found = beside(search, plain, name)
+    axes = standard(found.hypothesis, search.measurement)
+    u = axes.to_u(found.x)
+    spread = axes.local(u)
+    model = search.linear(found)
+    mean, covariance = model.coefficients(found.theta)
+    k = u.size
+    low, high = axes.bounds
+    low = np.where(axes.one_sided, 0.0, low)
+    own = covariance[:k, :k]
+    inside = log_inside(mean[:k], own, low / spread, high / spread)
+    replaced = axes.log_replaced(u, mean[:k] * spread, np.diag(own) * spread**2)
+    linear = model.log_density(found.theta)[0] + replaced + inside
+    prior_of_sizes = norm.logpdf(found.theta, model.priors[:, 0], model.priors[:, 1]).sum()
+
+    law = multivariate_t(mean[:k] * spread, 1.5 * own * np.outer(spread, spread), df=4, seed=8, allow_singular=True)
+    draws = np.atleast_2d(law.rvs(4000).reshape(4000, k))
+    kept = np.all((draws >= low) & (draws <= high), axis=1)
+    x = axes.to_x(draws[kept])
+    force = Forward(found.hypothesis, search.measurement, search.measurement.deflection)(x, reached=False).force
+    freed = _inverse(search, found)
+    r = search.noise.white((search.measurement.force - np.nan_to_num(force, nan=1e3)).T)
+    log_likelihood = -0.5 * np.sum(r * (freed @ r), axis=0) + 0.5 * np.linalg.slogdet(freed)[1]
+    log_likelihood -= 0.5 * N * np.log(2 * np.pi)
+    log_prior = np.where(axes.heavy, cauchy.logpdf(draws[kept]), norm.logpdf(draws[kept]))
+    within = np.where(axes.heavy, (np.arctan(high) - np.arctan(low)) / np.pi, np.where(axes.one_sided, 0.5, 1.0))
+    log_prior = log_prior.sum(axis=1) - np.log(within).sum()
+    weights = np.full(4000, -np.inf)
+    weights[kept] = log_likelihood + log_prior - law.logpdf(draws[kept])
+    sampled = logsumexp(weights) - np.log(4000) + prior_of_sizes
+    assert linear == pytest.approx(sampled, abs=0.8)
+
+
+def _inverse(search: Search, found: Candidate) -> Array:
+    """(N, N) inverse of noise and form error, freed of noise, at the fit."""
+    eta = np.exp(found.theta)
+    fitted = search.measurement.force - found.residual
+    columns = [eta[1] * fitted[:, None] * search.factors.state]
+    laws = iter(eta[2:])
+    for effect, trace in zip(found.hypothesis.effects, found.traces, strict=True):
+        if not effect.exact:
+            columns.append(next(laws) * trace[:, None] * search.factors.progress)
+    white = search.noise.white(np.column_stack(columns))
+    return np.linalg.inv(eta[0] ** 2 * np.eye(N) + white @ white.T)
+
+
+def test_traces_of_an_exact_effect_are_nothing(cyclic) -> None:
+    search, plain = cyclic
+    found = beside(search, plain, "force_offset")
+    forward = Forward(found.hypothesis, search.measurement, search.measurement.deflection)
+    force = forward(found.x[None, :], reached=False).force
+    assert not np.any(traces(forward, found.x[None, :], force))
+    assert found.law_errors == {}
+
+
+def test_evidence_under_another_noise_is_that_of_a_new_fit(cyclic) -> None:
+    search, plain = cyclic
+    other = replace(search, noise=white_noise(search.measurement, 1.2 * SD, 80.0))
+    anew = other.fit(PLAIN, [plain.x])
+    assert anew is not None
+    assert other.weighed_anew(plain).log_evidence == pytest.approx(other.polished(anew).log_evidence, abs=0.3)

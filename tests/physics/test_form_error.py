@@ -1,0 +1,96 @@
+"""The form error: its processes as low-rank factors, and the traces of effects."""
+
+import numpy as np
+import pytest
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.motion import Motion
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.form_error import (
+    PROGRESS_LENGTHS,
+    STATE_LENGTHS,
+    form_factors,
+    joint_factors,
+    progress,
+    states,
+    traces,
+)
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.annulus import Annulus
+
+LAWS = [name for name, e in components("effects").items() if not e.exact and e.occurs_on(Annulus)]
+EXACT = [name for name, e in components("effects").items() if e.exact and e.occurs_on(Annulus)]
+
+
+def cyclic(points: int = 80) -> Measurement:
+    d = np.interp(np.linspace(0.02, 4, points), [0, 1, 2, 3, 4], [0, 0.02, 0.0, 0.04, 0.001])
+    time = np.arange(1.0, points + 1)
+    return Measurement(d, 100 * d, Annulus(0.010, 0.035), Specimen("film", 50e-6), time=time)
+
+
+def kernel(place: np.ndarray, lengths: tuple[float, ...]) -> np.ndarray:
+    square = np.sum((place[:, None, :] - place[None, :, :]) ** 2, axis=2)
+    return np.mean([np.exp(-0.5 * square / length**2) for length in lengths], axis=0)
+
+
+def test_factors_times_their_transposes_are_the_processes() -> None:
+    m = cyclic()
+    found = form_factors(m)
+    for root, place, lengths in (
+        (found.state, states(m), STATE_LENGTHS),
+        (found.progress, progress(m)[:, None], PROGRESS_LENGTHS),
+    ):
+        assert root.shape[1] < len(m) / 2
+        assert np.sum(root**2, axis=1) == pytest.approx(1.0)
+        np.testing.assert_allclose(root @ root.T, kernel(place, lengths), atol=2e-3)
+
+
+def test_an_energy_errs_alike_on_every_leg_and_a_law_does_not() -> None:
+    m = cyclic()
+    up, down = 50, int(np.argmin(np.abs(m.deflection[60:] - m.deflection[50]))) + 60
+    found = form_factors(m)
+    assert m.leg[up] != m.leg[down]
+    assert found.state[up] @ found.state[down] > 0.99
+    assert found.progress[up] @ found.progress[down] < 0.95
+
+
+def test_joint_factors_are_the_same_process_at_the_readings() -> None:
+    m = cyclic()
+    there = Motion(np.linspace(0.002, 0.05, 25), None, m.full_range)
+    joint, alone = joint_factors(m, there), form_factors(m)
+    n = len(m)
+    for a, b in ((joint.state, alone.state), (joint.progress, alone.progress)):
+        assert len(a) == n + 25
+        np.testing.assert_allclose(a[:n] @ a[:n].T, b @ b.T, atol=4e-3)
+    everywhere = np.concatenate([states(m)[:, 0], there.deflection / m.full_range])[:, None]
+    np.testing.assert_allclose(joint.state @ joint.state.T, kernel(everywhere, STATE_LENGTHS), atol=2e-3)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_trace_is_what_an_effect_changes(name: str) -> None:
+    m, h = cyclic(24), hypothesis("neo_hookean", [name, "force_offset"])
+    forward, plain = Forward(h, m, m.deflection), Forward(hypothesis("neo_hookean"), m, m.deflection)
+    effect = h.effects[0]
+    x = np.array([[np.log(15.0), *effect.typical, 0.0], [np.log(15.0), *effect.null, 0.0]])
+    force = forward(x, reached=False).force
+    found = traces(forward, x, force)
+    alone = plain(x[:, :1], reached=False).force
+    np.testing.assert_allclose(found[0, 0], force[0] - alone[0], atol=1e-6 * np.max(np.abs(force)))
+    assert np.any(found[0, 0] != 0)
+    assert not np.any(found[1, 0])
+    assert not np.any(found[:, 1])
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_what_is_exact_has_no_law_to_be_inferred(name: str) -> None:
+    names = [p.name for p in hypothesis("neo_hookean", [name], "form").parameters]
+    assert names[-2:] == ["noise.ln_sd", "noise.ln_eta"]
+
+
+def test_one_law_that_may_be_off_adds_one_coordinate_however_many_there_are() -> None:
+    one = hypothesis("neo_hookean", LAWS[:1], "form")
+    two = hypothesis("neo_hookean", [*LAWS[:2], *EXACT[:1]], "form")
+    assert one.noise == two.noise
+    assert one.parameters[-1].name == "noise.ln_eta_law"
+    assert one.natural_names[-3:] == ("noise.sd", "noise.eta", "noise.eta_law")
