@@ -75,6 +75,7 @@ def main() -> None:
     parser.add_argument("--rows", type=Path, default=Path("studies/cycles.jsonl"))
     parser.add_argument("--table", type=Path, default=Path("docs/studies/cycles.md"))
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--note", default="", help="what is to be said of the rows")
     asked = parser.parse_args()
     tests = dict(measurements(asked.data))
     if not tests:
@@ -87,7 +88,7 @@ def main() -> None:
                 known.append(row(name, measurement, declared, asked.seed))
                 write_row(asked.rows, known[-1])
                 print(f"{name}, {declared}: {known[-1].verdict} {known[-1].sets}", flush=True)
-    asked.table.write_text(page(known, asked.seed), encoding="utf-8")
+    asked.table.write_text(page(known, asked.seed, asked.note), encoding="utf-8")
 
 
 def measurements(folder: Path) -> Iterator[tuple[str, Measurement]]:

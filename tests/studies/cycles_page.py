@@ -21,11 +21,11 @@ strips of the acrylic tape VHB 4910, loaded once and unloaded at 0.01, 0.03 and 
 Written as measured. Rows that are not here were not run."""
 
 
-def page(rows: Sequence[Row], seed: int) -> str:
+def page(rows: Sequence[Row], seed: int, note: str = "") -> str:
     """Markdown of the whole page."""
     known = [r for r in rows if r.seed == seed]
     declared = list(dict.fromkeys(r.declared for r in known))
-    parts = [HEAD.format(seed=seed), "## In short", _short(known)]
+    parts = [HEAD.format(seed=seed), *([note] if note else []), "## In short", _short(known)]
     for name in declared:
         parts += [f"## {'No energy declared' if name == 'none' else f'Declared: {name}'}", _table(known, name)]
     return "\n\n".join(parts) + "\n"

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.reference.outliers import without_outliers
+from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from bayesmembrane.words.diagnosis import document, sentence
 
 SD = 0.004
 seeds = pytest.mark.parametrize("seed", range(6))
@@ -105,3 +108,22 @@ def test_states_without_an_order_and_few_readings_stay() -> None:
     m = moved(cycles(3), change)
     assert without_outliers(replace(m, across=np.ones(300), rig=Uniaxial()))[1] is None
     assert without_outliers(m.select(np.arange(300) < 40))[1] is None
+
+
+def test_one_reading_changes_no_verdict_and_is_told() -> None:
+    """The answer is that of the other readings, with the count of those that were set aside."""
+    stretch = np.concatenate([np.linspace(1.01, 1.5, 60), np.linspace(1.49, 1.0, 60)])
+    force = 20 * (stretch - stretch**-2) + 0.02 * np.random.default_rng(5).standard_normal(120)
+    force[59] *= 0.9
+    m = Measurement(0.05 * (stretch - 1), force, Uniaxial(), Specimen("strip", 1e-3), time=np.arange(120) + 1.0)
+    found = diagnose(m, hypothesis("neo_hookean"))
+    others = diagnose(m.select(np.arange(120) != 59), hypothesis("neo_hookean"))
+    assert found.set_aside is not None
+    assert found.set_aside.numbers == (60,)
+    assert others.set_aside is None
+    assert found.verdict == others.verdict
+    assert found.noise.sd == others.noise.sd
+    assert found.probabilities == others.probabilities
+    assert document(found)["set_aside_readings"] == 1
+    assert document(others)["set_aside_readings"] == 0
+    assert "Set aside as outliers: 1 of the 120 readings (number 60)" in sentence(found)
