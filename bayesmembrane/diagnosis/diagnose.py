@@ -20,6 +20,7 @@ from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, decid
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
 from bayesmembrane.diagnosis.left.remaining import remaining
 from bayesmembrane.diagnosis.left.shape import residual_shape
+from bayesmembrane.diagnosis.reference.outliers import without_outliers
 from bayesmembrane.diagnosis.result import Diagnosis, thinning
 from bayesmembrane.diagnosis.separation import Experiment, experiments
 from bayesmembrane.diagnosis.thresholds import TINY, VERDICT
@@ -39,13 +40,15 @@ def diagnose(
     """Whether ``hypothesis`` leaves structure in the residual, and how probable each explanation of it is.
 
     A `Question` says whether the energy was declared at all, and whether pairs of effects are to be looked at.
-    A measurement of more readings than `thinning.MOST` is thinned, and so is what the answer holds by reading. Raises
-    `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
+    A measurement of more readings than `thinning.MOST` is thinned, single outliers are set aside, and what the answer
+    holds by reading is of those that are left. Raises `SettingsError` if there are too few points to tell a misfit
+    from noise, or no film reaches the data.
     """
     question = hypothesis if isinstance(hypothesis, Question) else Question(hypothesis)
     part = thinned(measurement)
-    found = _diagnosed(opened(part, question, seed, solve, tell or (lambda _: None)))
-    return replace(found, thinned=thinning(measurement, part))
+    kept, aside = without_outliers(part)
+    found = _diagnosed(opened(kept, question, seed, solve, tell or (lambda _: None)))
+    return replace(found, thinned=thinning(measurement, part), set_aside=aside)
 
 
 def _diagnosed(case: OpenCase) -> Diagnosis:

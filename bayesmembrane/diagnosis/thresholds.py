@@ -58,6 +58,22 @@ class ReferenceThresholds:
 
 
 @dataclass(frozen=True)
+class OutlierThresholds:
+    """When a reading is set aside."""
+
+    reach: float = 6.0
+    """Robust standard deviations off the reference, and off what comes before and after: noise does so never."""
+    share: float = 0.02
+    """Of the readings, at most: more are no outliers but something to be explained, and nothing is set aside."""
+    neighbours: int = 4
+    """Readings on either side whose median counts: up to two outliers in a row do not hide each other."""
+    window: int = 31
+    """Readings around each whose scatter counts, for noise may grow with the force."""
+    least_spare: float = 0.05
+    """Of a reading, what the reference leaves free: one that it follows anyway cannot be seen to be off."""
+
+
+@dataclass(frozen=True)
 class DetectionThresholds:
     """When something is seen to be missing."""
 
@@ -294,6 +310,8 @@ class LoopThresholds:
 class WordsThresholds:
     """From where on something is worth a sentence."""
 
+    listed_readings: int = 6
+    """Of those set aside, the numbers that are told."""
     visible_effects: int = 3
     """Smallest sizes that are told of an adequate model."""
     probable: float = 0.01
@@ -332,6 +350,7 @@ class WordsThresholds:
 
 NOISE = NoiseThresholds()
 REFERENCE = ReferenceThresholds()
+OUTLIERS = OutlierThresholds()
 DETECTION = DetectionThresholds()
 SEARCH = SearchThresholds()
 SIZES = Sizes()
