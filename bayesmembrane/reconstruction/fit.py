@@ -147,7 +147,7 @@ def _step(model: LossModel, here: _Look, damping: Array) -> Array:
     matrix = here.precision + diagonal[:, :, None] * np.eye(diagonal.shape[1])
     step = np.linalg.solve(matrix, here.gradient[:, :, None])[:, :, 0]
     longest = np.max(np.abs(step[:, -len(model.ranges) :]), axis=1)
-    return here.theta + step / np.maximum(1.0, longest)[:, None]
+    return np.asarray(here.theta + step / np.maximum(1.0, longest)[:, None])
 
 
 class _Look(NamedTuple):

@@ -26,6 +26,10 @@ from bayesmembrane.reconstruction.simulations import Simulate, Simulations
 # Laplace's error, is this much in its logarithm.
 EVIDENCE_SD = 2.0
 HOPELESS = 25.0  # ln evidence below the best at which a family is out, whatever its scales
+# Families whose evidences are no further apart than three standard deviations of a difference are not told apart, and
+# none of them has less than this part of the weight.
+TOLD_APART = 3 * np.sqrt(2) * EVIDENCE_SD
+LEAST = 0.05
 BEHIND = 2.0  # ... at which it looks again
 UNLIKELY = 12.0  # the same for a size of its smooth part
 LOOSEN = (4.0, 1.0)
@@ -118,7 +122,7 @@ def place(model: LossModel, family: CurveFamily, start: Mode) -> Placed:
         model, mode = _climb_with(model, family, c, firsts, knobs, loosen)
         c, firsts = mode.theta[: family.size], mode.theta[-len(model.ranges) :]
     for _ in range(ROUNDS):
-        modes = scan(model, [knobs._replace(roughness=np.array([size])) for size in family.sizes], mode)
+        modes = scan(model, [knobs._replace(roughness=np.array([size])) for size in family.sizes], mode, ROUGH_GAIN)
         mode = max(modes, key=lambda m: m.evidence)
         c, firsts, knobs = mode.theta[: family.size], mode.theta[-len(model.ranges) :], mode.knobs
         family, done = family.settled(c)
@@ -147,10 +151,14 @@ def _scanned(placed: Placed) -> Placed:
     """At all settings but those whose size of the smooth part is out."""
     top, ranges = placed.best.evidence, len(placed.model.ranges)
     grid = all_scales(placed.family, ranges)
-    likely = {float(m.knobs.roughness[0]) for m in placed.modes if m.evidence > top - UNLIKELY}
-    modes = scan(placed.model, [k for k in grid if float(k.roughness[0]) in likely], placed.best, ROUGH_GAIN)
+    likely = {_size(m.knobs) for m in placed.modes if m.evidence > top - UNLIKELY}
+    modes = scan(placed.model, [k for k in grid if _size(k) in likely], placed.best, ROUGH_GAIN)
     evidence = float(logsumexp([m.evidence for m in modes]) - np.log(len(grid)))
     return Placed(placed.model, tuple(modes), evidence)
+
+
+def _size(knobs: Knobs) -> float:
+    return float(np.ravel(knobs.roughness)[0])
 
 
 def relative_evidence(placed: Placed, counts: Sequence[tuple[int, ...]], firsts: Array) -> Array:
@@ -173,14 +181,27 @@ def relative_evidence(placed: Placed, counts: Sequence[tuple[int, ...]], firsts:
 
 
 def probabilities(log_evidence: Sequence[float]) -> Array:
-    """(K,) probabilities of families that are equally probable beforehand, E[Z_k / sum Z], ln Z uncertain each.
+    """(K,) probabilities of families that are equally probable beforehand: p_k = l_k + (1 - sum l) E[Z_k / sum Z].
 
     The mean is over independent normal errors of `EVIDENCE_SD`: it keeps a family in the mixture whose evidence is
-    lower by no more than the choice of a prior's width can change it. Quasi-random, so always the same.
+    lower by no more than the choice of a prior's width can change it. Quasi-random, so always the same. l is that of
+    `least_probabilities`.
     """
+    least = least_probabilities(log_evidence)
     points = qmc.Sobol(len(log_evidence), scramble=True, rng=0).random_base2(TRIALS)
     trials = np.asarray(log_evidence) + EVIDENCE_SD * norm.ppf(np.clip(points, 1e-9, 1 - 1e-9))
-    return np.asarray(np.mean(softmax(trials, axis=1), axis=0), dtype=float)
+    weighed = np.asarray(np.mean(softmax(trials, axis=1), axis=0), dtype=float)
+    return least + (1 - np.sum(least)) * weighed
+
+
+def least_probabilities(log_evidence: Sequence[float]) -> Array:
+    """(K,) what a family has whatever its evidence: `LEAST`, or 0 if it is further than `TOLD_APART` below the best.
+
+    Evidences by other means scatter by more than the differences between families that meet the losses. Then the
+    forces that one of them allows are possible, whatever its rank.
+    """
+    near = np.asarray(log_evidence) > np.max(log_evidence) - TOLD_APART
+    return np.where(near, min(LEAST, 1 / np.count_nonzero(near)), 0.0)
 
 
 # ---- what they say together ------------------------------------------------------------------------------------------

@@ -30,11 +30,12 @@ from bayesmembrane.reconstruction.counts import (
     tell_counts,
 )
 from bayesmembrane.reconstruction.families.smooth_logarithm import SmoothLogarithm
-from bayesmembrane.reconstruction.fit import Mode, again, find_mode, scan
+from bayesmembrane.reconstruction.fit import Mode, again, find_mode
 from bayesmembrane.reconstruction.mixture import (
     Placed,
     Told,
     families,
+    least_probabilities,
     mixture,
     moved,
     place_all,
@@ -46,7 +47,7 @@ from bayesmembrane.reconstruction.mixture import (
 from bayesmembrane.reconstruction.model import Knobs, LossModel
 from bayesmembrane.reconstruction.result import FamilyResult, Influence, LossCheck, RangeResult, Reconstruction
 from bayesmembrane.reconstruction.rows import RowCheck, check_row, set_aside, suspect
-from bayesmembrane.reconstruction.scales import NUGGET, all_scales, middle, solver_scales
+from bayesmembrane.reconstruction.scales import NUGGET, middle, solver_scales
 from bayesmembrane.reconstruction.simulations import Simulate, tabulate
 
 NEGLIGIBLE = 2e-3  # probability of a family below which it does not join the mixture
@@ -86,8 +87,7 @@ def reconstruct(table: PublishedTable | None = None, simulate: Simulate | None =
 def curve_of_all_families(model: LossModel, table: PublishedTable, simulate: Simulate) -> Mixed:
     """What all families say together, at given numbers of points and with the rows that are believed."""
     start = find_mode(model, middle(model.curve, len(model.ranges)))
-    mode = max(scan(model, all_scales(model.curve, len(model.ranges)), start), key=lambda m: m.evidence)
-    state = model.evaluate(mode.theta[None], mode.knobs)
+    state = model.evaluate(start.theta[None], start.knobs)
     near = np.array([state.x[0], state.force[0]])
     return _mixed(weigh(place_all(model, families(table, model.simulations, simulate, near), start)))
 
@@ -183,12 +183,14 @@ def _answer(table: PublishedTable, simulate: Simulate, mixed: Mixed, counted: _C
 
 def _families(mixed: Mixed) -> tuple[FamilyResult, ...]:
     best = max(p.log_evidence for p in mixed.placed)
+    least = least_probabilities([p.log_evidence for p in mixed.placed]).tolist()
     found = []
     for k, (p, probability) in enumerate(zip(mixed.placed, mixed.probability.tolist(), strict=True)):
         told = mixed.told.get(k)
         force = None if told is None else told.force
         sd = None if told is None else np.sqrt(np.diag(told.covariance))
-        found.append(FamilyResult(p.family.name, p.family.title, probability, p.log_evidence - best, force, sd))
+        numbers = probability, p.log_evidence - best, least[k]
+        found.append(FamilyResult(p.family.name, p.family.title, *numbers, force, sd))
     return tuple(found)
 
 
@@ -266,7 +268,7 @@ def _uncoupled(model: LossModel, mode: Mode, x: Array) -> Influence:
 def _moved(model: LossModel, mode: Mode, x: Array) -> Array:
     """(N,) forces of a mode at deflections x (N,), moved along its smooth curve."""
     theta = mode.theta[None]
-    return moved(model, theta, mode.knobs, model.evaluate(theta, mode.knobs), x)[0]
+    return np.asarray(moved(model, theta, mode.knobs, model.evaluate(theta, mode.knobs), x)[0])
 
 
 def _scales(table: PublishedTable, modes: Sequence[Mode]) -> dict[str, float]:

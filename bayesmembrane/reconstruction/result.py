@@ -90,6 +90,7 @@ class FamilyResult:
     name, title : how answers call it, how reports print it
     probability : after the losses; families are equally probable before them
     log_evidence : ln p(losses) by Laplace's approximation, relative to the best family
+    least_probability : what it has whatever its evidence, for evidences are not that sure; 0 if it is far behind
     force, force_sd : (N,) N, at the deflections of the reconstruction; None for a family that is not mixed
     """
 
@@ -97,6 +98,7 @@ class FamilyResult:
     title: str
     probability: float
     log_evidence: float
+    least_probability: float
     force: Array | None
     force_sd: Array | None
 
@@ -106,6 +108,7 @@ class FamilyResult:
             "title": self.title,
             "probability": self.probability,
             "log_evidence": self.log_evidence if np.isfinite(self.log_evidence) else None,
+            "least_probability": self.least_probability,
             "force_N": None if self.force is None else self.force.tolist(),
             "sd_N": None if self.force_sd is None else self.force_sd.tolist(),
         }

@@ -11,7 +11,7 @@ from bayesmembrane.ground.registry import material
 from bayesmembrane.reconstruction.families.base import CurveFamily
 from bayesmembrane.reconstruction.families.displaced import SHIFT
 from bayesmembrane.reconstruction.families.energy import half_normal, natural, standard
-from bayesmembrane.reconstruction.mixture import families, mixture, probabilities
+from bayesmembrane.reconstruction.mixture import LEAST, TOLD_APART, families, mixture, probabilities
 from bayesmembrane.reconstruction.reconstruct import simulate_on
 from bayesmembrane.reconstruction.simulations import tabulate
 
@@ -114,3 +114,12 @@ def test_probabilities_know_that_evidence_is_uncertain() -> None:
     assert first + second == pytest.approx(1.0)
     assert probabilities([0.0, -40.0])[1] < 1e-9
     assert np.all(np.diff(probabilities([0.0, -1.0, -2.0, -4.0])) < 0)
+
+
+def test_a_family_that_is_not_told_from_the_best_keeps_a_part_of_the_weight() -> None:
+    near, far = TOLD_APART - 0.1, TOLD_APART + 0.1
+    last = probabilities([0.0, -1.0, -near, -far])
+    assert last[2] > LEAST
+    assert last[3] < LEAST
+    assert np.sum(last) == pytest.approx(1.0)
+    np.testing.assert_allclose(probabilities([0.0] * 40), 1 / 40, rtol=0.1)

@@ -18,7 +18,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.diagnosis.diagnose import diagnose
-from bayesmembrane.diagnosis.explanation.case import Judged
+from bayesmembrane.diagnosis.explanation.total import Judged
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -34,7 +34,7 @@ WORDS = (
     "## Do ranking and effects survive the covariance?",
     "",
     "Made by `python -m tests.studies.paper_curve`. Each energy is fitted to the reconstructed curve, with an offset "
-    "of the deflection zero (prior sd 0.5 mm), a yielding frame, an offset of the force zero, or none of them; with a "
+    "of the deflection zero (prior sd 0.5 mm), an offset of the force zero, or neither; with a "
     "form that is exact, or off by a smooth 2 %. ln Z is Laplace's evidence relative to the best of its column and "
     "range, under the covariance of the smooth logarithm alone and under that of all families of curves.",
 )
@@ -70,7 +70,7 @@ def lines(words: str, name: str, found: Diagnosis, measurement: Measurement) -> 
     best = [j for j in found.ranking if len(j.candidate.names) == 1 and j.candidate.hypothesis.material.name == name]
     r = found.before
     out = [
-        f"| {name} | {words} | none | | | {1e3 * r.rmse_N:.3g} | {r.reduced_chi2:.3g} | | {found.verdict} |",
+        f"| {name} | {words} | none | | | | {1e3 * r.rmse_N:.3g} | {r.reduced_chi2:.3g} | | {found.verdict} |",
     ]
     return out + [line(words, name, j, found, measurement) for j in best[:SHOWN]]
 
@@ -85,7 +85,7 @@ def line(words: str, name: str, j: Judged, found: Diagnosis, measurement: Measur
     edge = " (a parameter at its bound)" if j.candidate.at_bound else ""
     return (
         f"| {name} | {words} | {effect.title} | {size_in_words(value, size.unit)}{edge} | "
-        f"{j.log_evidence - found.null.log_evidence:.1f} | {rms:.3g} | {j.fit.reduced_chi2:.3g} | {1e3 * worth:.3g} | |"
+        f"{j.gain:.1f} | {j.probability:.2f} | {rms:.3g} | {j.reduced_chi2:.3g} | {1e3 * worth:.3g} | |"
     )
 
 
@@ -97,8 +97,9 @@ def page(rows: list[str], sentences: list[str], seed: int) -> str:
         f"Made by `python -m tests.studies.paper_curve --diagnose --seed {seed}`; the reconstructed curve with its "
         "covariance.",
         "",
-        "| material | curve | effect | size | ln K | rms, mN | reduced chi-square | worth at most, mN | verdict |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| material | curve | effect | size | ln K | probability | rms, mN | reduced chi-square | worth at most, mN | "
+        "verdict |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     return "\n".join([*head, *rows, "", "What is said of each:", "", *sentences, ""])
 

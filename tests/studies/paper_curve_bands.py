@@ -1,6 +1,6 @@
 """What the losses say of energies and effects when the curve between them is not sure: part of `paper_curve`.
 
-Each energy, with and without an offset of the zeros or a yielding frame, with an exact form and with one that is off by
+Each energy, with and without an offset of the zeros, with an exact form and with one that is off by
 a few percent, is fitted to the reconstructed curve and judged by Laplace's evidence: under the covariance of the smooth
 logarithm alone, and under that of all families of curves.
 """
@@ -16,7 +16,7 @@ from bayesmembrane.data.published import read_published_table
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import material
 from bayesmembrane.reconstruction.families.displaced import SHIFT
-from bayesmembrane.reconstruction.families.energy import EnergyCurve, standard
+from bayesmembrane.reconstruction.families.energy import TRUST, EnergyCurve, standard
 from bayesmembrane.reconstruction.families.smooth_logarithm import SmoothLogarithm
 from bayesmembrane.reconstruction.model import LossModel
 from bayesmembrane.reconstruction.reconstruct import Mixed, curve_of_all_families, simulate_on
@@ -29,11 +29,14 @@ ZERO = 0.5e-3  # m: the prior that every analysis has for an offset of the zero
 EFFECTS = {
     "none": (False, False, False),
     "zero offset": (True, False, False),
-    "compliance": (False, True, False),
     "force offset": (False, False, True),
 }
 ABSENT = -8.0  # standard normal number of a compliance of nothing
-ROUNDS = 25
+ROUNDS = 60
+SETTLED = 1e-3  # gain of the log posterior that a further step promises: where the climb is over
+BEYOND = 6.0  # standard deviations of the prior of an energy: a film from there on is not looked for
+LONGEST = 1.0  # standard deviations of the prior that a step may go
+TOLD = 0.1  # ... above which the table says that it was not
 WRONG = 3  # the row that contradicts the others
 
 
@@ -53,12 +56,18 @@ class Band:
 
 @dataclass(frozen=True)
 class Judged:
-    """ln Z, chi-square per point, and offset of the zero with its standard deviation, m (nan if there is none)."""
+    """A film at its most probable parameters.
+
+    log_evidence, chi2 : ln Z; chi-square per point
+    shift, shift_sd : offset of the zero, m (nan if there is none)
+    left : gain of the log posterior that a further step promised
+    """
 
     log_evidence: float
     chi2: float
     shift: float
     shift_sd: float
+    left: float
 
 
 def bands() -> tuple[Band, Band]:
@@ -95,9 +104,15 @@ def judge(band: Band, family: EnergyCurve, effect: str, form: str) -> Judged:
         force, _, rates = (v[0] for v in family.force(c[None], size, band.x[None]))
         a = (root @ rates)[:, free]
         precision = a.T @ a + np.diag(1 / sd[free] ** 2)
-        step = np.linalg.solve(precision, a.T @ (root @ (band.force - force)) - c[free] / sd[free] ** 2)
-        here, share = level(c), 1.0
-        while share > 1e-3:
+        gradient = a.T @ (root @ (band.force - force)) - c[free] / sd[free] ** 2
+        step = np.linalg.solve(precision, gradient)
+        left = 0.5 * float(step @ gradient)
+        if left < SETTLED or np.max(np.abs(c[:k])) > BEYOND:
+            break
+        far = family.distance(family.expansion.at + step[:k]) / TRUST
+        here, share = level(c), 1 / max(1.0, far, float(np.max(np.abs(step))) / LONGEST)
+        least = 1e-3 * share
+        while share > least:
             there = c.copy()
             there[free] += share * step
             if level(there) > here:
@@ -106,8 +121,6 @@ def judge(band: Band, family: EnergyCurve, effect: str, form: str) -> Judged:
         else:
             break
         c = there
-        if level(c) - here < 1e-3:
-            break
     count, unknown = band.x.size, int(np.sum(free))
     prior = -float(np.sum(np.log(sd[free]))) - 0.5 * float(np.linalg.slogdet(precision)[1])
     evidence = level(c) + prior - 0.5 * log_det - 0.5 * count * np.log(2 * np.pi)
@@ -115,7 +128,7 @@ def judge(band: Band, family: EnergyCurve, effect: str, form: str) -> Judged:
     place = int(np.sum(free[:k]))
     spread = SHIFT * float(np.sqrt(np.linalg.inv(precision)[place, place])) if free[k] else np.nan
     assert unknown == precision.shape[0]
-    return Judged(evidence, float(z @ z) / count, SHIFT * c[k] if free[k] else np.nan, spread)
+    return Judged(evidence, float(z @ z) / count, SHIFT * c[k] if free[k] else np.nan, spread, left)
 
 
 def lines(alone: Band, together: Band) -> Iterator[str]:
@@ -141,7 +154,8 @@ def lines(alone: Band, together: Band) -> Iterator[str]:
             cells = []
             for j, top_evidence in zip(two, best, strict=True):
                 shift = f"{1e3 * j.shift:+.2f} +- {1e3 * j.shift_sd:.2f}" if np.isfinite(j.shift) else ""
-                cells += [f"{j.log_evidence - top_evidence:.1f}", f"{j.chi2:.2f}", shift]
+                settled = "" if j.left < TOLD else f" (not settled: {j.left:.2g} more)"
+                cells += [f"{j.log_evidence - top_evidence:.1f}{settled}", f"{j.chi2:.2f}", shift]
             yield f"| {words} | {name} | {effect} | {form} | {' | '.join(cells)} |"
 
 
