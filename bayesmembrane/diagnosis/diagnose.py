@@ -115,7 +115,7 @@ def _nearest(found: Verdict, null: Candidate) -> Candidate:
 
 def _predicting(found: Verdict, validation: HeldOut | None) -> Verdict:
     """A model that does not predict the points that were set aside explains nothing, and is not named."""
-    if found.verdict not in ("named", "material") or validation is None:
+    if found.verdict not in ("named", "material", "ambiguous") or validation is None:
         return found
     if validation.covered_after >= VERDICT.least_coverage:
         return found

@@ -192,7 +192,7 @@ class GrowthThresholds:
     """Sets of each size that are searched on with their own form error, at most."""
     polish_reach: float = 25.0
     """ln of the Bayes factor behind the best set of its size, beyond which one is left as it is: that gains less."""
-    energy_reach: float = 15.0
+    energy_reach: float = 30.0
     """ln of the Bayes factor behind the best energy, beyond which one is not tried with further sets of a size."""
     worth: float = 1e-3
     """Of the probability of all smaller sets: below it, larger sets are not looked at."""
