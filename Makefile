@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: help install demo test lint bench study study-loop study-reliability study-second study-fuzz study-seeds clean
+.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-seeds clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -18,6 +18,7 @@ help:
 	@echo "make bench    the table of solver times"
 	@echo "make study    statistical studies, minutes to hours"
 	@echo "make study-loop  diagnosis of synthetic faults, an hour or two; goes on where it was; LOOP='--limit 130' asks for less"
+	@echo "make study-cycles  real cyclic tests with each energy declared and with none, an hour or so; goes on where it was; CYCLES='--declare none' asks for less"
 	@echo "make study-reliability  are probabilities frequencies; hours; goes on where it was; RELIABILITY='--count 60' asks for less"
 	@echo "make study-second  the same on the second generator, once and at the end; SECOND='--count 60' asks for less"
 	@echo "make study-fuzz  500 calls at random, each judged, an hour or so; goes on where it was; FUZZ='--only fit' asks for less"
@@ -60,6 +61,9 @@ study: $(STAMP)
 
 study-loop: $(STAMP)
 	$(PY) -m tests.studies.loop_study --jobs $(PYTEST_WORKERS) $(LOOP)
+
+study-cycles: $(STAMP)
+	$(PY) -m tests.studies.cycles $(CYCLES)
 
 study-reliability: $(STAMP)
 	$(PY) -m tests.studies.reliability --jobs $(PYTEST_WORKERS) --table docs/studies/reliability.md $(RELIABILITY)

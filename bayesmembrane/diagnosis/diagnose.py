@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.thinning import thinned
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
+from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, Tell, opened
 from bayesmembrane.diagnosis.explanation.growth import grown
 from bayesmembrane.diagnosis.explanation.total import Judged, summed
@@ -17,9 +20,10 @@ from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, decid
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
 from bayesmembrane.diagnosis.left.remaining import remaining
 from bayesmembrane.diagnosis.left.shape import residual_shape
+from bayesmembrane.diagnosis.reference.outliers import without_outliers
 from bayesmembrane.diagnosis.result import Diagnosis, thinning
 from bayesmembrane.diagnosis.separation import Experiment, experiments
-from bayesmembrane.diagnosis.thresholds import VERDICT
+from bayesmembrane.diagnosis.thresholds import TINY, VERDICT
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -36,13 +40,15 @@ def diagnose(
     """Whether ``hypothesis`` leaves structure in the residual, and how probable each explanation of it is.
 
     A `Question` says whether the energy was declared at all, and whether pairs of effects are to be looked at.
-    A measurement of more readings than `thinning.MOST` is thinned, and so is what the answer holds by reading. Raises
-    `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
+    A measurement of more readings than `thinning.MOST` is thinned, single outliers are set aside, and what the answer
+    holds by reading is of those that are left. Raises `SettingsError` if there are too few points to tell a misfit
+    from noise, or no film reaches the data.
     """
     question = hypothesis if isinstance(hypothesis, Question) else Question(hypothesis)
     part = thinned(measurement)
-    found = _diagnosed(opened(part, question, seed, solve, tell or (lambda _: None)))
-    return replace(found, thinned=thinning(measurement, part))
+    kept, aside = without_outliers(part)
+    found = _diagnosed(opened(kept, question, seed, solve, tell or (lambda _: None)))
+    return replace(found, thinned=thinning(measurement, part), set_aside=aside)
 
 
 def _diagnosed(case: OpenCase) -> Diagnosis:
@@ -109,7 +115,7 @@ def _nearest(found: Verdict, null: Candidate) -> Candidate:
 
 def _predicting(found: Verdict, validation: HeldOut | None) -> Verdict:
     """A model that does not predict the points that were set aside explains nothing, and is not named."""
-    if found.verdict not in ("named", "material") or validation is None:
+    if found.verdict not in ("named", "material", "ambiguous") or validation is None:
         return found
     if validation.covered_after >= VERDICT.least_coverage:
         return found
@@ -121,7 +127,12 @@ def _validated(case: OpenCase, search: Search, found: Verdict) -> HeldOut | None
     if found.verdict not in ("named", "ambiguous", "material"):
         return validate(search, null, null, [])
     nulls = [j for j in found.ranking[3:] if j.candidate.label == null.label]
-    return validate(search, null, found.members[0].candidate, [*found.ranking[:3], *nulls])
+    return validate(search, null, found.members[0].candidate, [_believed(j) for j in (*found.ranking[:3], *nulls)])
+
+
+def _believed(j: Judged) -> tuple[Candidate, float]:
+    """A candidate, and ln of what was believed of it before the data, up to a constant."""
+    return j.candidate, float(np.log(max(j.probability, TINY))) / BELIEFS.counts - j.log_evidence
 
 
 def _experiments(search: Search, found: Verdict) -> tuple[Experiment, ...]:

@@ -20,6 +20,7 @@ from bayesmembrane.data.thinning import thinned
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.explanation.case import Question, Tell
 from bayesmembrane.diagnosis.left.discrepancy import Discrepancy, discrepancy
+from bayesmembrane.diagnosis.reference.outliers import without_outliers
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned, thinning
 from bayesmembrane.diagnosis.thresholds import LOOP, TINY
 from bayesmembrane.ground.showable import Showable
@@ -115,11 +116,13 @@ def loop(
     A `Question` may leave the energy open: the most probable one is sampled first. Named effects or a better energy
     make the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop,
     and so does a hypothesis that was there before. Of an ambiguous answer the first few are sampled. More readings
-    than `thinning.MOST` are thinned, for all of it. Raises what `sample` and `diagnose` raise.
+    than `thinning.MOST` are thinned and single outliers set aside, for all of it. Raises what `sample` and `diagnose`
+    raise.
     """
     part = thinned(measurement)
     question = hypothesis if isinstance(hypothesis, Question) else Question(hypothesis)
-    closing = _Closing(part, settings or LoopSettings(), tell or (lambda _: None), watch)
+    kept, aside = without_outliers(part)
+    closing = _Closing(kept, settings or LoopSettings(), tell or (lambda _: None), watch)
     found = closing.diagnosed(question)
     noise = _noise_for(found, question.hypothesis) if closing.settings.adapt_noise else question.hypothesis.noise
     stage = closing.sampled(replace(found.null.hypothesis, noise=noise))
@@ -130,7 +133,8 @@ def loop(
         after = closing.sampled(following) if goes_on else stage
         leaders = found.members[: LOOP.leaders] if found.verdict == "ambiguous" else ()
         rivals = [closing.sampled(replace(j.candidate.hypothesis, noise=noise)) for j in leaders]
-        rounds.append(Round(found, stage, after, tuple(rivals)))
+        # The readings that are left have no outliers: what was set aside at the start is told of every round.
+        rounds.append(Round(replace(found, set_aside=aside), stage, after, tuple(rivals)))
         if not goes_on or len(rounds) >= closing.settings.most_rounds:
             break
         seen.add(following.label())

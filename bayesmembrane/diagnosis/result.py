@@ -15,6 +15,7 @@ from bayesmembrane.diagnosis.left.heldout import HeldOut, Misfit
 from bayesmembrane.diagnosis.left.remaining import Remaining
 from bayesmembrane.diagnosis.left.shape import ResidualShape
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
+from bayesmembrane.diagnosis.reference.outliers import SetAside
 from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -57,6 +58,7 @@ class Diagnosis(Showable):
     validation : misfit on points that were set aside, or None
     experiments : what to measure next where rivals are left
     thinned : what was diagnosed of a measurement with too many readings, and what all of the above is about; else None
+    set_aside : single readings that were left out as outliers, of those; else None
     """
 
     verdict: str
@@ -83,6 +85,7 @@ class Diagnosis(Showable):
     validation: HeldOut | None
     experiments: tuple[Experiment, ...]
     thinned: Thinned | None = None
+    set_aside: SetAside | None = None
 
     @property
     def hypothesis(self) -> Hypothesis:

@@ -58,6 +58,22 @@ class ReferenceThresholds:
 
 
 @dataclass(frozen=True)
+class OutlierThresholds:
+    """When a reading is set aside."""
+
+    reach: float = 6.0
+    """Robust standard deviations off the reference, and off what comes before and after: noise does so never."""
+    share: float = 0.02
+    """Of the readings, at most: more are no outliers but something to be explained, and nothing is set aside."""
+    neighbours: int = 4
+    """Readings on either side whose median counts: up to two outliers in a row do not hide each other."""
+    window: int = 31
+    """Readings around each whose scatter counts, for noise may grow with the force."""
+    least_spare: float = 0.05
+    """Of a reading, what the reference leaves free: one that it follows anyway cannot be seen to be off."""
+
+
+@dataclass(frozen=True)
 class DetectionThresholds:
     """When something is seen to be missing."""
 
@@ -176,7 +192,7 @@ class GrowthThresholds:
     """Sets of each size that are searched on with their own form error, at most."""
     polish_reach: float = 25.0
     """ln of the Bayes factor behind the best set of its size, beyond which one is left as it is: that gains less."""
-    energy_reach: float = 15.0
+    energy_reach: float = 30.0
     """ln of the Bayes factor behind the best energy, beyond which one is not tried with further sets of a size."""
     worth: float = 1e-3
     """Of the probability of all smaller sets: below it, larger sets are not looked at."""
@@ -294,6 +310,8 @@ class LoopThresholds:
 class WordsThresholds:
     """From where on something is worth a sentence."""
 
+    listed_readings: int = 6
+    """Of those set aside, the numbers that are told."""
     visible_effects: int = 3
     """Smallest sizes that are told of an adequate model."""
     probable: float = 0.01
@@ -332,6 +350,7 @@ class WordsThresholds:
 
 NOISE = NoiseThresholds()
 REFERENCE = ReferenceThresholds()
+OUTLIERS = OutlierThresholds()
 DETECTION = DetectionThresholds()
 SEARCH = SearchThresholds()
 SIZES = Sizes()

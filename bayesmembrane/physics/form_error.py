@@ -31,7 +31,7 @@ ENERGY = Parameter(
 )
 """eta_a: half of the prior lies below 0.03 %, 95 % within 0.0002 % to 4 %.
 
-So wide that data which need none say so. Where the energy was exact (five films without a fault, even seeds from 700000,
+So wide that data which need none say so. Where the energy was exact (five films without fault, even seeds from 700000,
 `tests/studies/form_intervals.py`), parameters were 3.1 times as uncertain as by white noise with a median of 0.3 % and
 a spread of 1.5, 1.6 times with 0.05 % and 2, 1.4 times with 0.02 % and 2: what counts is how much of the prior lies
 below what such data can tell.

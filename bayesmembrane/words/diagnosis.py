@@ -12,6 +12,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, UNNAMED, WAVE, Foreign
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged
 from bayesmembrane.diagnosis.left.heldout import HeldOut
+from bayesmembrane.diagnosis.reference.outliers import SetAside
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.diagnosis.thresholds import WORDS
@@ -44,6 +45,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
             "energy_error": found.remaining.energy_error,
             "law_errors": dict(found.remaining.law_errors),
         },
+        "set_aside_readings": 0 if found.set_aside is None else len(found.set_aside.numbers),
         "verdict": found.verdict,
         "effects": list(found.effects),
         "material": found.material,
@@ -96,10 +98,11 @@ def document(found: Diagnosis) -> dict[str, Any]:
 def sentence(found: Diagnosis) -> str:
     """What to read first: how probable, the verdict, how large, what remains, what to do; in the units of the rig."""
     thinned = "" if found.thinned is None else f" {thinning_sentence(found.thinned)}"
+    aside = "" if found.set_aside is None else f" {set_aside_sentence(found.set_aside)}"
     parts = [probability_sentence(found), _ANSWERS[found.verdict](found).strip()]
     if found.verdict != "adequate":
         parts.append(remaining_sentence(found))
-    return " ".join(p for p in parts if p) + _noise(found) + thinned
+    return " ".join(p for p in parts if p) + _noise(found) + aside + thinned
 
 
 def probability_sentence(found: Diagnosis) -> str:
@@ -140,6 +143,16 @@ def remaining_sentence(found: Diagnosis) -> str:
     if left.carried >= WORDS.carried:
         return f"{text}; {' and '.join(forms)} would carry it ({factor * left.rms:.2g} {unit})."
     return f"{text}; not even {' and '.join(forms)} would carry all of it."
+
+
+def set_aside_sentence(aside: SetAside) -> str:
+    """How many readings were left out, which, and how far off they are."""
+    count, listed = len(aside.numbers), aside.numbers[: WORDS.listed_readings]
+    which = ", ".join(map(str, listed)) + (", ..." if count > len(listed) else "")
+    return (
+        f"Set aside as outliers: {count} of the {aside.measured} readings (number {which}), up to "
+        f"{aside.farthest:.2g} standard deviations off their neighbours."
+    )
 
 
 def thinning_sentence(thinned: Thinned) -> str:

@@ -170,7 +170,6 @@ DISTORTIONS = {
             0.7,
             0.01,
             {"proportional": {"length": (0.04, 0.25)}, "lead": {"width": (0.1, 0.5)}},
-            False,
         ),
         # ---- what no library holds
         Distortion(

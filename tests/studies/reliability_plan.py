@@ -29,7 +29,6 @@ UNEQUAL = 5.0  # and how much weaker its others are at most
 FAINTEST_FOREIGN, STRONGEST_FOREIGN = 10.0, 60.0
 SMALLER, TRIALS = 0.8, 8  # deflections, where a film locks before
 UNIT = 20.0  # ratio at strength 1
-HYSTERESIS = "hysteresis"
 
 ROUND = (
     *("null", "single", "pair", "foreign", "single", "null", "triple", "pair", "energy", "single"),
@@ -96,7 +95,7 @@ def _designs() -> dict[str, tuple[str, ...]]:
     def mixed(kinds: list[str]) -> tuple[str, ...]:
         return tuple(kinds[i] for i in rng.permutation(len(kinds)))
 
-    effects = (*LIBRARY, *(() if HYSTERESIS in LIBRARY else (HYSTERESIS,)))
+    effects = LIBRARY
     pairs, triples = (["+".join(c) for c in combinations(effects, n)] for n in (2, 3))
     # Outside families twice as often as those of the library under another name.
     energies = [f"typical:{f}" for f in (*FOREIGN_ENERGIES, *FOREIGN_ENERGIES, *DECLARED) if f != "neo_hookean"]

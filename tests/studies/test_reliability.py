@@ -105,6 +105,7 @@ def test_a_case_is_asked_as_it_says_and_kept(monkeypatch, tmp_path, capsys, sour
     monkeypatch.setattr(reliability, "diagnosed", answered)
     monkeypatch.setattr(reliability, "document", lambda found: said)
     monkeypatch.setattr(reliability, "warmed", lambda: None)
+    monkeypatch.setattr(reliability, "terms", lambda found: [("gent", "none", -1.0)])
     file = tmp_path / "results.jsonl"
     halves = ["--half", half] if source == "own" else []
     call = ["--generator", source, *halves, "--count", "2", "--energy", "both", "--results", str(file)]

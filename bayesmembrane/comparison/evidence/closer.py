@@ -29,8 +29,8 @@ class Closer(Problem):
     def __init__(self, problem: Problem, points: Sequence[Array], modes: Modes, rng: np.random.Generator) -> None:
         self.target, self.problem = problem.target, problem
         fitted = [around(x[rng.permutation(len(x))[:MOST]], rng) for x in (*points, *modes.clouds)]
-        share = np.cumprod([1.0, *([BESIDES] * (len(points) - 1))])
-        share = np.concatenate([np.asarray(share / np.sum(share), dtype=float), modes.weights])
+        given = np.array([BESIDES**i for i in range(len(points))])
+        share = np.concatenate([given / np.sum(given), modes.weights])
         g = joined(fitted, share)
         self.q = Mixture(g.log_weights, g.means, WIDER * g.roots, DEGREES)
 

@@ -239,7 +239,7 @@ def starts_with(bases: Sequence[Array], effect: Effect, scale: float) -> list[Ar
     for i, base in enumerate(bases):
         for sign in signs:
             for share in (small, middling) if i == 0 else (small,):
-                for shape in [{}, *effect.starts] if share == small and i == 0 else [{}]:
+                for shape in [{}, *effect.starts] if i == 0 else [{}]:
                     theta = np.array([shape.get(p.name, p.typical) for p in effect.coordinates])
                     theta[0] = (effect.size.null or 0.0) + sign * share * scale
                     out.append(np.concatenate([base, effect.within_bounds(theta)]))

@@ -15,6 +15,9 @@ class Beliefs:
 
     effects: tuple[float, ...] = (0.40, 0.40, 0.15, 0.05)
     """Of none, one, two and three effects beyond those given; sets of one size are equally probable."""
+    counts: float = 0.5
+    """Of every ln Bayes factor: real laws differ from the library's in more ways than the form error knows, so that
+    factors as they come are too sure. Chosen by the log score of the calibration half of `make study-reliability`."""
     foreign: float = 0.15
     """Of something that no effect of the library describes, on top of whatever else is at work."""
     supported: float = 1.0

@@ -187,5 +187,5 @@ def _worth_more(out: Grown, size: int) -> bool:
 
 def _mass(out: Grown, candidates: Iterable[Candidate] | Sequence[Candidate], size: int) -> float:
     visible = len(out.case.visible)
-    every = [c.log_evidence for c in candidates]
+    every = [BELIEFS.counts * c.log_evidence for c in candidates]
     return float(np.logaddexp.reduce(every)) + BELIEFS.log_set(size, visible) if every else -np.inf

@@ -91,14 +91,16 @@ def summed(grown: Grown) -> Total:
     def weight(c: Candidate) -> float:
         size = len(c.names) - len(given)
         energy = BELIEFS.log_energy(c.hypothesis.material.name, case.question.energy, len(case.plain))
-        return c.log_evidence + BELIEFS.log_set(size, visible) + energy
+        return BELIEFS.counts * c.log_evidence + BELIEFS.log_set(size, visible) + energy
 
     every.sort(key=weight, reverse=True)
     found = _foreign(grown, every, given)
     kinds = kinds_of(found)
     nothing = BELIEFS.log_foreign(0) if kinds else 0.0
     terms = [(c, NOTHING, weight(c) + nothing) for c in every]
-    terms += [(f.base, f.kind, weight(f.base) + f.gain + BELIEFS.log_foreign(kinds)) for f in found]
+    # What the data do not speak for is neither seen nor excluded, like a further effect that is idle.
+    seen = [f for f in found if BELIEFS.counts * f.gain > BELIEFS.supported]
+    terms += [(f.base, f.kind, weight(f.base) + BELIEFS.counts * f.gain + BELIEFS.log_foreign(kinds)) for f in seen]
     p = _normalised(np.array([w for _, _, w in terms]))
     judged = [_judged(grown, c, float(q)) for (c, kind, _), q in zip(terms, p, strict=True) if kind == NOTHING]
     owners = _owners(grown, [c for c, kind, _ in terms if kind == NOTHING])
@@ -159,7 +161,8 @@ def _owners(grown: Grown, every: Sequence[Candidate]) -> dict[str, str]:
         out[own] = own
         if smaller:
             less = max(smaller, key=lambda s: best[s].log_evidence)
-            idle = best[less].log_evidence > best[own].log_evidence - BELIEFS.supported
+            gain = best[own].log_evidence - best[less].log_evidence
+            idle = BELIEFS.counts * gain < BELIEFS.supported
             if idle and squares[less] - squares[own] < BELIEFS.takes:
                 out[own] = out[less]
     return {_joined(own): _joined(owner) for own, owner in out.items()}

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
-from bayesmembrane.diagnosis.explanation.total import Judged
-from bayesmembrane.diagnosis.thresholds import HELD_OUT, TINY
+from bayesmembrane.diagnosis.thresholds import HELD_OUT
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.form_error import FormFactors, traces
 from bayesmembrane.physics.forward import Forward
+
+Rivals = Sequence[tuple[Candidate, float]]
+"""Candidates, each with ln of what is believed of it before the data."""
 
 
 @dataclass(frozen=True)
@@ -74,10 +76,10 @@ class HeldOut:
     covered_after: float
 
 
-def validate(search: Search, before: Candidate, after: Candidate, rivals: Sequence[Judged]) -> HeldOut | None:
+def validate(search: Search, before: Candidate, after: Candidate, rivals: Rivals) -> HeldOut | None:
     """Fit to the points that are not held out, and predict those that are; None where there are none, or no film.
 
-    ``rivals`` are weighed by the others with the same beliefs as by all.
+    ``rivals`` come with ln of what is believed of each before the data.
     """
     whole = search.measurement
     mask = held_out(whole)
@@ -85,7 +87,7 @@ def validate(search: Search, before: Candidate, after: Candidate, rivals: Sequen
         return None
     part = _on_the_others(search, mask)
     fits = {}
-    for candidate in {c.label: c for c in (before, after, *(j.candidate for j in rivals))}.values():
+    for candidate in {c.label: c for c in (before, after, *(c for c, _ in rivals))}.values():
         found = part.fit(candidate.hypothesis, [candidate.x], candidate.at(~mask))
         if found is not None:
             fits[candidate.label] = found
@@ -93,7 +95,7 @@ def validate(search: Search, before: Candidate, after: Candidate, rivals: Sequen
         return None
     first, covered_first = _predicted(part, fits[before.label], search, mask)
     last, covered_last = _predicted(part, fits[after.label], search, mask)
-    belief = {j.candidate.label: float(np.log(max(j.probability, TINY))) - j.log_evidence for j in rivals}
+    belief = {c.label: value for c, value in rivals}
     chosen = max(fits, key=lambda label: fits[label].log_evidence + belief.get(label, -np.inf))
     cycles = np.unique(whole.cycle)
     return HeldOut(int(cycles[-1]), cycles.size, first, last, chosen, covered_first, covered_last)

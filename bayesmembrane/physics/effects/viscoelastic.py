@@ -43,6 +43,11 @@ class Viscoelastic(Memory):
         EffectParameter("withstood", "-", "part of a push that does not make it slack", Uniform(0.0, 1.0), (0.0, 1.0)),
     )
 
+    @property
+    def starts(self) -> list[dict[str, float]]:
+        """A broad spectrum is not found from one time alone."""
+        return [{"time": 10.0, "decades": 2.5}, {"time": 100.0, "decades": 2.5}]
+
     def remember(self, p: Array, force: Array, path: Motion) -> Array:
         gap = np.diff(path.clock, prepend=0.0)
         start = np.zeros(len(p))

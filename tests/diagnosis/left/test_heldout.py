@@ -2,11 +2,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.special import softmax
 
 from bayesmembrane.diagnosis.candidates.candidate import with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
-from bayesmembrane.diagnosis.explanation.total import Judged
 from bayesmembrane.diagnosis.left.heldout import held_out, misfit_of, validate
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
@@ -54,9 +52,7 @@ def test_the_right_effect_predicts_the_cycle_that_it_has_not_seen() -> None:
     for h in (plain, drift, friction):
         start = search.material_starts(plain)[0]
         fits.append(search.fit(h, [np.concatenate([start, *(e.typical for e in h.effects)])]))
-    weights = softmax([c.log_evidence for c in fits])
-    rivals = [Judged(c, float(p), 0.0, 1.0, 1.0) for c, p in zip(fits, weights, strict=True)]
-    found = validate(search, fits[0], fits[1], rivals)
+    found = validate(search, fits[0], fits[1], [(c, 0.0) for c in fits])
     assert (found.cycle, found.cycles) == (5, 5)
     assert set_aside(found) == "cycle 5"
     assert found.chosen == fits[1].label

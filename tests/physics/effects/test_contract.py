@@ -18,7 +18,7 @@ from tests.physics.effects.protocols import RIG, force, measured, path, staircas
 EFFECTS = {name: cls() for name, cls in components("effects").items()}
 NAMED = {
     *("zero_offset", "prestretch", "force_offset", "force_drift", "machine_compliance", "clamp_slip", "mullins"),
-    *("viscoelastic", "permanent_set", "tearing", "friction", "rate"),
+    *("viscoelastic", "permanent_set", "tearing", "friction", "rate", "hysteresis"),
 }
 every = pytest.mark.parametrize("effect", EFFECTS.values(), ids=EFFECTS)
 

@@ -1,0 +1,102 @@
+"""Single readings that no reference could follow, as where the grips turn: set aside, and counted.
+
+A reading is set aside if beside the smooth reference it lies `OUTLIERS.reach` robust standard deviations away, and off
+the readings before it and off those after it to the same side. A step, a ripple or a limit moves many readings, and
+each of them has neighbours like it: then nothing is set aside. P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed.
+(2009), 7.2, for residuals over sqrt(1 - leverage).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.reference.noise import orthonormal
+from bayesmembrane.diagnosis.reference.smooth import smooth_reference
+from bayesmembrane.diagnosis.thresholds import OUTLIERS
+from bayesmembrane.ground.parameters import Array
+
+SD_OF_MEDIAN = 1.4826
+"""Standard deviation of normal values over the median of their sizes."""
+
+
+@dataclass(frozen=True)
+class SetAside:
+    """Readings that were left out of a diagnosis.
+
+    numbers : of the readings, from 1, of ``measured`` ones
+    farthest : of them, in robust standard deviations off the reference
+    """
+
+    numbers: tuple[int, ...]
+    measured: int
+    farthest: float
+
+
+def without_outliers(measurement: Measurement) -> tuple[Measurement, SetAside | None]:
+    """The readings that are kept, and what was set aside; all of them, and None, if there is nothing or too much.
+
+    What is kept has no outliers: doing it again changes nothing. States without an order, and readings of a stated
+    covariance, are kept as they are. The film still remembers how it was moved past the others.
+    """
+    n = len(measurement)
+    most = int(OUTLIERS.share * n)
+    if most < 1 or measurement.across is not None or measurement.covariance is not None:
+        return measurement, None
+    keep, part, farthest = np.arange(n), measurement, 0.0
+    while True:
+        off = _off(part)
+        worst = int(np.argmax(off))
+        if off[worst] < OUTLIERS.reach:
+            break
+        if n - keep.size == most:
+            return measurement, None
+        farthest = max(farthest, float(off[worst]))
+        keep = np.delete(keep, worst)
+        part = measurement.select(keep)
+    if keep.size == n:
+        return measurement, None
+    return part, SetAside(tuple(int(i) + 1 for i in np.setdiff1d(np.arange(n), keep)), n, farthest)
+
+
+def _off(m: Measurement) -> Array:
+    """(N,) robust standard deviations by which readings lie off the reference, 0 unless they do so alone.
+
+    Also 0 where the reference follows them anyway: one just after a turn may be the start of a relaxation.
+    """
+    profile = np.ones(len(m)) if m.force_sd is None else m.force_sd
+    q = orthonormal(smooth_reference(m) / profile[:, None])
+    y = m.force / profile
+    spare = 1.0 - np.sum(q**2, axis=1)
+    seen = spare > OUTLIERS.least_spare
+    rest = np.where(seen, y - q @ (q.T @ y), 0.0) / np.sqrt(np.where(seen, spare, 1.0))
+    return np.asarray(_alone(rest) / _scale(rest, 0.0 if m.force_sd is None else 1.0))
+
+
+def _scale(rest: Array, stated: float) -> Array:
+    """(N,) robust standard deviation near each of ``rest`` (N,), no less than that of all, nor than what is stated."""
+    half = min(OUTLIERS.window // 2, (rest.size - 1) // 2)
+    wide = np.pad(np.abs(rest), half, mode="reflect")
+    near = np.median(np.lib.stride_tricks.sliding_window_view(wide, 2 * half + 1), axis=1)
+    floor = max(float(np.median(np.abs(rest))), 1e-12 * float(np.max(np.abs(rest))), 1e-300)
+    return np.asarray(np.maximum(SD_OF_MEDIAN * np.maximum(near, floor), stated))
+
+
+def _alone(rest: Array) -> Array:
+    """(N,) how far values ``rest`` (N,) lie off zero, off those before and off those after, the least of the three; 0
+    where these are to different sides, and at either end.
+    """
+    k, n = OUTLIERS.neighbours, rest.size
+    out = np.zeros(n)
+    if n < 2 * k + 1:
+        return out
+    runs = np.median(np.lib.stride_tricks.sliding_window_view(rest, k), axis=1)
+    here: NDArray[np.intp] = np.arange(k, n - k)
+    before, after = rest[here] - runs[here - k], rest[here] - runs[here + 1]
+    same = (np.sign(before) == np.sign(after)) & (np.sign(before) == np.sign(rest[here]))
+    off = np.minimum(np.abs(rest[here]), np.minimum(np.abs(before), np.abs(after)))
+    out[here] = np.where(same, off, 0.0)
+    return out

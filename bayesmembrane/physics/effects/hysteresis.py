@@ -1,0 +1,73 @@
+"""Friction within the material, as between the fillers of a rubber: loops that know force and way, but no time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesmembrane.data.motion import Motion
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
+
+
+@dataclass(frozen=True)
+class Hysteresis(Carried):
+    """F = F0 (1 + level z), with z = z_r + s u a / (t a + u) on each leg: s = +1 while loading, -1 while unloading.
+
+    u is the way since the reversal, z_r the z there and a = 1 - s z_r what is left to turn; half of it is turned at
+    u = t a. The length is t = travel ((1 - similar) D + similar A), with A the length of the leg before the reversal
+    (D, the full range, for the first loading): the same in all cycles, or small in small cycles. z = 0 at the start.
+
+    The reference's friction is constant in N; here it grows with the force that the film carries.
+    """
+
+    name: ClassVar[str] = "hysteresis"
+    title: ClassVar[str] = "hysteresis of the material"
+    reference: ClassVar[str] = (
+        "M. Berg, Veh. Syst. Dyn. 30 (1998) 197; M. Sjoberg, L. Kari, Nonlinear Dyn. 33 (2003) 323"
+    )
+    signature: ClassVar[str] = (
+        "Unloading below loading in every cycle and at any speed: closed loops whose width grows with the force, that "
+        "do not close at rest and do not remember the largest deflection."
+    )
+    coordinates: ClassVar[tuple[EffectParameter, ...]] = (
+        EffectParameter("level", "-", "half of the width of a loop over the force", HalfNormal(0.1), (0.0, 0.9), 0.0),
+        EffectParameter(
+            "travel",
+            "-",
+            "way after a reversal over which it turns, as part of a leg",
+            LogNormal(0.05, 0.8),
+            (2e-3, 2.0),
+        ),
+        EffectParameter(
+            "similar", "-", "part of that way that is shorter in small cycles", Uniform(0.0, 1.0), (0.0, 1.0)
+        ),
+    )
+
+    def carried(self, p: Array, force: Array, state: FilmState) -> Array:
+        return np.asarray(force * (1.0 + p[:, :1] * turned(p[:, 1:2], p[:, 2:3], state.path)))
+
+
+def turned(travel: Array, similar: Array, path: Motion) -> Array:
+    """z (B, N), -1 to 1, of the `Hysteresis` along a path, with ``travel`` and ``similar`` (B, 1)."""
+    out = np.empty((len(travel), path.deflection.size))
+    before, z = path.full_range, np.zeros((len(travel), 1))
+    for sign, start, part in _legs(path):
+        # How far the leg has come: jitter within it is no way.
+        way = np.maximum.accumulate(np.maximum(sign * (path.deflection[part] - start), 0.0))
+        length = travel * ((1 - similar) * path.full_range + similar * before)
+        rest = 1.0 - sign * z
+        out[:, part] = z + sign * way * rest / np.maximum(length * rest + way, 1e-12 * path.full_range)
+        before, z = float(way[-1]), out[:, part[-1:]]
+    return out
+
+
+def _legs(path: Motion) -> list[tuple[int, float, NDArray[np.intp]]]:
+    """(direction, deflection at which it starts, its points) of every leg; the first loading starts at zero."""
+    ends = np.flatnonzero(np.diff(path.leg)) + 1
+    parts = np.split(np.arange(path.deflection.size), ends)
+    starts = [0.0 if path.leg[0] > 0 else float(path.deflection[0]), *(float(path.deflection[i - 1]) for i in ends)]
+    return [(int(path.leg[part[0]]), start, part) for start, part in zip(starts, parts, strict=True)]

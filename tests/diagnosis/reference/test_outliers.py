@@ -1,0 +1,129 @@
+"""Single readings that nothing could follow are set aside; what moves many of them is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.reference.outliers import without_outliers
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from bayesmembrane.words.diagnosis import document, sentence
+
+SD = 0.004
+seeds = pytest.mark.parametrize("seed", range(6))
+
+
+def cycles(seed: int, sd: float = SD, grows: bool = False) -> Measurement:
+    """Three cycles, 300 readings in all, unloading below loading, with white noise, growing with the force or not."""
+    up, down = np.linspace(0.01, 1.0, 50), np.linspace(0.99, 0.0, 50)
+    d = np.concatenate([peak * way for peak in (0.02, 0.03, 0.04) for way in (up, down)])
+    leg = np.concatenate([s * np.ones(50) for _ in range(3) for s in (1, -1)])
+    force = 40 * d * (1 + 0.05 * leg) + 2e4 * d**3
+    noise = np.random.default_rng(seed).standard_normal(d.size)
+    noisy = force + sd * noise * (force / np.max(force) if grows else 1.0)
+    return Measurement(d, noisy, Annulus(0.010, 0.035), Specimen("film", 5e-5), time=np.arange(d.size) + 1.0)
+
+
+def moved(m: Measurement, change: np.ndarray) -> Measurement:
+    return replace(m, force=m.force + change)
+
+
+@seeds
+@pytest.mark.parametrize("grows", [False, True])
+def test_of_noise_nothing_is_set_aside(seed: int, grows: bool) -> None:
+    m = cycles(seed, grows=grows)
+    part, aside = without_outliers(m)
+    assert aside is None
+    assert part is m
+
+
+@seeds
+def test_one_reading_at_a_turn_or_anywhere_is(seed: int) -> None:
+    for where, size in ((149, -0.15), (255, -0.2), (20, 0.15), (120, 0.15)):
+        change = np.zeros(300)
+        change[where] = size
+        m = moved(cycles(seed), change)
+        part, aside = without_outliers(m)
+        assert aside is not None
+        assert aside.numbers == (where + 1,)
+        assert aside.measured == 300
+        assert aside.farthest > 6
+        assert np.array_equal(part.force, np.delete(m.force, where))
+        assert np.array_equal(part.path.deflection, m.deflection)
+
+
+@seeds
+def test_doing_it_again_changes_nothing(seed: int) -> None:
+    change = np.zeros(300)
+    change[[49, 149, 255]] = 0.2, -0.15, -0.2
+    part, aside = without_outliers(moved(cycles(seed), change))
+    assert aside is not None
+    assert len(aside.numbers) == 3
+    again, nothing = without_outliers(part)
+    assert nothing is None
+    assert again is part
+
+
+@pytest.mark.parametrize("size", [0.02, 0.05, 0.1, 0.3, 1.0])
+@seeds
+def test_a_step_a_ripple_and_a_limit_stay(seed: int, size: float) -> None:
+    m = cycles(seed)
+    number = np.arange(300)
+    limited = np.minimum(m.force, np.max(m.force) * (0.9 - 0.3 * size)) - m.force
+    dropped = size * ((number > 130) & (number < 150))
+    for name, change in {
+        "step": size * (number > 130),
+        "quick ripple": size * np.sin(2 * np.pi * number / 7.3),
+        "slow ripple": size * np.sin(2 * np.pi * number / 23),
+        "limit": limited,
+        "a stretch of readings": dropped,
+        "play": size * (m.leg < 0),
+    }.items():
+        assert without_outliers(moved(m, change))[1] is None, name
+
+
+def test_too_many_are_no_outliers() -> None:
+    change = np.zeros(300)
+    change[15::30] = 0.3
+    m = moved(cycles(1), change)
+    assert without_outliers(m) == (m, None)
+
+
+def test_noise_that_is_stated_is_believed() -> None:
+    change = np.zeros(300)
+    change[77] = 0.15
+    m = moved(cycles(2), change)
+    assert without_outliers(replace(m, force_sd=np.full(300, SD)))[1] is not None
+    assert without_outliers(replace(m, force_sd=np.full(300, 0.06)))[1] is None
+    assert without_outliers(replace(m, covariance=SD**2 * np.eye(300)))[1] is None
+
+
+def test_states_without_an_order_and_few_readings_stay() -> None:
+    change = np.zeros(300)
+    change[77] = 0.15
+    m = moved(cycles(3), change)
+    assert without_outliers(replace(m, across=np.ones(300), rig=Uniaxial()))[1] is None
+    assert without_outliers(m.select(np.arange(300) < 40))[1] is None
+
+
+def test_one_reading_changes_no_verdict_and_is_told() -> None:
+    """The answer is that of the other readings, with the count of those that were set aside."""
+    stretch = np.concatenate([np.linspace(1.01, 1.5, 60), np.linspace(1.49, 1.0, 60)])
+    force = 20 * (stretch - stretch**-2) + 0.02 * np.random.default_rng(5).standard_normal(120)
+    force[59] *= 0.9
+    m = Measurement(0.05 * (stretch - 1), force, Uniaxial(), Specimen("strip", 1e-3), time=np.arange(120) + 1.0)
+    found = diagnose(m, hypothesis("neo_hookean"))
+    others = diagnose(m.select(np.arange(120) != 59), hypothesis("neo_hookean"))
+    assert found.set_aside is not None
+    assert found.set_aside.numbers == (60,)
+    assert others.set_aside is None
+    assert found.verdict == others.verdict
+    assert found.noise.sd == others.noise.sd
+    assert found.probabilities == others.probabilities
+    assert document(found)["set_aside_readings"] == 1
+    assert document(others)["set_aside_readings"] == 0
+    assert "Set aside as outliers: 1 of the 120 readings (number 60)" in sentence(found)

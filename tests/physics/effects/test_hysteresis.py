@@ -1,0 +1,77 @@
+"""Hysteresis of the material: loops that know force and way, and neither time nor the largest deflection."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from bayesmembrane.physics.effects.hysteresis import Hysteresis, turned
+from tests.physics.effects.protocols import force, measured, path, staircase, two_speeds
+
+
+def loop(d: np.ndarray, travel: float = 0.05, similar: float = 0.5) -> np.ndarray:
+    return turned(np.array([[travel]]), np.array([[similar]]), path(d))[0]
+
+
+def triangles(*ends: float, points: int = 200) -> np.ndarray:
+    turns = [0.0, *ends]
+    parts = [np.linspace(a, b, points)[1:] for a, b in pairwise(turns)]
+    return np.concatenate(parts)
+
+
+def test_it_is_the_same_at_any_speed() -> None:
+    d = staircase()
+    slow, quick = (measured(d, k * two_speeds(d)) for k in (1.0, 1e-3))
+    evenly = measured(d, np.arange(d.size) + 1.0)
+    assert np.array_equal(force(slow, "hysteresis"), force(quick, "hysteresis"))
+    assert np.array_equal(force(slow, "hysteresis"), force(evenly, "hysteresis"))
+
+
+def test_loading_lies_above_and_unloading_below_in_every_cycle() -> None:
+    d = staircase()
+    m = measured(d)
+    change = force(m, "hysteresis") / force(m) - 1
+    for cycle in range(1, 5):
+        deep = (m.cycle == cycle) & (m.deflection < 0.6 * np.max(d[m.cycle == cycle]))
+        assert np.all(change[deep & (m.leg < 0)] < 0)
+        late = (m.cycle == cycle) & (m.leg > 0) & (m.deflection > 0.5 * np.max(d[m.cycle == cycle]))
+        assert np.all(change[late] > 0)
+    assert np.max(np.abs(change)) <= Hysteresis().typical[0]
+
+
+def test_repeated_cycles_become_one_closed_loop() -> None:
+    z = loop(triangles(0.04, 0.001, 0.04, 0.001, 0.04, 0.001, 0.04, 0.001))
+    legs = z.reshape(8, -1)
+    assert legs[6] == pytest.approx(legs[4], abs=5e-3)
+    assert legs[7] == pytest.approx(legs[5], abs=5e-3)
+    assert np.mean(legs[6]) > np.mean(legs[7][::-1]) + 0.5
+
+
+def test_a_small_loop_within_a_large_one_is_similar_or_flatter() -> None:
+    """A small cycle turns as far as a large one if lengths go with the cycle, and less if they do not."""
+    d = triangles(0.04, 0.02, 0.025, 0.02, 0.025, 0.02)
+    small = slice(-398, None)
+    scaled, fixed = (np.ptp(loop(d, 0.1, similar)[small]) for similar in (1.0, 0.0))
+    assert scaled > 1.2 * fixed
+
+
+def test_half_is_turned_at_the_length_times_what_is_left() -> None:
+    d = triangles(1.0, 0.0, points=2001)
+    z = loop(d, 0.1, 0.0)
+    assert z[np.argmin(np.abs(d[:2000] - 0.1))] == pytest.approx(0.5, abs=2e-3)
+    assert np.all(np.abs(z) < 1)
+
+
+def test_a_film_at_rest_stays_where_it_is_and_jitter_is_no_way() -> None:
+    rng = np.random.default_rng(3)
+    rising = np.linspace(0.001, 0.04, 100)
+    held = 0.04 - 1e-5 * rng.random(500)
+    z = loop(np.concatenate([rising, held, np.linspace(0.0399, 0.001, 100)]))
+    assert z[99:600] == pytest.approx(np.full(501, z[99]), abs=0.02)
+    assert z[-1] < -0.5
+
+
+def test_a_test_that_begins_with_unloading_has_a_start_too() -> None:
+    z = loop(np.concatenate([np.linspace(0.04, 0.01, 50), np.linspace(0.011, 0.04, 50)]))
+    assert np.all(np.isfinite(z))
+    assert z[49] < -0.5 < 0.3 < z[-1]
