@@ -123,7 +123,7 @@ def test_every_verb_takes_it_and_the_page_shows_it(place: Path) -> None:
     assert valleys["ranges"][0]["parameters"] == ["c1", "c2", "c3"]
     diagnosed = run(place, "diagnose", *STRIP_FILES, *MATERIAL, "--out", "more")
     assert diagnosed["verdict"] == "adequate"
-    assert diagnosed["sentence"].startswith("Isihara describes the curve")
+    assert "Isihara describes the curve" in diagnosed["sentence"]
     looped = run(place, "loop", *STRIP_FILES, *MATERIAL, *BESIDE, "--ess", "50", "--out", "more", "--report", "looped")
     (first,) = looped["rounds"]
     assert first["verdict"] == "adequate"

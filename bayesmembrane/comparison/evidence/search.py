@@ -128,6 +128,8 @@ def density(problem: Problem, v: Array) -> Array:
 
 def _standing_out(v: Array, value: Array, most: int) -> Array:
     """Up to ``most`` of v (n, k) that are higher than their neighbours: half the highest, half from the rest."""
+    if not len(v):
+        return v
     order = np.argsort(-value)
     if v.shape[1] > FEW and order.size > LOOKED_AT:
         # Neighbours are dear in many dimensions: of the lower half of those looked at, only some.

@@ -83,6 +83,8 @@ class Linear:
         square, v = float(np.exp(2 * theta[0])), self.variances(theta)
         m = (r * v) @ r.T
         m[np.diag_indices(p)] += square
+        if not np.all(np.isfinite(m)):  # larger than doubles hold: no size of noise or form error is like that
+            return -1e300, np.zeros(len(theta))
         factor = cho_factor(m, lower=True, check_finite=False)
         a = cho_solve(factor, along, check_finite=False)
         log_det = 2 * float(np.sum(np.log(np.diag(factor[0])))) + 2 * (n - p) * float(theta[0])

@@ -30,7 +30,9 @@ def row(material: str, z: float, elpd: float, off: float = 0.0) -> Row:
         Widened(f"{material}.ln_gd", 0.5, 0.6, 0.05, 900.0, 0.1, None),
         Widened(f"{material}.ln_gd", 2.0, float("nan"), float("nan"), 3.0, 0.1, Unknown.FEW),
     )
-    return Row(material, hypothesis(material), together(pair), loo, None, None, None, widths, (), None, 1, 1.0, (), "")
+    return Row(
+        material, hypothesis(material), together(pair), loo, None, None, None, widths, (), None, 1, 1.0, None, ""
+    )
 
 
 def compared(off: float = 0.0) -> dict[str, Comparison]:
