@@ -142,7 +142,8 @@ def _waves(m: Measurement) -> Array:
 
 
 def _phase(place: Array, frequencies: Array) -> Array:
-    return np.asarray(2 * np.pi * ((place - place.min()) / np.ptp(place))[:, None] * frequencies)
+    span = float(np.ptp(place)) or 1.0  # where the disc stands still, nothing repeats with the deflection
+    return np.asarray(2 * np.pi * ((place - place.min()) / span)[:, None] * frequencies)
 
 
 def _plays(m: Measurement, base: Candidate) -> Array:
