@@ -64,6 +64,8 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
     validation = _validated(case, search, found)
     found = _predicting(found, validation)
     known = found.verdict in ("named", "ambiguous", "material")
+    answer = found.members[0].candidate if known else _nearest(found, _null(case, found))
+    left = remaining(search, answer, _null(case, found))
     found = replace(found, members=_adapted(search, found.members), ranking=_adapted(search, found.ranking))
     null = _null(case, found)
     best = found.members[0].candidate if known else null
@@ -76,7 +78,7 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
         material=best.hypothesis.material.name if found.verdict == "material" else "",
         declared=case.question.declared,
         probabilities=found.probabilities,
-        remaining=remaining(search, best if known else _nearest(found, null), null),
+        remaining=left,
         rig=case.measurement.rig,
         thickness=case.measurement.specimen.thickness,
         detection=case.detection,

@@ -130,8 +130,6 @@ class SearchThresholds:
     """Of the largest singular value: coordinates along directions below it stay where they are."""
     spare_points: int = 3
     """Points beyond the parameters, at least: fewer tell no misfit from noise."""
-    better_null: float = 1.0
-    """ln of the Bayes factor by which another optimum of the plain model counts as better."""
 
 
 @dataclass(frozen=True)
@@ -234,8 +232,6 @@ class VerdictThresholds:
 
     sure: float = 0.95
     """From which an answer is given; sets of an ambiguous one hold as much together."""
-    least_share: float = 0.01
-    """A set that has less is no member of an ambiguous answer, unless it is needed for `sure`."""
     most_members: int = 6
     """Of an ambiguous answer; if more are needed, nothing can be told."""
     carried: float = 0.05

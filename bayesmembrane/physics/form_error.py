@@ -13,6 +13,7 @@ M. C. Kennedy, A. O'Hagan, J. R. Stat. Soc. B 63 (2001) 425; J. Brynjarsdottir, 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ from numpy.typing import ArrayLike
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
+from bayesmembrane.physics.effects.base import Effect
 
 if TYPE_CHECKING:
     from bayesmembrane.physics.forward import Forward
@@ -129,6 +131,14 @@ def smooth_factor(place: Array, lengths: tuple[float, ...]) -> Array:
 def _kernel(a: Array, b: Array, lengths: tuple[float, ...]) -> Array:
     square = np.sum((a[:, None, :] - b[None, :, :]) ** 2, axis=2)
     return np.asarray(np.mean([np.exp(-0.5 * square / length**2) for length in lengths], axis=0))
+
+
+def form_columns(factors: FormFactors, force: Array, effects: Sequence[Effect], traces: Array) -> list[Array]:
+    """Columns (N, m) N that a form error is a sum of, per unit of its relative size: of the energy, with the ``force``
+    (N,) N; then of every effect whose law could be off, with its trace of ``traces`` (E, N) N.
+    """
+    laws = [trace for effect, trace in zip(effects, traces, strict=True) if not effect.exact]
+    return [force[:, None] * factors.state, *(trace[:, None] * factors.progress for trace in laws)]
 
 
 def traces(forward: Forward, x: ArrayLike, force: Array) -> Array:

@@ -27,7 +27,6 @@ class Candidate:
     at_bound : names of coordinates at a bound
     traces : (E, N) N, what each effect changes of the force; zeros for one that has no law that could be off
     theta : (h,) ln of noise over its reference, ln of the relative error of the energy and of every law
-    theta_sd : (h,) their standard deviations
     form : (N,) N, of the residual what the form error carries; the rest is noise
     """
 
@@ -39,7 +38,6 @@ class Candidate:
     at_bound: tuple[str, ...]
     traces: Array
     theta: Array
-    theta_sd: Array
     form: Array
 
     @property

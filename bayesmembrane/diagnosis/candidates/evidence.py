@@ -126,12 +126,10 @@ class Weighed:
     """ln Z of a linear model, and the most probable theta.
 
     theta : (h,) ln s, then ln eta of every block that has one
-    sd : (h,) of theta
     """
 
     log_evidence: float
     theta: Array
-    sd: Array
 
 
 def weighed(model: Linear, start: Array | None = None) -> Weighed:
@@ -154,7 +152,7 @@ def weighed(model: Linear, start: Array | None = None) -> Weighed:
     bend = _curvature(model, theta)
     log_det = float(np.linalg.slogdet(bend)[1])
     value = float(-done.fun) + 0.5 * theta.size * float(np.log(2 * np.pi)) - 0.5 * log_det
-    return Weighed(value, theta, np.sqrt(np.diag(np.linalg.inv(bend))))
+    return Weighed(value, theta)
 
 
 def _curvature(model: Linear, theta: Array) -> Array:

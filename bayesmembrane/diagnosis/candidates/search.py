@@ -13,12 +13,12 @@ from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, log_inside, weighed
-from bayesmembrane.diagnosis.candidates.standard import Standard, standard
+from bayesmembrane.diagnosis.candidates.standard import Standard, expected_size, standard
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.thresholds import FORM, SEARCH, TINY
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.physics.effects.base import Effect
-from bayesmembrane.physics.form_error import ENERGY, LAW, FormFactors, form_factors, traces
+from bayesmembrane.physics.form_error import ENERGY, LAW, FormFactors, form_columns, form_factors, traces
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -123,6 +123,10 @@ class Search:
         taken = np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=SEARCH.rank)[0]
         return np.asarray(candidate.residual - candidate.slopes @ taken)
 
+    def excess(self, candidate: Candidate) -> float:
+        """Squares of its best fit beyond those of noise, in variances of the noise; 0 or more."""
+        return beyond_noise(self.noise.white(self.adapted(candidate)), candidate)
+
     def steepness(self, candidate: Candidate) -> Array:
         """(k,) dx over the coefficients of `linear`."""
         axes = standard(candidate.hypothesis, self.measurement)
@@ -142,24 +146,26 @@ class Search:
 
     # ---- form error ----------------------------------------------------------------------------------------------
 
-    def _forms(self, candidate: Candidate) -> list[Block]:
-        """What the form error of its energy and of its laws could look like, freed of noise."""
+    def _columns(self, candidate: Candidate) -> list[Array]:
+        """What the form error of its energy and of its laws could look like, in N."""
         fitted = self.measurement.force - candidate.residual
-        out = [Block(self.noise.white(fitted[:, None] * self.factors.state), _moments(ENERGY))]
-        for effect, trace in zip(candidate.hypothesis.effects, candidate.traces, strict=True):
-            if not effect.exact:
-                out.append(Block(self.noise.white(trace[:, None] * self.factors.progress), _moments(LAW)))
-        return out
+        return form_columns(self.factors, fitted, candidate.hypothesis.effects, candidate.traces)
+
+    def _forms(self, candidate: Candidate) -> list[Block]:
+        """The same freed of noise, with the priors of their relative sizes."""
+        energy, *laws = (self.noise.white(c) for c in self._columns(candidate))
+        return [Block(energy, _moments(ENERGY)), *(Block(law, _moments(LAW)) for law in laws)]
 
     def _freeing(self, parent: Candidate | None, capped: bool = True) -> Freeing:
         if parent is None:
             force = np.abs(self.measurement.force)[:, None]
             columns = float(np.exp(_moments(ENERGY)[0])) * self.noise.white(force * self.factors.state)
         else:
+            forms = self._forms(parent)
             # A poor parent's form error is large, and would take what the coordinates are to explain.
-            usual = np.array([b.ln_eta[0] for b in self._forms(parent) if b.ln_eta is not None])
+            usual = np.array([b.ln_eta[0] for b in forms if b.ln_eta is not None])
             eta = np.exp(np.minimum(parent.theta[1:], usual) if capped else parent.theta[1:])
-            columns = np.column_stack([e * b.columns for e, b in zip(eta, self._forms(parent), strict=True)])
+            columns = np.column_stack([e * b.columns for e, b in zip(eta, forms, strict=True)])
         q, s, _ = np.linalg.svd(columns, full_matrices=False)
         keep = s > SEARCH.least_form
         return Freeing(self.noise, q[:, keep], 1 - 1 / np.sqrt(1 + s[keep] ** 2))
@@ -191,9 +197,8 @@ class Search:
         trace = traces(forward, x[None, :], r + self.measurement.force)[0]
         nothing = np.zeros(r.shape[1])
         found = Candidate(
-            objective.hypothesis, x, -r[0], slopes, -np.inf, _at_bound(objective, axes, u), trace, np.empty(0),
-            np.empty(0), nothing,
-        )  # fmt: skip
+            objective.hypothesis, x, -r[0], slopes, -np.inf, _at_bound(objective, axes, u), trace, np.empty(0), nothing
+        )
         return self._weighed(found, axes, u)
 
     def _weighed(self, found: Candidate, axes: Standard, u: Array) -> Candidate:
@@ -206,17 +211,13 @@ class Search:
         inside = log_inside(mean[:k], covariance[:k, :k], np.where(axes.one_sided, 0.0, low), high)
         own = mean[:k] * spread, np.diag(covariance)[:k] * spread**2
         replaced = axes.log_replaced(u, *own)
-        form = self._coloured(found, mean[k:])
-        return replace(found, log_evidence=z.log_evidence + replaced + inside, theta=z.theta, theta_sd=z.sd, form=form)
+        form = np.column_stack(self._columns(found)) @ mean[k:]
+        return replace(found, log_evidence=z.log_evidence + replaced + inside, theta=z.theta, form=form)
 
-    def _coloured(self, found: Candidate, coefficients: Array) -> Array:
-        """(N,) N: the form error with these coefficients."""
-        fitted = self.measurement.force - found.residual
-        parts = [fitted[:, None] * self.factors.state]
-        for effect, trace in zip(found.hypothesis.effects, found.traces, strict=True):
-            if not effect.exact:
-                parts.append(trace[:, None] * self.factors.progress)
-        return np.asarray(np.column_stack(parts) @ coefficients)
+
+def beyond_noise(white: Array, candidate: Candidate) -> float:
+    """Squares of residuals (N,), freed of noise, beyond those that noise leaves beside a fit; 0 or more."""
+    return max(float(white @ white) - (white.size - candidate.x.size), 0.0)
 
 
 def _freed(freeing: Freeing, r: Array, j: Array) -> tuple[Array, Array]:
@@ -229,12 +230,12 @@ def _freed(freeing: Freeing, r: Array, j: Array) -> tuple[Array, Array]:
     return out[:, :, 0], out[:, :, 1:]
 
 
-def starts_with(bases: Sequence[Array], effect: Effect, scale: float) -> list[Array]:
-    """Starts for ``bases`` (k,) with one more effect of the expected size ``scale``: from the first a small and a
+def starts_with(bases: Sequence[Array], effect: Effect, measurement: Measurement) -> list[Array]:
+    """Starts for ``bases`` (k,) with one more effect, in parts of its expected size: from the first a small and a
     middling one, from the others a small one, and both signs where both are allowed.
     """
     signs = (1.0,) if effect.size.one_sided else (1.0, -1.0)
-    small, middling = SEARCH.small_share, SEARCH.middling_share
+    small, middling, scale = SEARCH.small_share, SEARCH.middling_share, expected_size(effect, measurement)
     out = []
     for i, base in enumerate(bases):
         for sign in signs:

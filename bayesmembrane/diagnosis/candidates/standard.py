@@ -11,7 +11,7 @@ from scipy.special import ndtr, ndtri
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.thresholds import SIZES
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Parameter, Prior, Uniform
-from bayesmembrane.physics.effects.base import EffectParameter
+from bayesmembrane.physics.effects.base import Effect, EffectParameter
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 FAR = 1e4
@@ -188,6 +188,11 @@ def standard(hypothesis: Hypothesis, measurement: Measurement) -> Standard:
     """Of the coordinates of ``hypothesis`` that shape the curve."""
     scales = size_scales(measurement)
     return Standard(tuple(_axis(p, scales) for p in hypothesis.parameters[: hypothesis.curve_size]))
+
+
+def expected_size(effect: Effect, measurement: Measurement) -> float:
+    """The size of an effect that is expected before the data, in the unit of that parameter."""
+    return float(_axis(effect.size, size_scales(measurement)).slope(np.zeros(1))[0])
 
 
 def size_scales(measurement: Measurement) -> dict[str, float]:

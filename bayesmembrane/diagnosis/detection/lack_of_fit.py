@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, f, ncf, ncx2
+from scipy.stats import chi2, f
 
 from bayesmembrane.diagnosis.reference.noise import Whitened
 from bayesmembrane.diagnosis.thresholds import NOISE, TINY
@@ -28,19 +28,6 @@ class LackOfFit:
     dof: int
     extra: int = 1
     rest: float = np.inf
-
-    def p_if_left(self, part: float, before: LackOfFit) -> float:
-        """P(F >= ratio) if ``part`` of the misfit that ``before`` shows were left: noncentral F or chi-square."""
-        missing = part * max(before.ratio - 1, 0.0) * before.extra
-        if missing == 0:
-            return self.p_value
-        if np.isinf(self.rest):
-            return float(ncx2.sf(self.ratio * self.extra, self.extra, missing))
-        return float(ncf.sf(self.ratio, self.extra, self.rest, missing))
-
-    def part_left_of(self, before: LackOfFit) -> float:
-        """(F - 1) over that of another model: part of its misfit that this one leaves; 0 where it has none."""
-        return max(self.ratio - 1, 0.0) / max(before.ratio - 1, 1e-12) if before.ratio > 1 else 0.0
 
     @property
     def reduced_chi2(self) -> float:

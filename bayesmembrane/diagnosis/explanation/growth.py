@@ -10,7 +10,7 @@ import numpy as np
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import Search, starts_with
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
-from bayesmembrane.diagnosis.candidates.standard import standard
+from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase, renewed
 from bayesmembrane.diagnosis.thresholds import GROWTH
@@ -121,8 +121,8 @@ def first_order(search: Search, base: Candidate, effect: Effect) -> float:
     can follow.
     """
     model = search.linear(base)
-    size = standard(with_effects(base.hypothesis, [effect]), search.measurement).axes[base.x.size].slope(np.zeros(1))[0]
-    slopes = [(slope * float(size), side) for slope, side in slopes_of_effect(search, base, effect)]
+    size = expected_size(effect, search.measurement)
+    slopes = [(slope * size, side) for slope, side in slopes_of_effect(search, base, effect)]
     if not slopes:
         return -np.inf
     white = search.noise.white(np.column_stack([s for s, _ in slopes]))
@@ -138,8 +138,7 @@ def _added(out: Grown, base: Candidate, effect: Effect) -> Candidate | None:
     names = [e.title for e in base.hypothesis.effects if e.name not in out.case.null.names]
     out.case.tell(f"refitting with {' and '.join([*names, effect.title])}")
     hypothesis = with_effects(base.hypothesis, [effect])
-    scale = float(standard(hypothesis, out.case.measurement).axes[base.x.size].slope(np.zeros(1))[0])
-    return out.search.fit(hypothesis, starts_with(_bases(out, base), effect, scale), base)
+    return out.search.fit(hypothesis, starts_with(_bases(out, base), effect, out.case.measurement), base)
 
 
 def _bases(out: Grown, base: Candidate) -> list[Array]:

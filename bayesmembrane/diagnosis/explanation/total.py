@@ -16,7 +16,7 @@ from bayesmembrane.diagnosis.explanation.growth import Grown
 from bayesmembrane.diagnosis.thresholds import FOREIGN
 from bayesmembrane.ground.parameters import Array
 
-Key = TypeVar("Key")
+Named = TypeVar("Named")
 
 NOTHING = "none"
 """No effect; nothing foreign."""
@@ -130,7 +130,7 @@ def _normalised(log_weights: Array) -> Array:
     return np.asarray(p / np.sum(p))
 
 
-def _falling(p: Mapping[Key, float]) -> dict[Key, float]:
+def _falling(p: Mapping[Named, float]) -> dict[Named, float]:
     return dict(sorted(p.items(), key=lambda i: -i[1]))
 
 
@@ -154,7 +154,7 @@ def _owners(grown: Grown, every: Sequence[Candidate]) -> dict[str, str]:
         own = frozenset(c.names) - given
         if own not in best or c.log_evidence > best[own].log_evidence:
             best[own] = c
-    squares = {own: _excess(grown, c) for own, c in best.items()}
+    squares = {own: grown.search.excess(c) for own, c in best.items()}
     out: dict[frozenset[str], frozenset[str]] = {}
     for own in sorted(best, key=len):
         smaller = [own - {e} for e in own if own - {e} in best]
@@ -174,7 +174,7 @@ def _joined(names: frozenset[str]) -> str:
 
 def _judged(grown: Grown, c: Candidate, probability: float) -> Judged:
     null = grown.found[(grown.case.null.hypothesis.material.name, frozenset(grown.case.null.names))]
-    left, before = _excess(grown, c), _excess(grown, null)
+    left, before = grown.search.excess(c), grown.search.excess(null)
     n = c.residual.size
     return Judged(
         c,
@@ -183,9 +183,3 @@ def _judged(grown: Grown, c: Candidate, probability: float) -> Judged:
         min(left / before, 1.0) if before > 0 else 0.0,
         (left + n - c.x.size) / max(n - c.x.size, 1),
     )
-
-
-def _excess(grown: Grown, c: Candidate) -> float:
-    """Squares beyond those of noise, over its variance; 0 or more."""
-    white = grown.search.noise.white(grown.search.adapted(c))
-    return max(float(white @ white) - (c.residual.size - c.x.size), 0.0)

@@ -36,7 +36,8 @@ class Verdict:
 def adequate(case: OpenCase) -> Verdict:
     """The tests see nothing. What single effects could still be there is told to first order."""
     null = case.null
-    judged = Judged(null, 1.0, 0.0, 1.0, _reduced(case, null))
+    dof = max(null.residual.size - null.x.size, 1)
+    judged = Judged(null, 1.0, 0.0, 1.0, case.search.excess(null) / dof + 1)
     return Verdict("adequate", (judged,), (judged,), _first_order(case))
 
 
@@ -111,8 +112,3 @@ def _shares(log_weights: dict[str, float]) -> dict[str, float]:
     w = np.array(list(log_weights.values()))
     p = np.exp(w - np.logaddexp.reduce(w))
     return dict(sorted(zip(log_weights, map(float, p), strict=True), key=lambda i: -i[1]))
-
-
-def _reduced(case: OpenCase, c: Candidate) -> float:
-    white = case.search.noise.white(c.residual)
-    return float(white @ white) / max(c.residual.size - c.x.size, 1)

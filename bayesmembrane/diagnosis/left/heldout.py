@@ -13,7 +13,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.thresholds import HELD_OUT
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.form_error import FormFactors, traces
+from bayesmembrane.physics.form_error import FormFactors, form_columns, traces
 from bayesmembrane.physics.forward import Forward
 
 Rivals = Sequence[tuple[Candidate, float]]
@@ -117,10 +117,9 @@ def _predicted(part: Search, fit: Candidate, search: Search, mask: NDArray[np.bo
     new = forward(fit.x[None, :], sensitivities=True, reached=False)
     assert new.sensitivity is not None
     force = np.nan_to_num(new.force[0])
-    columns = [np.nan_to_num(new.sensitivity[0]) * part.steepness(fit), force[:, None] * search.factors.state]
-    for effect, trace in zip(fit.hypothesis.effects, traces(forward, fit.x[None, :], force[None, :])[0], strict=True):
-        if not effect.exact:
-            columns.append(trace[:, None] * search.factors.progress)
+    own = np.nan_to_num(new.sensitivity[0]) * part.steepness(fit)
+    trace = traces(forward, fit.x[None, :], force[None, :])[0]
+    columns = [own, *form_columns(search.factors, force, fit.hypothesis.effects, trace)]
     here = np.column_stack(columns)[mask]
     mean, covariance = part.linear(fit).coefficients(fit.theta)
     k = fit.x.size

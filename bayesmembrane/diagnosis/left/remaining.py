@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
-from bayesmembrane.diagnosis.candidates.search import Search
-from bayesmembrane.ground.parameters import Array
+from bayesmembrane.diagnosis.candidates.search import Search, beyond_noise
 
 
 @dataclass(frozen=True)
@@ -33,22 +32,15 @@ class Remaining:
 
 
 def remaining(search: Search, model: Candidate, plain: Candidate) -> Remaining:
-    """What ``model`` leaves, beside what the ``plain`` one does."""
-    white = search.noise.white
+    """What ``model`` leaves, beside what the ``plain`` one does; both as they were fitted, with their form error."""
     dof = max(model.residual.size - model.x.size, 1)
-    adapted = search.adapted(model)
-    left, before = _beyond(white(adapted), model), _beyond(white(search.adapted(plain)), plain)
-    rest = _beyond(white(model.residual - model.form), model)
+    left, before = search.excess(model), search.excess(plain)
+    rest = beyond_noise(search.noise.white(model.residual - model.form), model)
     return Remaining(
         share=float(np.clip(left / before, 0.0, 1.0)) if before > 0 else 0.0,
-        reduced_chi2=float(np.sum(white(adapted) ** 2)) / dof,
+        reduced_chi2=float(np.sum(search.noise.white(search.adapted(model)) ** 2)) / dof,
         carried=1 - min(rest / left, 1.0) if left > 0 else 0.0,
         rms=float(np.sqrt(np.mean(model.form**2))),
         energy_error=model.energy_error,
         law_errors=model.law_errors,
     )
-
-
-def _beyond(white: Array, model: Candidate) -> float:
-    """Squares beyond those of noise alone."""
-    return max(float(white @ white) - (white.size - model.x.size), 0.0)

@@ -44,8 +44,7 @@ def single() -> tuple[Search, Candidate]:
 def beside(search: Search, plain: Candidate, name: str) -> Candidate:
     effect = components("effects")[name]()
     claim = with_effects(plain.hypothesis, [effect])
-    scale = standard(claim, search.measurement).axes[plain.x.size].slope(np.zeros(1))[0]
-    found = search.fit(claim, starts_with([plain.x], effect, float(scale)), plain)
+    found = search.fit(claim, starts_with([plain.x], effect, search.measurement), plain)
     assert found is not None
     return search.polished(found)
 
