@@ -349,6 +349,11 @@ def _model(candidate: Candidate) -> str:
 
 
 def _misses(found: Diagnosis) -> str:
+    if found.detection.adequate:
+        return (
+            f"{_model(found.null)} follows the curve (p = {found.detection.p_value:.2g}), but with parameters that "
+            "are less probable than another explanation: "
+        )
     return f"{_model(found.null)} misses something (p {_p(found)}): "
 
 
