@@ -233,7 +233,7 @@ class VerdictThresholds:
     sure: float = 0.95
     """From which an answer is given; sets of an ambiguous one hold as much together."""
     most_members: int = 6
-    """Of an ambiguous answer; if more are needed, nothing can be told."""
+    """Of an ambiguous answer; if more are needed and no effect is sure to be among them, nothing can be told."""
     carried: float = 0.05
     """Relative error of an energy from which on none of those known is said to hold."""
     law_carried: float = 0.35

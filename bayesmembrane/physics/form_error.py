@@ -50,6 +50,14 @@ LAW = Parameter(
 another one.
 """
 
+LOCAL = Parameter(
+    "ln_eta_local", "-", "log of the relative error where a test starts, turns or goes slack",
+    Normal(float(np.log(1e-3)), 1.5), (-17.0, float(np.log(0.1))),
+)  # fmt: skip
+"""eta_l, of the largest force: half of the prior lies below 0.1 %, 95 % within 0.005 % to 2 %. No drive starts or turns
+at once, and no film goes slack at once.
+"""
+
 STATE_LENGTHS = (0.15, 0.3, 0.6)
 """Of the whole range: over how much deflection the error of an energy changes. Equal parts of its variance."""
 PROGRESS_LENGTHS = (0.3, 1.0, 3.0)
@@ -58,6 +66,10 @@ DECADE = 0.3
 """Of the whole range: how much of the way a decade of time counts in a hold, where the disc stands still."""
 KNOTS = 240
 """Points at which the process is taken apart; between them it is interpolated by its own covariance."""
+AFTER = 2
+"""Readings after the start or a turn, and that at it, of which a law of a steady motion does not hold to all digits."""
+SLACK = 0.04
+"""Of the largest force: below it an unloading film is about to go slack."""
 LEAST = 1e-5
 """Of the variance of the process: what a further column would add is left out below it."""
 
@@ -68,10 +80,12 @@ class FormFactors:
 
     state : (N, r) of an energy's error
     progress : (N, q) of a law's error
+    local : (N, m) a column for every reading at which a test starts, turns or goes slack; without any, None
     """
 
     state: Array
     progress: Array
+    local: Array | None = None
 
 
 def form_factors(measurement: Measurement) -> FormFactors:
@@ -79,7 +93,19 @@ def form_factors(measurement: Measurement) -> FormFactors:
     return FormFactors(
         smooth_factor(states(measurement), STATE_LENGTHS),
         smooth_factor(progress(measurement)[:, None], PROGRESS_LENGTHS),
+        np.eye(len(measurement))[:, unsteady(measurement)],
     )
+
+
+def unsteady(measurement: Measurement) -> Array:
+    """Numbers of the readings at which the test starts, turns, or goes slack."""
+    leg, n = measurement.leg, len(measurement)
+    moves = np.flatnonzero(leg != 0)
+    turns = moves[1:][np.diff(leg[moves]) != 0]
+    near = {i + j for i in (0, *turns) for j in range(AFTER + 1)} | {i - 1 for i in turns}
+    force = np.abs(measurement.force)
+    ends = np.flatnonzero((leg < 0) & (force < SLACK * np.max(force)))
+    return np.array(sorted(i for i in near | set(ends.tolist()) if 0 <= i < n), dtype=int)
 
 
 def joint_factors(measurement: Measurement, there: Motion) -> FormFactors:
@@ -141,10 +167,12 @@ def _kernel(a: Array, b: Array, lengths: tuple[float, ...]) -> Array:
 
 def form_columns(factors: FormFactors, force: Array, effects: Sequence[Effect], traces: Array) -> list[Array]:
     """Columns (N, m) N that a form error is a sum of, per unit of its relative size: of the energy, with the ``force``
-    (N,) N; then of every effect whose law could be off, with its trace of ``traces`` (E, N) N.
+    (N,) N; then of every effect whose law could be off, with its trace of ``traces`` (E, N) N; at last of what
+    is not steady.
     """
     laws = [trace for effect, trace in zip(effects, traces, strict=True) if not effect.exact]
-    return [force[:, None] * factors.state, *(trace[:, None] * factors.progress for trace in laws)]
+    local = [] if factors.local is None else [float(np.max(np.abs(force))) * factors.local]
+    return [force[:, None] * factors.state, *(trace[:, None] * factors.progress for trace in laws), *local]
 
 
 def traces(forward: Forward, x: ArrayLike, force: Array) -> Array:

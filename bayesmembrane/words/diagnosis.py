@@ -301,7 +301,7 @@ def _member(j: Judged, found: Diagnosis) -> str:
 
 def _unknown(found: Diagnosis) -> str:
     waves, units = found.detection.periodicity, _units(found)
-    if found.foreign is not None:
+    if found.foreign is not None and found.probabilities.foreign.get(NOTHING, 1.0) < 0.5:
         base = found.foreign.base.names
         beside = f" beside {' and '.join(effect_title(n) for n in base)}" if base else ""
         return (

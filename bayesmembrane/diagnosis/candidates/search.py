@@ -18,7 +18,7 @@ from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.thresholds import FORM, SEARCH, TINY
 from bayesmembrane.ground.parameters import Array, Normal, Parameter, frozen
 from bayesmembrane.physics.effects.base import Effect
-from bayesmembrane.physics.form_error import ENERGY, LAW, FormFactors, form_columns, form_factors, traces
+from bayesmembrane.physics.form_error import ENERGY, LAW, LOCAL, FormFactors, form_columns, form_factors, traces
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -90,15 +90,16 @@ class Search:
         return self._candidate(objective, axes, u[int(np.argmin(size))])
 
     def polished(self, found: Candidate) -> Candidate:
-        """The same hypothesis, searched on from where it is with the form error that it shows."""
+        """The same hypothesis, searched on from where it is with the form error that it shows.
+
+        The end counts even if its evidence is less: that of the start rests on a linear model far from where it holds.
+        """
         objective = Objective(found.hypothesis, self.measurement, "euclidean", self.quick)
         axes = standard(found.hypothesis, self.measurement)
         u, size = self._descended(
             objective, axes, self._freeing(found, False), axes.to_u(found.x)[None, :], SEARCH.last_iterations
         )
-        if not np.isfinite(size[0]):
-            return found
-        return max(found, self._candidate(objective, axes, u[0]), key=lambda c: c.log_evidence)
+        return self._candidate(objective, axes, u[0]) if np.isfinite(size[0]) else found
 
     def weighed_anew(self, candidate: Candidate) -> Candidate:
         """The same fit under the present noise: its evidence moves with it, and the linear model says how."""
@@ -153,13 +154,16 @@ class Search:
 
     def _forms(self, candidate: Candidate) -> list[Block]:
         """The same freed of noise, with the priors of their relative sizes."""
-        energy, *laws = (self.noise.white(c) for c in self._columns(candidate))
-        return [_form(energy, ENERGY), *(_form(law, LAW) for law in laws)]
+        white = [self.noise.white(c) for c in self._columns(candidate)]
+        local = [] if self.factors.local is None else [LOCAL]
+        sizes = [ENERGY, *[LAW] * (len(white) - 1 - len(local)), *local]
+        return [_form(columns, size) for columns, size in zip(white, sizes, strict=True)]
 
     def _freeing(self, parent: Candidate | None, capped: bool = True) -> Freeing:
         if parent is None:
-            force = np.abs(self.measurement.force)[:, None]
-            columns = float(np.exp(_moments(ENERGY)[0])) * self.noise.white(force * self.factors.state)
+            usual = np.exp([_moments(size)[0] for size in (ENERGY, LOCAL)])
+            made = form_columns(self.factors, np.abs(self.measurement.force), (), np.empty((0, len(self.measurement))))
+            columns = np.column_stack([eta * self.noise.white(c) for eta, c in zip(usual, made, strict=False)])
         else:
             forms = self._forms(parent)
             # A poor parent's form error is large, and would take what the coordinates are to explain.

@@ -38,7 +38,7 @@ class Grown:
         """Keep the better of two fits of one hypothesis."""
         if candidate is None:
             return
-        key = (candidate.hypothesis.material.name, frozenset(candidate.names))
+        key = _key(candidate)
         if key not in self.found or candidate.log_evidence > self.found[key].log_evidence:
             self.found[key] = candidate
 
@@ -61,13 +61,17 @@ class Grown:
         every = self.best_of_each_set(size)[: GROWTH.polished]
         for c in every:
             if every[0].log_evidence - c.log_evidence < GROWTH.polish_reach:
-                self.add(self.search.polished(c))
+                self.found[_key(c)] = self.search.polished(c)
 
     def renew(self) -> None:
         """Noise from the best candidate, and all of them weighed under it."""
         best = max(self.found.values(), key=lambda c: c.log_evidence)
         self.search = renewed(self.search, self.case.smooth, best)
         self.found = {key: self.search.weighed_anew(c) for key, c in self.found.items()}
+
+
+def _key(candidate: Candidate) -> Key:
+    return candidate.hypothesis.material.name, frozenset(candidate.names)
 
 
 def grown(case: OpenCase) -> Grown:

@@ -56,7 +56,8 @@ def decided(case: OpenCase, total: Total) -> Verdict:
     members = tuple(best[name] for name in _smallest(p.effects) if name in best)
     unknown = Verdict("unknown", (), total.ranking, p, strange)
     sure = p.foreign.get(NOTHING, 1.0) < 0.5
-    if not members or len(members) > VERDICT.most_members:
+    certain = any(p.of_effect(n) >= VERDICT.sure for n in (members[0].candidate.names if members else ()))
+    if not members or (len(members) > VERDICT.most_members and not certain):
         return unknown
     first = members[0]
     if sure and strange is not None and strange.share * first.unexplained > VERDICT.foreign_carries:

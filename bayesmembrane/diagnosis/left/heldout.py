@@ -90,7 +90,7 @@ def validate(search: Search, before: Candidate, after: Candidate, rivals: Rivals
     for candidate in {c.label: c for c in (before, after, *(c for c, _ in rivals))}.values():
         found = part.fit(candidate.hypothesis, [candidate.x], candidate.at(~mask))
         if found is not None:
-            fits[candidate.label] = found
+            fits[candidate.label] = part.polished(found)
     if before.label not in fits or after.label not in fits:
         return None
     first, covered_first = _predicted(part, fits[before.label], search, mask)
@@ -103,7 +103,9 @@ def validate(search: Search, before: Candidate, after: Candidate, rivals: Rivals
 
 def _on_the_others(search: Search, mask: NDArray[np.bool_]) -> Search:
     seen = search.measurement.select(~mask)
-    factors = FormFactors(search.factors.state[~mask], search.factors.progress[~mask])
+    whole = search.factors
+    local = None if whole.local is None else whole.local[~mask]
+    factors = FormFactors(whole.state[~mask], whole.progress[~mask], local)
     return replace(search, measurement=seen, noise=search.noise.part(seen, ~mask), known_factors=factors)
 
 
