@@ -11,8 +11,9 @@ from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.base import Rig
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
-from bayesmembrane.words.diagnosis import SCALES, size_in_words, thinning_sentence
+from bayesmembrane.words.diagnosis import thinning_sentence
 from bayesmembrane.words.shape import shape_in_words
+from bayesmembrane.words.units import SCALES, size_in_words
 
 THICKNESS = 1e-3
 STRETCH = np.concatenate([np.linspace(1.01, 1.5, 30), np.linspace(1.49, 1.01, 30)])

@@ -4,50 +4,60 @@ from __future__ import annotations
 
 import math
 
+from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.left.heldout import Misfit
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.registry import components
 from bayesmembrane.report.blocks import Column, Table, Value
 from bayesmembrane.words.candidates import candidate_title, sizes
-from bayesmembrane.words.diagnosis import set_aside, size_in_words
+from bayesmembrane.words.diagnosis import set_aside
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import spoken_parameter
+from bayesmembrane.words.seen import Seen, seen
+from bayesmembrane.words.units import size_in_words
 
 MOST_CANDIDATES = 20
 
-ERRORS = (
-    Column("model", "model"),
-    Column("rmse_mN", "root mean square (mN)", ".3g"),
-    Column("max_mN", "largest (mN)", ".3g"),
-    Column("reduced_chi2", "reduced chi-square", ".3f"),
-    Column("heldout_rmse_mN", "held out: root mean square (mN)", ".3g"),
-    Column("heldout_max_mN", "held out: largest (mN)", ".3g"),
-    Column("heldout_reduced_chi2", "held out: reduced chi-square", ".3f"),
-    Column("heldout_coverage_90", "held out: inside the 90 % band", "%"),
-)
+
+def error_columns(how: Seen) -> tuple[Column, ...]:
+    """Those of a table of errors, in the unit of what models leave."""
+    unit = how.small[1]
+    return (
+        Column("model", "model"),
+        Column(f"rmse_{unit}", f"root mean square ({unit})", ".3g"),
+        Column(f"max_{unit}", f"largest ({unit})", ".3g"),
+        Column("reduced_chi2", "reduced chi-square", ".3f"),
+        Column(f"heldout_rmse_{unit}", f"held out: root mean square ({unit})", ".3g"),
+        Column(f"heldout_max_{unit}", f"held out: largest ({unit})", ".3g"),
+        Column("heldout_reduced_chi2", "held out: reduced chi-square", ".3f"),
+        Column("heldout_coverage_90", "held out: inside the 90 % band", "%"),
+    )
 
 
 def errors_caption(where: str) -> str:
     """What a table of errors says; ``where`` : which points were held out."""
     return (
-        "Residuals before and after, by the measurement's own noise (a reduced chi-square of 1 is noise alone). Held "
+        "Errors before and after, chi-square by the noise (a reduced chi-square of 1 is noise alone). Held "
         f"out: {where}; predicted by the model fitted to the other points."
     )
 
 
-def error_cells(error: Misfit | None) -> tuple[Value, ...]:
+def error_cells(error: Misfit | None, how: Seen) -> tuple[Value, ...]:
     """An error in three cells."""
-    return (None, None, None) if error is None else (1e3 * error.rmse_N, 1e3 * error.max_N, error.reduced_chi2)
+    if error is None:
+        return (None, None, None)
+    factor = how.small[0]
+    return (factor * error.rmse_N, factor * error.max_N, error.reduced_chi2)
 
 
 def before_and_after(d: Diagnosis, name: str) -> Table:
     """Errors of the model as given and, if something was found, of the most probable one."""
-    v = d.validation
+    v, how = d.validation, seen(d.measurement)
     rows = [
         (
             spoken(d.null.hypothesis),
-            *error_cells(d.before),
-            *error_cells(v.before if v else None),
+            *error_cells(d.before, how),
+            *error_cells(v.before if v else None, how),
             v.covered_before if v else None,
         )
     ]
@@ -55,12 +65,12 @@ def before_and_after(d: Diagnosis, name: str) -> Table:
         rows.append(
             (
                 spoken(d.best.hypothesis),
-                *error_cells(d.after),
-                *error_cells(v.after if v else None),
+                *error_cells(d.after, how),
+                *error_cells(v.after if v else None, how),
                 v.covered_after if v else None,
             )
         )
-    return Table(name, errors_caption(set_aside(v)), ERRORS, tuple(rows))
+    return Table(name, errors_caption(set_aside(v)), error_columns(how), tuple(rows))
 
 
 def ranking_table(d: Diagnosis, name: str) -> Table:
@@ -84,7 +94,7 @@ def ranking_table(d: Diagnosis, name: str) -> Table:
         rows.append(
             (
                 candidate_title(c, d.null),
-                ", ".join(sizes(c, d.null)) or "-",
+                ", ".join(sizes(c, d)) or "-",
                 j.probability,
                 j.gain,
                 j.unexplained,
@@ -128,15 +138,14 @@ def power_table(d: Diagnosis, name: str) -> Table:
         Column("usual", "usual"),
         Column("ratio", "smallest over usual", ".2g"),
     )
-    known = components("effects")
+    known, shown = components("effects"), d.rig.shown(d.thickness)
     rows = []
     for effect, smallest in d.power.items():
         size = known[effect]().size
         if math.isfinite(smallest):
-            words = (size_in_words(v, size.unit) for v in (smallest, size.scale))
-            rows.append(
-                (effect_title(effect), spoken_parameter(f"{effect}.{size.name}"), *words, smallest / size.scale)
-            )
+            usual = expected_size(known[effect](), d.measurement)
+            words = (size_in_words(v, size.unit, shown) for v in (smallest, usual))
+            rows.append((effect_title(effect), spoken_parameter(f"{effect}.{size.name}"), *words, smallest / usual))
     rows.sort(key=lambda r: float(r[-1]))
     caption = (
         f"What this measurement could have shown beside {spoken(d.null.hypothesis)}: the smallest effect "

@@ -6,17 +6,19 @@ from collections.abc import Sequence
 
 from bayesmembrane.ground.registry import components
 from bayesmembrane.report.blocks import Column, Table
-from bayesmembrane.report.sections.diagnosis.tables import ERRORS, error_cells, errors_caption
+from bayesmembrane.report.sections.diagnosis.tables import error_cells, error_columns, errors_caption
 from bayesmembrane.report.sections.loop.way import Waypoint
 from bayesmembrane.words.hypothesis import effect_title
 from bayesmembrane.words.language import spoken_parameter
 from bayesmembrane.words.moved import Change
+from bayesmembrane.words.seen import seen
 
 
 def errors_table(found: Sequence[Waypoint], where: str, name: str) -> Table:
     """Errors of every model on the way, in sample and on points that were set aside."""
-    rows = tuple((_labelled(m), *error_cells(m.error), *error_cells(m.held_out), m.covered) for m in found)
-    return Table(name, errors_caption(where), ERRORS, rows)
+    how = seen(found[0].of.measurement)
+    rows = tuple((_labelled(m), *error_cells(m.error, how), *error_cells(m.held_out, how), m.covered) for m in found)
+    return Table(name, errors_caption(where), error_columns(how), rows)
 
 
 def _labelled(model: Waypoint) -> str:
