@@ -24,7 +24,7 @@ from bayesmembrane.words.language import listed
 
 GENERATOR = "bayesmembrane report"
 PAGE, TWIN = "index.html", "report.json"
-FOOTER = "Bands hold what data and priors leave open if the material is right. Forces in N or mN, lengths in mm."
+FOOTER = "Bands hold what data and priors leave open if the material is right."
 
 
 def warned(sentence: str) -> None:

@@ -21,17 +21,19 @@ from bayesmembrane.ground.registry import components
 from bayesmembrane.words import language
 from bayesmembrane.words.diagnosis import percent, set_title
 from bayesmembrane.words.hypothesis import effect_title, spoken
-from bayesmembrane.words.language import listed, sentence
-from bayesmembrane.words.moved import modulus_of
+from bayesmembrane.words.language import listed
+from bayesmembrane.words.moved import MATTERS, modulus_of
 from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.seen import MEASURED, seen
+from bayesmembrane.words.shape import PARTS
 from bayesmembrane.words.sizes import bound_of_material as _bound
 from bayesmembrane.words.sizes import flagged_size
 from bayesmembrane.words.units import size_in_words
 
 MOST_TOLD = 3
 """Explanations whose probability is told."""
-THIRDS = ("lower", "middle", "upper")
+ANSWERED = ("named", "material", "ambiguous")
+"""Verdicts that rest on another model than the one that was given."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,9 @@ def course_of(found: Loop) -> Course:
 
 def _brief(course: Course, following: str) -> Brief:
     d = course.telling
-    return Brief(tested(course.first), f"{_probabilities(course)}: {_ANSWERS[d.verdict](course)}", left(d), following)
+    return Brief(
+        tested(course.first), f"{_probabilities(course)}: {_ANSWERS[d.verdict](course)}", left(course), following
+    )
 
 
 # ---- what was tested -------------------------------------------------------------------------------------------------
@@ -104,10 +108,11 @@ def tested(d: Diagnosis) -> str:
     """``film (reconstructed): 700 readings, 3 cycles up to 30 mm, against Yeoh.``"""
     m, how = d.measurement, seen(d.measurement)
     origin = "" if how.origin == MEASURED else f" ({how.origin}, not measured)"
+    what = "readings" if how.origin == MEASURED else "points"
     cycles = np.unique(m.cycle).size
     of = f" in {cycles} cycles" if cycles > 1 else " of a loop" if np.any(m.leg < 0) else ""
     aside = "" if d.set_aside is None else f" ({len(d.set_aside.numbers)} set aside)"
-    readings = f"{len(m)} readings{aside}{of} up to {how.place(float(np.max(m.deflection)))}"
+    readings = f"{len(m)} {what}{aside}{of} up to {how.place(float(np.max(m.deflection)))}"
     model = "" if d.declared else ", the nearest of all energies"
     return f"{m.specimen.name}{origin}: {readings}, against {spoken(d.null.hypothesis)}{model}."
 
@@ -116,11 +121,11 @@ def tested(d: Diagnosis) -> str:
 
 
 def _probabilities(course: Course) -> str:
-    """``Friction in the guide (level 12 mN) 98 %, no effect 1 %``: what each round named, then the telling one's."""
+    """``98 % friction in the guide (level 12 mN), 1 % no effect``: what each round named, then the telling one's."""
     d = course.telling
     earlier = [_told(x, set_name(x.best, x.null.names)) for x in course.named if x is not d]
     start = f"{', '.join(earlier)}, then " if earlier else ""
-    return sentence(start + ", ".join(_every(d)))[:-1]
+    return start + ", ".join(_every(d))
 
 
 def _every(d: Diagnosis) -> list[str]:
@@ -128,9 +133,9 @@ def _every(d: Diagnosis) -> list[str]:
     told = [_told(d, name) for name, q in p.effects.items() if q >= WORDS.probable][:MOST_TOLD]
     foreign = 1.0 - p.foreign.get(NOTHING, 1.0)
     if foreign >= WORDS.probable:
-        told.insert(0 if foreign > 0.5 else len(told), f"something foreign {percent(foreign)}")
+        told.insert(0 if foreign > 0.5 else len(told), f"{percent(foreign)} something foreign")
     if d.verdict == "material":
-        told.append(f"the energy {d.best.hypothesis.material.title} {percent(p.energies.get(d.material, 0.0))}")
+        told.append(f"{percent(p.energies.get(d.material, 0.0))} the energy {d.best.hypothesis.material.title}")
     return told
 
 
@@ -139,9 +144,9 @@ def _told(d: Diagnosis, name: str) -> str:
     p = percent(d.probabilities.effects.get(name, 0.0))
     of = next((j.candidate for j in d.members if set_name(j.candidate, d.null.names) == name), None)
     if of is None or name == NOTHING:
-        return f"{set_title(name)} {p}"
+        return f"{p} {set_title(name)}"
     own = [e for e in of.hypothesis.effects if e.name in name.split("+")]
-    return f"{listed(f'{e.title} ({flagged_size(e, of, d.measurement)})' for e in own)} {p}"
+    return f"{p} {listed(f'{e.title} ({flagged_size(e, of, d.measurement)})' for e in own)}"
 
 
 def _adequate(course: Course) -> str:
@@ -176,10 +181,11 @@ def _unknown(course: Course) -> str:
         return f"{_foreign(d.foreign, d.measurement)}{f', beside {beside}' if beside else ''}"
     if d.members and d.validation is not None:
         covered = language.percent(d.validation.covered_after)
-        return f"no name is given, for its 90 % band holds only {covered} of the points held out"
+        further = " further" if course.named else ""
+        return f"nothing{further} is named, for this predicts only {covered} of the points held out"
     if d.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return "none of the energies has this form"
-    return "too many explanations fit, and none is named"
+    return f"too many explanations fit, and nothing{' further' if course.named else ''} is named"
 
 
 _ANSWERS = {
@@ -221,15 +227,18 @@ def _foreign(f: Foreign, m: Measurement) -> str:
 # ---- what is left ----------------------------------------------------------------------------------------------------
 
 
-def left(d: Diagnosis) -> str:
+def left(course: Course) -> str:
     """How much the answer leaves, where, and of what kind, as a clause."""
+    d = course.telling
     if noise_alone(d):
         return "leaving noise alone"
-    answered = d.verdict in ("named", "material", "ambiguous")
-    error, residual = (d.after, d.best.residual) if answered else (d.before, d.null.residual)
-    much = f"leaving {error.rmse_N / d.noise.sd:.2g} times the noise"
-    place = where(residual_shape(d.measurement, residual), seen(d.measurement).travel)
-    return f"{much}{f', most of it {place}' if place else ''}, {_kind(d)}"
+    of, error, residual = d, d.before, d.null.residual
+    if d.verdict in ANSWERED or course.named:
+        of = d if d.verdict in ANSWERED else course.named[-1]
+        error, residual = of.after, of.best.residual
+    much = f"leaving {error.rmse_N / course.last.noise.sd:.2g} times the noise"
+    place = where(residual_shape(of.measurement, residual))
+    return f"{much}{f', mostly {place}' if place else ''}, {_kind(d)}"
 
 
 def noise_alone(d: Diagnosis) -> bool:
@@ -243,25 +252,23 @@ def noise_alone(d: Diagnosis) -> bool:
 def _kind(d: Diagnosis) -> str:
     r = d.remaining
     if r.carried < WORDS.carried:
-        return "of a kind that nothing here describes"
+        return "of no kind that is known here"
     laws = [f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in r.law_errors.items() if e > WORDS.law_error]
     return f"smooth as if {listed([f'the energy were {100 * r.energy_error:.2g} %', *laws])} off"
 
 
-def where(shape: ResidualShape, travel: str) -> str:
+def where(shape: ResidualShape) -> str:
     """``on unloading in the lower third``; "" if it is everywhere."""
     words = []
-    if (shape.loading and shape.unloading) and max(shape.loading, shape.unloading) > WORDS.uneven * min(
-        shape.loading, shape.unloading
-    ):
-        words.append(f"on {'loading' if shape.loading > shape.unloading else 'unloading'}")
+    up, down = shape.loading or 0.0, shape.unloading or 0.0
+    if min(up, down) > 0 and max(up, down) > WORDS.uneven * min(up, down):
+        words.append(f"on {'loading' if up > down else 'unloading'}")
     sizes = [size for _, size in shape.cycles]
     if len(sizes) > 1 and max(sizes) > WORDS.uneven * np.median(sizes):
         words.append(f"in cycle {shape.cycles[int(np.argmax(sizes))][0]}")
     filled = [s for s in shape.thirds if s > 0]
     if len(filled) > 1 and max(filled) > WORDS.uneven * min(filled):
-        which = THIRDS[int(np.argmax(shape.thirds))]
-        words.append(f"in the {which} third of the {travel}{'es' if travel.endswith('h') else 's'}")
+        words.append(f"in the {PARTS[int(np.argmax(shape.thirds))]} third")
     return " ".join(words)
 
 
@@ -302,27 +309,26 @@ def _use_as_it_is(d: Diagnosis) -> str:
 
 def _when_unknown(d: Diagnosis) -> str:
     if d.foreign is None:
-        return "Do not extrapolate with this model. Repeat the test: what comes again is the film's or the rig's."
+        return "Repeat the test, and do not extrapolate with this model."
     advice = {
         SUDDEN: "Look for a knock, a tear or a change of temperature then.",
         WAVE: "Look at the drive, its gear, and what vibrates.",
         PLAY: "Take the play out of the drive, and test again.",
         CLIPPED: "Leave these readings out, or take a larger load cell.",
     }
-    return advice.get(d.foreign.kind, "Repeat the test: what comes again is the film's or the rig's.")
+    return advice.get(d.foreign.kind, "Repeat the test: what comes again is no accident.")
 
 
 def _tell_apart(d: Diagnosis) -> str:
     best = next(iter(d.experiments), None)
     if best is None or best.separation < NEXT_TEST.clear:
-        return "No further test that was simulated tells them apart: let each of them speak for the film."
-    what = sentence(spoken_test(best.test, d.rig))[:-1]
-    apart = "" if np.isinf(best.separation) else f" by {best.separation:.2g} times the noise"
-    return f"{what}: tells them apart{apart}."
+        return "No further test that was simulated tells them apart: rely on what holds for each of them."
+    apart = "" if np.isinf(best.separation) else f" ({best.separation:.2g} times the noise apart)"
+    return f"To tell them apart: {spoken_test(best.test, d.rig)}{apart}."
 
 
 def _use(before: Stage, after: Stage) -> str:
     """Which modulus to use."""
-    (new, sd), (old, _) = modulus_of(after.run), modulus_of(before.run)
-    model = spoken(after.run.hypothesis)
-    return f"Use {model}: shear modulus {new:.3g} +- {sd:.1g} MPa, not {old:.3g}."
+    (new, sd), (old, was_sure) = modulus_of(after.run), modulus_of(before.run)
+    instead = "as without" if abs(new - old) <= MATTERS * was_sure else f"not {old:.4g}"
+    return f"Use {spoken(after.run.hypothesis)}: shear modulus {new:.4g} +- {sd:.2g} MPa, {instead}."

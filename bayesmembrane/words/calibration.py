@@ -119,6 +119,8 @@ def describes(group: Sequence[Case]) -> str:
     by = {v: [c for c in group if c.verdict == v] for v in ("adequate", "strained", "misses", "unknown")}
     if by["unknown"]:
         best = sorted(group, key=lambda c: c.rmse)
+        if len(best) == 1:
+            return f"Up to {end}, {_named(best)} cannot be judged by itself: the measurement states no noise."
         tail = f"; the others: {_named(best[1:])}" if best[1:] else ""
         return (
             f"Up to {end} the measurement states no noise: a calibration alone cannot say which material is adequate. "

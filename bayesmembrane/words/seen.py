@@ -56,7 +56,7 @@ class Seen:
     def place(self, deflection: float) -> str:
         """A deflection in m in words, to follow "up to": ``30 mm``, ``a stretch of 2.5``."""
         value = self.rest + self.travel_scale[0] * deflection
-        return f"a {self.travel} of {value:.3g}" if self.rest else f"{value:.3g} {self.travel_scale[1]}"
+        return f"a {self.travel} of {value:.4g}" if self.rest else f"{value:.4g} {self.travel_scale[1]}"
 
     @property
     def curve(self) -> str:

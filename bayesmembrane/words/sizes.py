@@ -19,14 +19,14 @@ def usual_size(effect: Effect, measurement: Measurement, shown: Units = SCALES) 
 
 
 def flagged_size(effect: Effect, candidate: Candidate, measurement: Measurement) -> str:
-    """``loss 0.66, 6.6 times the usual 0.1``: the size of one of its effects, with what must be known of it."""
+    """``loss 0.66, implausible: usual 0.1``: the size of one of its effects, with what must be known of it."""
     shown = measurement.rig.shown(measurement.specimen.thickness)
     p = effect.size
     value = candidate.parameters[f"{effect.name}.{p.name}"]
     told = [f"{spoken_parameter(f'{effect.name}.{p.name}')} {size_in_words(value, p.unit, shown)}"]
     times = abs(value - (p.null or 0.0)) / expected_size(effect, measurement)
     if times >= IMPLAUSIBLE:
-        told.append(f"{times:.2g} times the usual {usual_size(effect, measurement, shown)}")
+        told.append(f"implausible: usual {usual_size(effect, measurement, shown)}")
     own = [n.partition(".")[2] for n in candidate.at_bound if n.startswith(f"{effect.name}.")]
     told += [("" if n == p.name else f"{n.replace('_', ' ')} ") + "at its bound" for n in own]
     return ", ".join(told)

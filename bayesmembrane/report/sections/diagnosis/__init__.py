@@ -54,7 +54,7 @@ class DiagnosisSection(Section):
 
     def lead(self, results: Sequence[Any]) -> Lead | None:
         found = of_kind(results, Diagnosis)
-        return lead(of_diagnosis(found[0]), steps_of(found[0])) if len(found) == 1 else None
+        return lead(of_diagnosis(found[0]), steps_of(found[0]), found[0]) if len(found) == 1 else None
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
         return [Glance("diagnosis", spoken(d.null.hypothesis), finding(d)) for d in of_kind(results, Diagnosis)]
@@ -97,9 +97,13 @@ def place_of(d: Diagnosis, sd: Array | None = None) -> Place:
 
 def _residuals(d: Diagnosis) -> Figure:
     how = seen(d.measurement)
-    rows = [Residual(f"As given: {spoken(d.null.hypothesis)}, rms {how.error(d.before.rmse_N)}", d.null.residual)]
+    rows = [
+        Residual(
+            f"As given: {spoken(d.null.hypothesis)}, root mean square {how.error(d.before.rmse_N)}", d.null.residual
+        )
+    ]
     if d.best is not d.null:
-        title = f"The most probable: {spoken(d.best.hypothesis)}, rms {how.error(d.after.rmse_N)}"
+        title = f"The most probable: {spoken(d.best.hypothesis)}, root mean square {how.error(d.after.rmse_N)}"
         rows.append(Residual(title, d.best.residual))
     return residuals_figure(place_of(d), rows)
 

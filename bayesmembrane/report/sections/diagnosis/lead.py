@@ -25,7 +25,8 @@ from bayesmembrane.words.seen import Seen, seen
 
 WIDTH = 5.6  # inches: half of a page
 PARTS = 24  # means that make a line of one leg, at most
-FEW = 150  # readings that are drawn one by one
+EACH, FEWEST = 4, 3  # points of such a mean, and means of a leg, at least
+FEW = 100  # readings that are drawn one by one
 NOISE = "#c9ced4"
 
 
@@ -44,38 +45,40 @@ class Step:
         return self.of.measurement
 
 
-def lead(brief: Brief, steps: Sequence[Step]) -> Lead:
-    """The first screen; one step where nothing was found, else the first and the last."""
-    how = seen(steps[0].measurement)
-    return Lead(brief.tested, brief.answer, brief.left, errors(steps, how), brief.following, _figure(steps, how))
+def lead(brief: Brief, steps: Sequence[Step], last: Diagnosis) -> Lead:
+    """The first screen; one step where nothing was found, else the first and the last. Noise is as ``last`` has it."""
+    return Lead(brief.tested, brief.answer, brief.left, errors(steps, last), brief.following, _figure(steps, last))
 
 
-def errors(steps: Sequence[Step], how: Seen) -> Table:
+def errors(steps: Sequence[Step], last: Diagnosis) -> Table:
     """Root mean squares before and after, in sample and held out, and of noise alone."""
-    factor, unit = how.small
-    first = steps[0].of
+    factor, unit = seen(last.measurement).small
+    v = steps[0].of.validation
+    held = "held out (too few points)" if v is None else f"held out: {set_aside(v)}"
     columns = (
         Column("model", f"root mean square ({unit})"),
         Column("in_sample", "in sample", ".3g"),
-        Column("held_out", f"held out: {set_aside(first.validation)}", ".3g"),
+        Column("held_out", held, ".3g"),
     )
     rows = [
         (s.title, factor * s.error.rmse_N, None if s.held_out is None else factor * s.held_out.rmse_N) for s in steps
     ]
-    noise = ("noise alone", factor * steps[-1].of.noise.sd, None)
+    noise = ("noise", factor * last.noise.sd, None)
     return Table("first screen", "", columns, (*rows, noise))
 
 
-def _figure(steps: Sequence[Step], how: Seen) -> Figure:
+def _figure(steps: Sequence[Step], last: Diagnosis) -> Figure:
+    how = seen(last.measurement)
     below = f"below: {how.origin} less fitted ({how.small[1]})"
     caption = f"{how.load.capitalize()} ({how.load_scale[1]}) over {how.travel} ({how.travel_scale[1]}); {below}."
     shown = " and ".join(spoken(c.hypothesis) for c in dict.fromkeys((steps[0].of.null, steps[-1].of.best)))
     alt = f"The {how.curve} with the curves of {shown}, and what they leave, against {how.travel}"
-    return Figure(lead_picture(steps, how), alt, caption)
+    return Figure(lead_picture(steps, last), alt, caption)
 
 
-def lead_picture(steps: Sequence[Step], how: Seen, kind: str = "png") -> Picture:
+def lead_picture(steps: Sequence[Step], last: Diagnosis, kind: str = "png") -> Picture:
     """The curve above, what the models leave of it below; loops are drawn as loops, before and after in two colours."""
+    how = seen(last.measurement)
     with style():
         figure = new_figure(5.4, WIDTH)
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.5, 1.0))
@@ -84,7 +87,7 @@ def lead_picture(steps: Sequence[Step], how: Seen, kind: str = "png") -> Picture
             how.along(m.deflection), how.carried(m.force), "o", color=INK, markersize=3.0 if len(m) <= 120 else 1.8,
             alpha=0.7, zorder=2,
         )  # fmt: skip
-        _noise(below, steps[-1], how)
+        _noise(below, last, how)
         for step, colour in zip(steps, RANGE_COLOURS, strict=False):
             fitted = how.carried(step.measurement.force - step.residual)
             x = how.along(step.measurement.deflection)
@@ -116,12 +119,12 @@ def _averaged(x: Array, y: Array, m: Measurement) -> tuple[Array, Array]:
         return x, y
     parts: list[NDArray[np.intp]] = []
     for leg in np.split(np.arange(x.size), np.flatnonzero(np.diff(m.leg.astype(int))) + 1):
-        parts += np.array_split(leg, min(PARTS, leg.size))
+        parts += np.array_split(leg, min(max(FEWEST, min(PARTS, leg.size // EACH)), leg.size))
     return np.array([x[p].mean() for p in parts]), np.array([y[p].mean() for p in parts])
 
 
-def _noise(ax: Axes, step: Step, how: Seen) -> None:
-    m, sd = step.measurement, 2 * how.left(step.of.noise.each)
+def _noise(ax: Axes, last: Diagnosis, how: Seen) -> None:
+    m, sd = last.measurement, 2 * how.left(last.noise.each)
     order = np.argsort(m.deflection, kind="stable")
     x = how.along(m.deflection)[order]
     ax.fill_between(x, -sd[order], sd[order], color=NOISE, alpha=0.6, linewidth=0, zorder=0)

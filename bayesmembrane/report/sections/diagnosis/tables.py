@@ -37,7 +37,7 @@ def error_columns(how: Seen) -> tuple[Column, ...]:
 def errors_caption(where: str) -> str:
     """What a table of errors says; ``where`` : which points were held out."""
     return (
-        "Errors before and after, chi-square by the noise (a reduced chi-square of 1 is noise alone). Held "
+        "Errors of the best fits before and after (a reduced chi-square of 1 is noise alone). Held "
         f"out: {where}; predicted by the model fitted to the other points."
     )
 
@@ -77,8 +77,8 @@ def ranking_table(d: Diagnosis, name: str) -> Table:
     """Every candidate that was refitted, the most probable first."""
     columns = (
         Column("candidate", "candidate"),
-        Column("size", "size"),
-        Column("probability", "probability", ".3g"),
+        Column("size", "most probable size"),
+        Column("probability", "probability, with this energy", "%"),
         Column("log_bayes_factor", "ln Bayes factor", "+.1f"),
         Column("unexplained", "unexplained", "%"),
         Column("law_error", "error of its law", "%"),

@@ -62,7 +62,7 @@ class LoopSection(Section):
 
     def lead(self, results: Sequence[Any]) -> Lead | None:
         loops = of_kind(results, Loop)
-        return lead(of_loop(loops[0]), steps_of(loops[0])) if len(loops) == 1 else None
+        return lead(of_loop(loops[0]), steps_of(loops[0]), loops[0].rounds[-1].diagnosis) if len(loops) == 1 else None
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
         return [Glance("loop", subject(found), finding(deciding(found))) for found in of_kind(results, Loop)]
@@ -105,14 +105,14 @@ def _place(found: Loop) -> Place:
 
 
 def steps_of(found: Loop) -> list[Step]:
-    """The model as given, and the last one that was added, or else the first of the rivals."""
+    """The model as given, the last one that was added, and of an ambiguous answer the first of the rivals."""
     way = waypoints(found)
     first = way[0]
     if len(way) == 1:
         return [_step("as given", first)]
-    added = [m for m in way[1:] if m.added]
-    last = added[-1] if added else way[1]
-    return [_step("before", first), _step("after" if added else "if the first", last)]
+    added = [_step("after", m) for m in way[1:] if m.added]
+    rivals = [_step("if the first", m) for m in way[1:] if not m.added]
+    return [_step("before", first), *added[-1:], *rivals[:1]]
 
 
 def _step(title: str, m: Waypoint) -> Step:
@@ -132,7 +132,7 @@ def residual_rows(way: Sequence[Waypoint]) -> list[Residual]:
 
 
 def _row_title(word: str, m: Waypoint) -> str:
-    return f"{word}: {m.title}, rms {seen(m.of.measurement).error(m.error.rmse_N)}"
+    return f"{word}: {m.title}, root mean square {seen(m.of.measurement).error(m.error.rmse_N)}"
 
 
 def _left(found: Loop, last: Diagnosis) -> list[Block]:
