@@ -44,12 +44,12 @@ def changes(before: Run, after: Run) -> list[Change]:
     out = [Change("shear modulus", "MPa", modulus_of(before), modulus_of(after), True)]
     old, new = _posterior(before), _posterior(after)
     nothing = (float("nan"), float("nan"))
+    units = after.measurement.rig.shown(after.measurement.specimen.thickness)
     for name in dict.fromkeys([*new, *old]):
         unit = (new.get(name) or old[name])[1]
         b, a = (found[name][0] if name in found else nothing for found in (old, new))
-        noise = name.startswith("noise.")
         own = name.partition(".")[0] in (before.hypothesis.material.name, after.hypothesis.material.name)
-        factor, shown = (1e3, "mN") if noise and unit == "N" else (1.0, unit)
+        factor, shown = (1.0, unit) if own else units.get(unit, (1.0, unit))
         out.append(Change(name, shown, _times(factor, b), _times(factor, a), own))
     return out
 

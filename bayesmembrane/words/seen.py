@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.words.language import digits, newtons
 
 MEASURED = "measured"
 _NOT_MEASURED = ("reconstructed", "synthetic", "simulated")
@@ -53,6 +55,10 @@ class Seen:
         """A residual in N in words: ``4.02 mN``."""
         return f"{self.small[0] * value:.3g} {self.small[1]}"
 
+    def force(self, value: float) -> str:
+        """A force in N in words, three digits: mN below 0.1 N; of a strip its stress."""
+        return newtons(value) if not self.rest else f"{digits(self.load_scale[0] * value)} {self.load_scale[1]}"
+
     def place(self, deflection: float) -> str:
         """A deflection in m in words, to follow "up to": ``30 mm``, ``a stretch of 2.5``."""
         value = self.rest + self.travel_scale[0] * deflection
@@ -74,6 +80,17 @@ class Seen:
     @property
     def left_label(self) -> str:
         return f"{self.origin} less fitted ({self.small[1]})"
+
+
+DISC = Seen("deflection", (1e3, "mm"), 0.0, "force", (1.0, "N"), (1e3, "mN"))
+"""A lifted disc, measured."""
+
+
+def alike(every: Iterable[Seen]) -> Seen:
+    """How several curves are seen in one table: as they all are, or as a lifted disc where rigs differ."""
+    first, *others = every
+    same = all((o.travel_scale, o.rest, o.small) == (first.travel_scale, first.rest, first.small) for o in others)
+    return first if same else DISC
 
 
 def seen_on(rig: Fixture, thickness: float, origin: str = "") -> Seen:

@@ -139,14 +139,14 @@ def power_table(d: Diagnosis, name: str) -> Table:
         Column("ratio", "smallest over usual", ".2g"),
     )
     known, shown = components("effects"), d.rig.shown(d.thickness)
-    rows = []
+    rows: list[tuple[Value, ...]] = []
     for effect, smallest in d.power.items():
         size = known[effect]().size
         if math.isfinite(smallest):
             usual = expected_size(known[effect](), d.measurement)
             words = (size_in_words(v, size.unit, shown) for v in (smallest, usual))
             rows.append((effect_title(effect), spoken_parameter(f"{effect}.{size.name}"), *words, smallest / usual))
-    rows.sort(key=lambda r: float(r[-1]))
+    rows.sort(key=lambda r: float(r[-1] or 0.0))
     caption = (
         f"What this measurement could have shown beside {spoken(d.null.hypothesis)}: the smallest effect "
         "that the tests would have found nine times out of ten, beside what is usual before the data. An effect whose "
