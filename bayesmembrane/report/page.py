@@ -16,7 +16,7 @@ from bayesmembrane.ground.errors import BayesmembraneError, SettingsError, Stora
 from bayesmembrane.ground.files import write_text
 from bayesmembrane.ground.plain import json_text
 from bayesmembrane.ground.registry import components
-from bayesmembrane.report.blocks import Column, Lead, Part, Table, Text
+from bayesmembrane.report.blocks import Block, Column, Lead, Part, Table, Text
 from bayesmembrane.report.render import whole_page
 from bayesmembrane.report.runs import Shown, read
 from bayesmembrane.report.sections.base import Section, Subject
@@ -82,8 +82,8 @@ class Content:
     @property
     def tables(self) -> list[Table]:
         """Every table, that of the first screen first."""
-        first = [] if self.lead is None else [self.lead.table]
-        return [*first, *(b for p in self.parts for b in p.blocks if isinstance(b, Table))]
+        blocks = [*([] if self.lead is None else [self.lead]), *(b for p in self.parts for b in p.blocks)]
+        return [b.table if isinstance(b, Lead) else b for b in blocks if isinstance(b, Lead | Table)]
 
 
 def sections() -> list[Section]:
@@ -152,10 +152,17 @@ def _named_once(parts: Sequence[Part]) -> list[Part]:
         Part(
             once(p.key, keys, "-"),
             p.title,
-            tuple(replace(b, name=once(b.name, tables, " ")) if isinstance(b, Table) else b for b in p.blocks),
+            tuple(_renamed(b, lambda name: once(name, tables, " ")) for b in p.blocks),
         )
         for p in parts
     ]
+
+
+def _renamed(block: Block, name: Callable[[str], str]) -> Block:
+    """The same with its table under another name, if it has one."""
+    if isinstance(block, Lead):
+        return replace(block, table=replace(block.table, name=name(block.table.name)))
+    return replace(block, name=name(block.name)) if isinstance(block, Table) else block
 
 
 # ---- what is found -------------------------------------------------------------------------------------------------

@@ -123,14 +123,15 @@ def tested(d: Diagnosis) -> str:
 def _probabilities(course: Course) -> str:
     """``98 % friction in the guide (level 12 mN), 1 % no effect``: what each round named, then the telling one's."""
     d = course.telling
-    earlier = [_told(x, set_name(x.best, x.null.names)) for x in course.named if x is not d]
+    earlier = [_told(x, set_name(x.best, x.null.names), course) for x in course.named if x is not d]
     start = f"{', '.join(earlier)}, then " if earlier else ""
-    return start + ", ".join(_every(d))
+    return start + ", ".join(_every(course))
 
 
-def _every(d: Diagnosis) -> list[str]:
+def _every(course: Course) -> list[str]:
+    d = course.telling
     p = d.probabilities
-    told = [_told(d, name) for name, q in p.effects.items() if q >= WORDS.probable][:MOST_TOLD]
+    told = [_told(d, name, course) for name, q in p.effects.items() if q >= WORDS.probable][:MOST_TOLD]
     foreign = 1.0 - p.foreign.get(NOTHING, 1.0)
     if foreign >= WORDS.probable:
         told.insert(0 if foreign > 0.5 else len(told), f"{percent(foreign)} something foreign")
@@ -139,12 +140,14 @@ def _every(d: Diagnosis) -> list[str]:
     return told
 
 
-def _told(d: Diagnosis, name: str) -> str:
-    """A set of effects with its probability; with the sizes where the answer rests on it."""
+def _told(d: Diagnosis, name: str, course: Course) -> str:
+    """A set of effects with its probability; where the answer rests on it with the sizes, as they were fitted last."""
     p = percent(d.probabilities.effects.get(name, 0.0))
     of = next((j.candidate for j in d.members if set_name(j.candidate, d.null.names) == name), None)
     if of is None or name == NOTHING:
         return f"{p} {set_title(name)}"
+    if course.last is not d and set(name.split("+")) <= set(course.last.null.names):
+        of = course.last.null
     own = [e for e in of.hypothesis.effects if e.name in name.split("+")]
     return f"{p} {listed(f'{e.title} ({flagged_size(e, of, d.measurement)})' for e in own)}"
 
@@ -156,6 +159,7 @@ def _adequate(course: Course) -> str:
 
 def _named(course: Course) -> str:
     null, best = course.first.null.hypothesis, course.telling.best
+    best = best if course.last is course.telling else course.last.null
     count = len(best.names) - len(null.effects)
     who, verb = ("it", "explains") if count == 1 else ("both" if count == 2 else "together they", "explain")
     other = f", with {_energy(best)}," if best.hypothesis.material is not null.material or _bound(best) else ""
@@ -228,17 +232,13 @@ def _foreign(f: Foreign, m: Measurement) -> str:
 
 
 def left(course: Course) -> str:
-    """How much the answer leaves, where, and of what kind, as a clause."""
-    d = course.telling
+    """How much the answer leaves, where, and of what kind, as a clause: as the last diagnosis has it."""
+    d = course.last
     if noise_alone(d):
         return "leaving noise alone"
-    of, error, residual = d, d.before, d.null.residual
-    if d.verdict in ANSWERED or course.named:
-        of = d if d.verdict in ANSWERED else course.named[-1]
-        error, residual = of.after, of.best.residual
-    much = f"leaving {error.rmse_N / course.last.noise.sd:.2g} times the noise"
-    place = where(residual_shape(of.measurement, residual))
-    return f"{much}{f', mostly {place}' if place else ''}, {_kind(d)}"
+    error, residual = (d.after, d.best.residual) if d.verdict in ANSWERED else (d.before, d.null.residual)
+    place = where(residual_shape(d.measurement, residual))
+    return f"leaving {error.rmse_N / d.noise.sd:.2g} times the noise{f', mostly {place}' if place else ''}, {_kind(d)}"
 
 
 def noise_alone(d: Diagnosis) -> bool:

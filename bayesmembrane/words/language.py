@@ -55,8 +55,8 @@ def digits(value: float) -> str:
 
 def without_exponent(text: str) -> str:
     """A formatted number without an exponent where that is short, and with a true minus sign."""
-    if "e" in text and abs(float(text)) < 1e7 and abs(float(text)) >= 1e-4:
-        text = f"{float(text):,.0f}" if abs(float(text)) >= 1 else f"{float(text):.6f}".rstrip("0")
+    if "e" in text and abs(float(text)) < 1e7 and abs(float(text)) >= 1e-6:
+        text = f"{float(text):,.0f}" if abs(float(text)) >= 1 else f"{float(text):.9f}".rstrip("0")
     return "\u2212" + text[1:] if text.startswith("-") else text
 
 

@@ -54,7 +54,7 @@ class DiagnosisSection(Section):
 
     def lead(self, results: Sequence[Any]) -> Lead | None:
         found = of_kind(results, Diagnosis)
-        return lead(of_diagnosis(found[0]), steps_of(found[0]), found[0]) if len(found) == 1 else None
+        return lead_of(found[0]) if len(found) == 1 else None
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
         return [Glance("diagnosis", spoken(d.null.hypothesis), finding(d)) for d in of_kind(results, Diagnosis)]
@@ -74,9 +74,16 @@ def finding(d: Diagnosis) -> str:
     return f"{d.verdict}: {spoken(d.hypothesis)}" if d.explains else d.verdict
 
 
+def lead_of(d: Diagnosis) -> Lead:
+    """Its first screen."""
+    return lead(of_diagnosis(d), steps_of(d), d)
+
+
 def _part(d: Diagnosis, end: str) -> Part:
+    """All of a diagnosis; one of several, with an ``end`` to its names, begins with its first screen."""
     told = [*(s for s in [validation_sentence(d)] if s), *bounds(d)]
     blocks: list[Block] = [
+        *([lead_of(d)] if end else []),
         Text(words.sentence(d)),
         *points(told),
         _residuals(d),

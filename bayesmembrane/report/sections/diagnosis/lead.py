@@ -100,7 +100,7 @@ def lead_picture(steps: Sequence[Step], last: Diagnosis, kind: str = "png") -> P
         for ax in (above, below):
             ax.grid(color=FAINT, linewidth=0.5)
         figure.legend(
-            handles=_handles(steps, how), loc="outside upper center", ncols=4, handletextpad=0.5, columnspacing=1.2
+            handles=handles(steps, how), loc="outside upper center", ncols=4, handletextpad=0.5, columnspacing=1.2
         )
         return encoded(figure, kind)
 
@@ -130,7 +130,8 @@ def _noise(ax: Axes, last: Diagnosis, how: Seen) -> None:
     ax.fill_between(x, -sd[order], sd[order], color=NOISE, alpha=0.6, linewidth=0, zorder=0)
 
 
-def _handles(steps: Sequence[Step], how: Seen) -> list[Line2D | Patch]:
+def handles(steps: Sequence[Step], how: Seen) -> list[Line2D | Patch]:
+    """The legend: how the points came about, the models, noise."""
     points = Line2D([], [], color=INK, marker="o", linestyle="none", markersize=4, label=how.origin)
     lines = [Line2D([], [], color=c, label=s.title) for s, c in zip(steps, RANGE_COLOURS, strict=False)]
     return [points, *lines, Patch(color=NOISE, label="noise, 2 sd")]

@@ -37,7 +37,7 @@ def error_columns(how: Seen) -> tuple[Column, ...]:
 def errors_caption(where: str) -> str:
     """What a table of errors says; ``where`` : which points were held out."""
     return (
-        "Errors of the best fits before and after (a reduced chi-square of 1 is noise alone). Held "
+        "Errors of the best fits, each as it was fitted last (a reduced chi-square of 1 is noise alone). Held "
         f"out: {where}; predicted by the model fitted to the other points."
     )
 

@@ -62,7 +62,7 @@ class LoopSection(Section):
 
     def lead(self, results: Sequence[Any]) -> Lead | None:
         loops = of_kind(results, Loop)
-        return lead(of_loop(loops[0]), steps_of(loops[0]), loops[0].rounds[-1].diagnosis) if len(loops) == 1 else None
+        return lead_of(loops[0]) if len(loops) == 1 else None
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
         return [Glance("loop", subject(found), finding(deciding(found))) for found in of_kind(results, Loop)]
@@ -77,12 +77,19 @@ class LoopSection(Section):
         return Subject(tuple(films), f"What was missing: {'; '.join(map(subject, loops))}.", curve)
 
 
+def lead_of(found: Loop) -> Lead:
+    """Its first screen."""
+    return lead(of_loop(found), steps_of(found), found.rounds[-1].diagnosis)
+
+
 def _part(found: Loop, number: int) -> Part:
+    """All of a loop; one of several, with a ``number``, begins with its first screen."""
     end = f" {number}" if number else ""
     first, last = found.rounds[0].diagnosis, found.rounds[-1].diagnosis
     way = waypoints(found)
     where = set_aside(first.validation)
-    blocks: list[Block] = [Text(text) for text in answer(found)]
+    blocks: list[Block] = [lead_of(found)] if number else []
+    blocks += [Text(text) for text in answer(found)]
     blocks += points([*validation_sentences(found), *bound_sentences(found), *moved(found), *rival_sentences(found)])
     blocks.append(residuals_figure(_place(found), residual_rows(way)))
     blocks += [errors_table(way, where, f"loop errors{end}"), scores_table(way, f"loop scores{end}")]
@@ -141,7 +148,7 @@ def _left(found: Loop, last: Diagnosis) -> list[Block]:
     kept = left_sentence(found.left, seen(last.measurement))
     caption = (
         f"{kept} Lines and bands: mean and two standard deviations of the process that is kept "
-        "for it along the way of the disc; it has no name, and predicts nothing for another test."
+        "for it along the test; it has no name, and predicts nothing for another test."
     )
     picture = discrepancy_picture(_place(found), last.null.residual, found.left.mean, found.left.sd)
     model = spoken(last.null.hypothesis)

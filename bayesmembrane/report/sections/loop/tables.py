@@ -59,13 +59,14 @@ def moved_table(found: Sequence[Change], name: str) -> Table:
         Column("after_sd", "sd", ".2g"),
         Column("change", "change (%)", "+.3g"),
         Column("in_sd", "change (sd before)", "+.2g"),
+        Column("remark", "remark"),
     )
-    rows = tuple((_parameter(c), c.unit, *c.before, *c.after, 100 * c.share, c.in_sd) for c in found)
+    rows = tuple((_parameter(c), c.unit, *c.before, *c.after, 100 * c.share, c.in_sd, c.remark or None) for c in found)
     caption = (
         "Posterior mean and standard deviation in the first and in the last calibration. A change of many standard "
         "deviations says that the first one was sure of a wrong value."
     )
-    return Table(name, caption, columns, rows)
+    return Table(name, caption, columns, rows).without_empty()
 
 
 def _parameter(c: Change) -> str:
