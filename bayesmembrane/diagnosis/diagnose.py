@@ -52,7 +52,8 @@ def diagnose(
 
 
 def _diagnosed(case: OpenCase) -> Diagnosis:
-    if case.detection.adequate:
+    # A declared energy may follow the curve by parameters that nobody would expect: then all are weighed none the less.
+    if case.detection.adequate and (case.null is case.best_plain or case.tested(case.best_plain).adequate):
         return _concluded(case, case.search, adequate(case))
     found = grown(case)
     return _concluded(case, found.search, decided(case, summed(found)))

@@ -238,6 +238,8 @@ class VerdictThresholds:
     """Relative error of an energy from which on none of those known is said to hold."""
     law_carried: float = 0.6
     """Relative error of a law from which on the effect is no longer the one that the library means."""
+    foreign_carries: float = 0.1
+    """Of the misfit beyond noise: if something foreign takes more of it than that, effects are not named beside it."""
     least_coverage: float = 0.45
     """Of held-out points inside the 90 % band: a model that covers fewer predicts nothing, and is not named."""
 

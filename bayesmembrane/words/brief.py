@@ -16,7 +16,7 @@ from bayesmembrane.diagnosis.explanation.total import NOTHING, set_name
 from bayesmembrane.diagnosis.left.shape import ResidualShape, residual_shape
 from bayesmembrane.diagnosis.loop import Loop, Stage
 from bayesmembrane.diagnosis.result import Diagnosis
-from bayesmembrane.diagnosis.thresholds import NEXT_TEST, WORDS
+from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words import language
 from bayesmembrane.words.diagnosis import percent, set_title
@@ -158,38 +158,61 @@ def _adequate(course: Course) -> str:
 
 
 def _named(course: Course) -> str:
-    null, best = course.first.null.hypothesis, course.telling.best
-    best = best if course.last is course.telling else course.last.null
+    d, null, best = course.telling, course.first.null.hypothesis, course.telling.best
+    if course.last is d and d.detection.adequate:
+        return _improbable(d)
+    best = best if course.last is d else course.last.null
     count = len(best.names) - len(null.effects)
     who, verb = ("it", "explains") if count == 1 else ("both" if count == 2 else "together they", "explain")
     other = f", with {_energy(best)}," if best.hypothesis.material is not null.material or _bound(best) else ""
-    much = "the curve" if len(course.named) > 1 else f"{_explained(course.telling)} of what {spoken(null)} misses"
-    return f"{who} {verb}{other} {much}"
+    much = "the curve" if len(course.named) > 1 else f"{_explained(d)} of what {spoken(null)} misses"
+    return f"{who} {verb}{other} {much}{_beside(d)}"
 
 
 def _material(course: Course) -> str:
     d = course.telling
+    if d.detection.adequate:
+        return _improbable(d)
     return f"{_energy(d.best)} explains {_explained(d)} of what {spoken(d.null.hypothesis)} misses"
+
+
+def _improbable(d: Diagnosis) -> str:
+    return f"{spoken(d.null.hypothesis)} follows the curve, but by less probable parameters{_beside(d)}"
 
 
 def _ambiguous(course: Course) -> str:
     d = course.telling
-    also = "" if d.foreign is None else f" (or {_foreign(d.foreign, d.measurement)})"
-    return f"this curve cannot tell which{also}; the first explains {_explained(d)} of what is missed"
+    sure = _certain(d)
+    which = f"only {sure} is certain" if sure else "this curve cannot tell which"
+    return f"{which}; the first explains {_explained(d)} of what is missed{_beside(d)}"
 
 
 def _unknown(course: Course) -> str:
     d = course.telling
+    sure, further = _certain(d), " further" if course.named else ""
+    start = f"{sure} is certain, yet " if sure else ""
     if d.foreign is not None:
         beside = listed(effect_title(n) for n in d.foreign.base.names)
-        return f"{_foreign(d.foreign, d.measurement)}{f', beside {beside}' if beside else ''}"
+        return f"{start}{_foreign(d.foreign, d.measurement)}{f', beside {beside}' if beside and not sure else ''}"
     if d.members and d.validation is not None:
         covered = language.percent(d.validation.covered_after)
-        further = " further" if course.named else ""
         return f"nothing{further} is named, for this predicts only {covered} of the points held out"
     if d.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
-        return "none of the energies has this form"
-    return f"too many explanations fit, and nothing{' further' if course.named else ''} is named"
+        return f"{start}none of the energies has this form"
+    return f"{start}too many explanations fit, and nothing{further} is named"
+
+
+def _beside(d: Diagnosis) -> str:
+    """What is foreign beside the effects."""
+    return "" if d.foreign is None else f", beside {_foreign(d.foreign, d.measurement)}"
+
+
+def _certain(d: Diagnosis) -> str:
+    """Effects that are in all that is probable; "" if there is none, or nothing else is probable anyway."""
+    names = {n for key in d.probabilities.effects for n in key.split("+")} - {NOTHING}
+    sure = sorted(n for n in names if d.probabilities.of_effect(n) >= VERDICT.sure)
+    alone = d.probabilities.effects.get("+".join(sure), 0.0) >= VERDICT.sure
+    return "" if alone else listed(map(effect_title, sure))
 
 
 _ANSWERS = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -15,7 +16,7 @@ from bayesmembrane.diagnosis.left.heldout import HeldOut
 from bayesmembrane.diagnosis.reference.outliers import SetAside
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
-from bayesmembrane.diagnosis.thresholds import WORDS
+from bayesmembrane.diagnosis.thresholds import VERDICT, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed, spoken_parameter
@@ -239,7 +240,8 @@ def _named(found: Diagnosis) -> str:
     (member, *_) = (j.candidate for j in found.members)
     have = {e.name for e in found.null.hypothesis.effects}
     signatures = " ".join(e.signature for e in member.hypothesis.effects if e.name not in have)
-    return f"{_misses(found)}{_added(member, found)}. {_error(found)}{_bounds(member)} {signatures}".rstrip()
+    answer = f"{_misses(found)}{_added(member, found)}. {_error(found)}{_bounds(member)} {signatures}".rstrip()
+    return f"{answer}{_beside(found)}"
 
 
 def _material(found: Diagnosis) -> str:
@@ -255,13 +257,26 @@ def _ambiguous(found: Diagnosis) -> str:
     names = "; or ".join(_member(j, found) for j in found.members)
     nexts = found.experiments
     advice = f" To tell them apart: {experiment_sentence(nexts[0], found.rig)}." if nexts else ""
-    units = _units(found)
-    foreign = "" if found.foreign is None else f" {foreign_sentence(found.foreign, units)}"
-    other = "; or something foreign" if foreign else ""
     return (
-        f"{_misses(found)}this measurement cannot tell which of these it is: {names}{other}. {_error(found)}{advice}"
-        f"{foreign}"
+        f"{_misses(found)}{_common(found)}this measurement cannot tell which of these it is: {names}. {_error(found)}"
+        f"{advice}{_beside(found)}"
     )
+
+
+def _common(found: Diagnosis) -> str:
+    """What is in every set of an ambiguous answer, for that much is sure."""
+    sets = [set(j.candidate.names) for j in found.members]
+    shared = sorted(set.intersection(*sets) - set(found.null.names))
+    return f"{_at_work(shared)} each of them, yet " if shared else ""
+
+
+def _at_work(names: Sequence[str]) -> str:
+    return f"{set_title('+'.join(names))} {'is' if len(names) == 1 else 'are'} at work in"
+
+
+def _beside(found: Diagnosis) -> str:
+    """What is foreign beside the effects."""
+    return "" if found.foreign is None else f" Beside it: {foreign_sentence(found.foreign, _units(found))}"
 
 
 def _member(j: Judged, found: Diagnosis) -> str:
@@ -281,19 +296,30 @@ def _unknown(found: Diagnosis) -> str:
         base = found.foreign.base.names
         beside = f" beside {' and '.join(effect_title(n) for n in base)}" if base else ""
         return (
-            f"{_misses(found)}no effect of the library describes it{beside}. {foreign_sentence(found.foreign, units)}"
+            f"{_misses(found)}{_certain(found)}no effect of the library describes it{beside}. "
+            f"{foreign_sentence(found.foreign, units)}"
         )
     shape = shape_in_words(found.shape, waves, found.rig, units)
     if found.members:
         held, covered = set_aside(found.validation), found.validation
         part = "" if covered is None else f"{100 * covered.covered_after:.0f} %"
         return (
-            f"{_misses(found)}{_added(found.members[0].candidate, found)} would be the most probable, but its 90 % "
-            f"band holds only {part} of the points that were set aside ({held}): no name is given. {shape}"
+            f"{_misses(found)}{_certain(found)}{_added(found.members[0].candidate, found)} would be the most probable, "
+            f"but its 90 % band holds only {part} of the points that were set aside ({held}): no name is given. {shape}"
         )
     if found.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{_misses(found)}no effect is needed, and none of the energies has this form. {shape}"
-    return f"{_misses(found)}more explanations are about as probable than this measurement can part. {shape}"
+    return (
+        f"{_misses(found)}{_certain(found)}more explanations are about as probable than this measurement can part. "
+        f"{shape}"
+    )
+
+
+def _certain(found: Diagnosis) -> str:
+    """Effects that are in all that is probable: what is known where the whole is not."""
+    p, names = found.probabilities, {n for key in found.probabilities.effects for n in key.split("+")} - {NOTHING}
+    sure = sorted(n for n in names if p.of_effect(n) >= VERDICT.sure)
+    return f"{_at_work(sure)} all that is probable, yet " if sure else ""
 
 
 _ANSWERS = {
@@ -318,6 +344,11 @@ def _model(candidate: Candidate) -> str:
 
 
 def _misses(found: Diagnosis) -> str:
+    if found.detection.adequate:
+        return (
+            f"{_model(found.null)} follows the curve (p = {found.detection.p_value:.2g}), but with parameters that "
+            "are less probable than another explanation: "
+        )
     return f"{_model(found.null)} misses something (p {_p(found)}): "
 
 

@@ -16,7 +16,7 @@ from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, log_insid
 from bayesmembrane.diagnosis.candidates.standard import Standard, expected_size, standard
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.thresholds import FORM, SEARCH, TINY
-from bayesmembrane.ground.parameters import Array, Normal, Parameter
+from bayesmembrane.ground.parameters import Array, Normal, Parameter, frozen
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.form_error import ENERGY, LAW, FormFactors, form_columns, form_factors, traces
 from bayesmembrane.physics.forward import Forward, Solve
@@ -266,5 +266,5 @@ def _at_bound(objective: Objective, axes: Standard, u: Array) -> tuple[str, ...]
 
 
 def _ends(p: Parameter) -> tuple[float, float]:
-    low, high = p.prior.distribution().support()
+    low, high = frozen(p.prior).support()
     return float(low), float(high)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,31 +43,44 @@ def adequate(case: OpenCase) -> Verdict:
 
 
 def decided(case: OpenCase, total: Total) -> Verdict:
-    """The verdict of a sum over hypotheses, of a model that misses something."""
+    """The verdict of a sum over hypotheses, of a model that misses something.
+
+    What is foreign beside effects that carry nearly all of the misfit is told with them; where it carries more, a name
+    would be a guess.
+    """
     p, given = total.probabilities, case.null.names
-    held = _smallest(total)
-    kinds = [kind for _, kind in held if kind != NOTHING]
-    foreign = next((f for f in total.foreign if kinds and f.kind == kinds[0]), None)
-    if p.foreign.get(NOTHING, 1.0) < 0.5:
-        return Verdict("unknown", (), total.ranking, p, foreign)
+    strange = _strange(total, given)
     best: dict[str, Judged] = {}
     for j in total.ranking:
         best.setdefault(set_name(j.candidate, given), j)
-    members = tuple(best[name] for name, kind in held if kind == NOTHING and name in best)
+    members = tuple(best[name] for name in _smallest(p.effects) if name in best)
+    unknown = Verdict("unknown", (), total.ranking, p, strange)
     if not members or len(members) > VERDICT.most_members:
-        return Verdict("unknown", (), total.ranking, p, foreign)
-    if all(name == NOTHING for name, _ in held) and foreign is None:
-        return _without_effects(case, total, members)
-    if any(_carried(m.candidate) for m in members[:1]):
-        return Verdict("unknown", (), total.ranking, p, foreign)
-    single = len(members) == 1 and foreign is None
-    return Verdict("named" if single else "ambiguous", members, total.ranking, p, foreign)
+        return unknown
+    first = members[0]
+    if strange is not None and strange.share * first.unexplained > VERDICT.foreign_carries:
+        return unknown
+    if [set_name(m.candidate, given) for m in members] == [NOTHING]:
+        return unknown if strange else _without_effects(case, total, members)
+    if _carried(first.candidate):
+        return unknown
+    return Verdict("named" if len(members) == 1 else "ambiguous", members, total.ranking, p, strange)
 
 
-def _smallest(total: Total) -> list[tuple[str, str]]:
-    """The fewest (set of effects, kind of what is foreign) that hold `VERDICT.sure` together."""
+def _strange(total: Total, given: Sequence[str]) -> Foreign | None:
+    """The most probable thing that is foreign, beside the most probable set; None if nothing more likely is."""
+    p = total.probabilities
+    if p.foreign.get(NOTHING, 1.0) >= 0.5:
+        return None
+    first, kind = next(key for key in total.joint if key[1] != NOTHING)
+    same = [f for f in total.foreign if f.kind == kind]
+    return next((f for f in same if set_name(f.base, given) == first), same[0])
+
+
+def _smallest(probabilities: Mapping[str, float]) -> list[str]:
+    """The fewest that hold `VERDICT.sure` together, of probabilities that fall."""
     held, out = 0.0, []
-    for key, q in total.joint.items():
+    for key, q in probabilities.items():
         out.append(key)
         held += q
         if held >= VERDICT.sure:

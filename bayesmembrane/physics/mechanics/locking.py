@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 
 import numba
 import numpy as np
@@ -13,6 +13,7 @@ from bayesmembrane.ground.parameters import Array
 
 STEPS = 60  # per factor 3.5 of R2/R1
 TABLE = np.linspace(np.log(1e-3), np.log(1e6), 400)
+TABULATED = 200  # films of one pre-stretch, from which on a table costs less than they do; one without any is kept
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -101,12 +102,12 @@ def locking_deflection(extensibility: ArrayLike, prestretch: ArrayLike, ratio: f
     jm, l0 = np.broadcast_arrays(np.asarray(extensibility, dtype=float), np.asarray(prestretch, dtype=float))
     shape = jm.shape
     jm, l0 = jm.ravel(), l0.ravel()
-    if jm.size and np.all(l0 == l0[0]):
+    if jm.size and np.all(l0 == l0[0]) and (l0[0] == 1.0 or jm.size >= TABULATED):
         return np.asarray(_interpolate(jm, float(l0[0]), float(ratio))).reshape(shape)
     return np.asarray(_lock_all(jm, l0, np.log(ratio)), dtype=float).reshape(shape)
 
 
-@cache
+@lru_cache(maxsize=64)
 def _table(l0: float, ratio: float) -> CubicSpline:
     """ln of the locking deflection against ln(Jm - Jm0), where Jm0 is the pre-stretch's own I1 - 3."""
     jm = np.exp(TABLE) + _own(l0)

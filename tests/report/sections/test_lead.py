@@ -1,4 +1,4 @@
-"""The first screen of a diagnosis or a loop: short, as the JSON answer has it, of one mind with the rest of the page."""
+"""The first screen of a diagnosis or a loop: short, and of one mind with the JSON answer and the rest of the page."""
 
 import itertools
 import re

@@ -1,0 +1,93 @@
+"""Verdicts follow from probabilities: of the effects, and of what is foreign beside them."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
+from bayesmembrane.diagnosis.explanation.case import OpenCase
+from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, Foreign
+from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, Total
+from bayesmembrane.diagnosis.explanation.verdict import decided
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.hypothesis import hypothesis
+
+
+def candidate(effects: str, energy_error: float = 1e-3, material: str = "gent") -> Candidate:
+    """A fit of a set of effects, with no residual to speak of."""
+    names = [] if effects == NOTHING else effects.split("+")
+    claim = with_effects(hypothesis(material), [components("effects")[n]() for n in names])
+    theta = np.array([0.0, np.log(energy_error), *([np.log(0.05)] * len(names))])
+    nothing = np.zeros(3)
+    return Candidate(
+        claim, np.zeros(claim.curve_size), nothing, nothing[:, None], 0.0, (), nothing[None], theta, nothing
+    )
+
+
+def total(
+    sets: dict[str, float], strange: float = 0.0, takes: float = 0.5, left: float = 0.01, best: Candidate | None = None
+) -> Total:
+    """A sum over sets of effects, with something sudden beside the first of the probability ``strange``, which takes
+    the part ``takes`` of the part ``left`` of the squares that the effects leave.
+    """
+    chosen = {name: best if best is not None and i == 0 else candidate(name) for i, name in enumerate(sets)}
+    ranking = tuple(Judged(chosen[n], p, 0.0, 1.0 if n == NOTHING else left, 1.0) for n, p in sets.items())
+    kinds = {SUDDEN: strange, NOTHING: 1 - strange}
+    first = next(iter(sets))
+    joint = {(n, k): p * q for n, p in sets.items() for k, q in kinds.items() if q > 0}
+    foreign = Foreign(SUDDEN, chosen[first], 30.0, size=0.1, place=5, share=takes)
+    return Total(
+        ranking,
+        Probabilities(sets, {"gent": 1.0}, dict(sorted(kinds.items(), key=lambda i: -i[1]))),
+        dict(sorted(joint.items(), key=lambda i: -i[1])),
+        (foreign,) if strange else (),
+    )
+
+
+def verdict(
+    sets: dict[str, float], null: str = "gent", describes: bool = True, **more: Any
+) -> tuple[str, list[str], bool]:
+    tested = SimpleNamespace(adequate=describes)
+    case = SimpleNamespace(null=candidate(NOTHING, material=null), tested=lambda _: tested)
+    found = decided(cast(OpenCase, case), total(sets, **more))
+    return found.verdict, ["+".join(m.candidate.names) for m in found.members], found.foreign is not None
+
+
+def test_a_set_is_named_from_the_probability_on_that_is_asked_for() -> None:
+    assert verdict({"friction": 0.951, "mullins": 0.049}) == ("named", ["friction"], False)
+    assert verdict({"friction": 0.949, "mullins": 0.051}) == ("ambiguous", ["friction", "mullins"], False)
+
+
+def test_an_ambiguous_answer_holds_the_fewest_sets_that_are_enough() -> None:
+    assert verdict({"friction": 0.6, "mullins": 0.36, "tearing": 0.04})[1] == ["friction", "mullins"]
+
+
+def test_too_many_sets_are_no_answer() -> None:
+    names = ["friction", "mullins", "tearing", "clamp_slip", "viscoelastic", "hysteresis", "force_drift"]
+    assert verdict(dict.fromkeys(names, 1 / 7))[0] == "unknown"
+
+
+def test_what_is_foreign_and_small_is_told_beside_a_name() -> None:
+    assert verdict({"friction": 0.99, "mullins": 0.01}, strange=0.99, left=0.05) == ("named", ["friction"], True)
+
+
+def test_what_is_foreign_and_large_forbids_a_name() -> None:
+    assert verdict({"friction": 0.99, "mullins": 0.01}, strange=0.99, left=0.5) == ("unknown", [], True)
+
+
+def test_what_is_foreign_without_any_effect_is_no_name() -> None:
+    assert verdict({NOTHING: 0.99, "friction": 0.01}, strange=0.99) == ("unknown", [], True)
+    assert verdict({NOTHING: 0.7, "friction": 0.3}, strange=0.99) == ("unknown", [], True)
+
+
+@pytest.mark.parametrize(("null", "answer"), [("gent", "adequate"), ("yeoh", "material")])
+def test_no_effect_is_adequate_or_another_energy(null: str, answer: str) -> None:
+    assert verdict({NOTHING: 0.99, "friction": 0.01}, null=null)[0] == answer
+
+
+def test_an_energy_that_is_far_off_is_not_known() -> None:
+    poor = candidate(NOTHING, energy_error=0.2)
+    assert verdict({NOTHING: 1.0}, describes=False, best=poor)[0] == "unknown"
+    assert verdict({"friction": 1.0}, best=candidate("friction", energy_error=0.2))[0] == "unknown"
