@@ -219,6 +219,12 @@ def by_points(shown: Sequence[Shown]) -> list[list[Shown]]:
     return [list(g) for _, g in groupby(in_order(shown), key=lambda s: (s.digest.end, s.data_hash))]
 
 
+def reach(s: Shown, shown: Sequence[Shown]) -> str:
+    """How far a run was fitted, as all of ``shown`` are told apart: with its points where others end there, too."""
+    same = {o.data_hash for o in shown if o.end == s.end}
+    return s.end if len(same) <= 1 else f"{s.end} ({s.digest.at.size} points)"
+
+
 def end_column(shown: Sequence[Shown]) -> Column:
     """How far runs were fitted, in a table; the values are those of `ends`."""
     how = alike(s.how for s in shown)

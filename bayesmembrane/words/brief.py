@@ -32,6 +32,8 @@ from bayesmembrane.words.units import size_in_words
 
 MOST_TOLD = 3
 """Explanations whose probability is told."""
+MOST_SIZES = 3
+"""Effects whose size is told with it; what is not told on the first screen is below."""
 ANSWERED = ("named", "material", "ambiguous")
 """Verdicts that rest on another model than the one that was given."""
 
@@ -131,7 +133,9 @@ def _probabilities(course: Course) -> str:
 def _every(course: Course) -> list[str]:
     d = course.telling
     p = d.probabilities
-    told = [_told(d, name, course) for name, q in p.effects.items() if q >= WORDS.probable][:MOST_TOLD]
+    probable = [name for name, q in p.effects.items() if q >= WORDS.probable][:MOST_TOLD]
+    sizes = np.cumsum([len(name.split("+")) for name in probable])
+    told = [_told(d, n, course, bool(k <= MOST_SIZES)) for n, k in zip(probable, sizes, strict=True)]
     foreign = 1.0 - p.foreign.get(NOTHING, 1.0)
     if foreign >= WORDS.probable:
         told.insert(0 if foreign > 0.5 else len(told), f"{percent(foreign)} something foreign")
@@ -140,11 +144,11 @@ def _every(course: Course) -> list[str]:
     return told
 
 
-def _told(d: Diagnosis, name: str, course: Course) -> str:
+def _told(d: Diagnosis, name: str, course: Course, sized: bool = True) -> str:
     """A set of effects with its probability; where the answer rests on it with the sizes, as they were fitted last."""
     p = percent(d.probabilities.effects.get(name, 0.0))
     of = next((j.candidate for j in d.members if set_name(j.candidate, d.null.names) == name), None)
-    if of is None or name == NOTHING:
+    if of is None or name == NOTHING or not sized:
         return f"{p} {set_title(name)}"
     if course.last is not d and set(name.split("+")) <= set(course.last.null.names):
         of = course.last.null

@@ -27,10 +27,10 @@ def answer(found: Loop) -> list[str]:
 
 
 def subject(found: Loop) -> str:
-    """Film, model and range that a loop started from."""
+    """Film, model, readings and range that a loop started from."""
     m = found.rounds[0].before.run.measurement
     end = seen(m).place(float(np.max(m.deflection)))
-    return f"{m.specimen.name}, {spoken(found.rounds[0].diagnosis.null.hypothesis)} up to {end}"
+    return f"{m.specimen.name}, {spoken(found.rounds[0].diagnosis.null.hypothesis)}, {len(m)} readings up to {end}"
 
 
 def validation_sentences(found: Loop) -> list[str]:

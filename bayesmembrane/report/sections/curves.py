@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.report.blocks import Block, Figure, Picture, points
 from bayesmembrane.report.canvas import Measured, Shade, band, encoded, errorbars, legend_columns, new_figure, style
-from bayesmembrane.report.runs import Shown, by_points
+from bayesmembrane.report.runs import Shown, by_points, reach
 from bayesmembrane.report.sections.base import Section, of_kind
 from bayesmembrane.report.style import FAINT, INK, MUTED, SHADE, colour, linestyle, marker
 from bayesmembrane.words.calibration import held_out
@@ -31,13 +31,14 @@ class CurvesSection(Section):
     order = 30
 
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
-        return [b for group in by_points(of_kind(results, Shown)) for b in _blocks(group)]
+        shown = of_kind(results, Shown)
+        return [b for group in by_points(shown) for b in _blocks(group, reach(group[0], shown))]
 
 
-def _blocks(group: Sequence[Shown]) -> list[Block]:
-    names, end, how = listed(s.name for s in group), group[0].end, group[0].how
+def _blocks(group: Sequence[Shown], end: str) -> list[Block]:
+    names, how = listed(s.name for s in group), group[0].how
     figure = Figure(
-        first_look([look_of(group)]),
+        first_look([look_of(group, end)]),
         alt=f"{how.origin.capitalize()} {how.load} against {how.travel} up to {end} with the curves of {names}, and "
         "their residuals",
         caption=f"{how.load.capitalize()} ({how.load_scale[1]}) against {how.travel_label}, fitted up to {end}: median "
@@ -49,7 +50,7 @@ def _blocks(group: Sequence[Shown]) -> list[Block]:
     return [figure, *points([held_out(s.name, s.digest.rest_residual, s.how) for s in group if s.digest.rest_at.size])]
 
 
-def look_of(group: Sequence[Shown]) -> Panel:
+def look_of(group: Sequence[Shown], end: str) -> Panel:
     """The picture of runs that were fitted to the same points."""
     d = group[0].digest
     rest = None
@@ -58,7 +59,7 @@ def look_of(group: Sequence[Shown]) -> Panel:
     curves = tuple(
         Fitted(s.look, s.digest.deflection, s.digest.curve, s.digest.beyond, s.digest.residual, s.name) for s in group
     )
-    return Panel(group[0].points, curves, rest, f"Fitted up to {group[0].end}")
+    return Panel(group[0].points, curves, rest, f"Fitted up to {end}")
 
 
 # ---- the picture -----------------------------------------------------------------------------------------------------

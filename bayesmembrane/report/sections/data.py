@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.report.blocks import Block, Table, Text, facts_table
-from bayesmembrane.report.runs import Shown, ShownFilm, by_points
+from bayesmembrane.report.runs import Shown, ShownFilm, by_points, reach
 from bayesmembrane.report.sections.base import Section, of_kind
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.origin import origin
@@ -29,12 +29,12 @@ class DataSection(Section):
         out: list[Block] = [Text(origin(r)) for r in of_kind(results, Reconstruction)]
         before = ""
         for group in by_points(shown):
-            out.append(_table(group[0], before))
+            out.append(_table(group[0], before, reach(group[0], shown)))
             before = group[0].film.origin
         return out
 
 
-def _table(s: Shown, before: str) -> Table:
+def _table(s: Shown, before: str, end: str) -> Table:
     """What is known of a measurement; an origin that is that of the table ``before`` is not told again."""
     d, film, how = s.digest, s.film, s.how
     factor, unit = how.small
@@ -57,7 +57,7 @@ def _table(s: Shown, before: str) -> Table:
         "notes": "; ".join(film.notes) or "none",
         "data hash (SHA-256)": s.data_hash,
     }
-    return facts_table(f"data up to {s.end}", f"The {how.curve}, fitted up to {s.end}.", facts)
+    return facts_table(f"data up to {end}", f"The {how.curve}, fitted up to {end}.", facts)
 
 
 def _rig(film: ShownFilm) -> str:

@@ -189,10 +189,8 @@ def test_two_loops_keep_apart(named: Loop, unknown: Loop) -> None:
     names = [b.name for s in sections for b in s.blocks if isinstance(b, Table)]
     assert [s.key for s in sections] == ["loop1", "loop2"]
     assert len(set(names)) == len(names)
-    assert [s.startswith("synthetic <film>, neo-Hookean up to") for s in LoopSection().answer([named, unknown])] == [
-        True,
-        True,
-    ]
+    starts = [s.partition(" up to")[0] for s in LoopSection().answer([named, unknown])]
+    assert starts == ["synthetic <film>, neo-Hookean, 120 readings"] * 2
 
 
 def test_without_a_name_the_rest_is_drawn_and_nothing_is_added(unknown: Loop) -> None:

@@ -106,8 +106,9 @@ def ranking_table(d: Diagnosis, name: str) -> Table:
     caption = (
         f"What could explain the residual of {spoken(d.null.hypothesis)}: every hypothesis was fitted as a whole. "
         "Probability: among all of them, nothing foreign beside it. ln Bayes factor: against the model as it was, "
-        "noise and form error integrated out. Unexplained: part of the squares beyond noise that is left. Error of "
-        "its law: what the trace of its effects would have to be off."
+        "noise and form error integrated out. Unexplained: part of the squares beyond noise that is left, form error "
+        "aside; above 100 % it is more than the model as it was leaves. Error of its law: what the trace of its "
+        "effects would have to be off."
     )
     if len(d.ranking) > MOST_CANDIDATES:
         caption += f" The {MOST_CANDIDATES} most probable of {len(d.ranking)}."

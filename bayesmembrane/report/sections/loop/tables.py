@@ -11,6 +11,7 @@ from bayesmembrane.report.sections.loop.way import Waypoint
 from bayesmembrane.words.hypothesis import effect_title
 from bayesmembrane.words.language import spoken_parameter
 from bayesmembrane.words.moved import Change
+from bayesmembrane.words.noises import noise_title
 from bayesmembrane.words.seen import seen
 
 
@@ -29,6 +30,7 @@ def scores_table(found: Sequence[Waypoint], name: str) -> Table:
     """Evidence, prediction of left-out points and coverage of the models that were sampled."""
     columns = (
         Column("model", "model"),
+        Column("noise", "noise model"),
         Column("log_evidence", "ln Z", ".2f"),
         Column("log_evidence_sd", "+-", ".2f"),
         Column("elpd_loo", "elpd, leave one out", ".1f"),
@@ -36,14 +38,23 @@ def scores_table(found: Sequence[Waypoint], name: str) -> Table:
         Column("coverage_90", "inside the 90 % band", "%"),
     )
     rows = tuple(
-        (_labelled(m), s.log_evidence, s.log_evidence_sd, s.elpd_loo, s.loo_se, s.coverage)
+        (
+            _labelled(m),
+            noise_title(s.run.hypothesis.noise.name),
+            s.log_evidence,
+            s.log_evidence_sd,
+            s.elpd_loo,
+            s.loo_se,
+            s.coverage,
+        )
         for m in found
         if (s := m.stage) is not None
     )
+    points = len(found[0].of.measurement)
     caption = (
-        "From the posteriors: evidence by bridge sampling, expected log predictive density of points left out one by "
-        "one (with its standard error), and the part of the measured points that the 90 % predictive band holds. The "
-        "band contains the noise that a model infers, so that it can cover what it does not explain."
+        f"From the posteriors of {points} readings: evidence by bridge sampling, expected log predictive density of "
+        "points left out one by one (with its standard error), and the part of the measured points that the "
+        "90 % predictive band holds. The band contains the noise that a model infers, so that it can cover what it does not explain."
     )
     return Table(name, caption, columns, rows)
 

@@ -13,7 +13,7 @@ from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.calibration.run import Run, stored_predictions
 from bayesmembrane.report.blocks import Block, Figure, Heading, Part, Text
 from bayesmembrane.report.render import fragment
-from bayesmembrane.report.runs import Shown, in_order, read
+from bayesmembrane.report.runs import Shown, in_order, reach, read
 from bayesmembrane.report.sections.base import Glance, Section, of_kind
 from bayesmembrane.report.sections.run.draws import (
     Marginal,
@@ -54,7 +54,7 @@ class RunSection(Section):
         shown = [*of_kind(results, Shown), *map(read, of_kind(results, Run))]
         compared = of_kind(results, Compared)
         return [
-            Part(s.key, f"{s.name}, fitted up to {s.end}", tuple(_blocks(s, _beside(s, compared))))
+            Part(s.key, f"{s.name}, fitted up to {reach(s, shown)}", tuple(_blocks(s, _beside(s, compared))))
             for s in in_order(shown)
         ]
 
@@ -62,13 +62,14 @@ class RunSection(Section):
         return warnings([s.case for s in in_order(of_kind(results, Shown))])
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
+        shown = in_order(of_kind(results, Shown))
         return [
             Glance(
                 "calibration",
-                f"{s.name}, up to {s.end}",
+                f"{s.name}, up to {reach(s, shown)}",
                 f"rms residual {s.how.force(s.case.rmse)}, {verdict(s.case)}; {s.sampling.status}",
             )
-            for s in in_order(of_kind(results, Shown))
+            for s in shown
         ]
 
     def text(self, result: Any) -> str:
