@@ -8,7 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from bayesmembrane.words.language import percent, without_exponent
+from bayesmembrane.words.language import percent, three_digits, without_exponent
+
+PLAIN = "three digits"
+"""Form of a column: three digits without an exponent."""
 
 Value = str | float | int | bool | None
 
@@ -75,6 +78,8 @@ class Column:
             return value
         if self.form == "%":
             return percent(float(value))
+        if self.form == PLAIN:
+            return three_digits(float(value))
         if self.form == "p" and value < 1e-4:
             return "< 0.0001"
         return without_exponent(f"{value:{'.2g' if self.form == 'p' else self.form}}")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.words.language import digits, newtons, without_exponent
+from bayesmembrane.words.language import digits, newtons, three_digits
 
 MEASURED = "measured"
 _NOT_MEASURED = ("reconstructed", "synthetic", "simulated")
@@ -53,7 +53,7 @@ class Seen:
 
     def error(self, value: float) -> str:
         """A residual in N in words: ``4.02 mN``."""
-        return f"{without_exponent(f'{self.small[0] * value:.3g}')} {self.small[1]}"
+        return f"{three_digits(self.small[0] * value)} {self.small[1]}"
 
     def force(self, value: float) -> str:
         """A force in N in words, three digits: mN below 0.1 N; of a strip its stress."""

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.ground.stored import read
-from bayesmembrane.report.blocks import Block, Column, Figure, Picture, Table, Text, points
+from bayesmembrane.report.blocks import PLAIN, Block, Column, Figure, Picture, Table, Text, points
 from bayesmembrane.report.canvas import Interval, draw_interval, encoded, new_figure, style
 from bayesmembrane.report.runs import Shown, end_column, ends, in_order
 from bayesmembrane.report.sections.base import Section, Subject, of_kind
@@ -75,11 +75,11 @@ def fits_table(shown: Sequence[Shown]) -> Table:
         end_column(shown),
         Column("points", "points", "d"),
         Column("parameters", "parameters", "d"),
-        Column(f"rmse_{unit}", f"rms residual ({unit})", ".3g"),
-        Column(f"max_{unit}", f"largest residual ({unit})", ".3g"),
+        Column(f"rmse_{unit}", f"rms residual ({unit})", PLAIN),
+        Column(f"max_{unit}", f"largest residual ({unit})", PLAIN),
         Column(f"loss_{whole}", f"loss ({whole})"),
-        Column(f"own_noise_{unit}", f"stated noise ({unit})", ".3g"),
-        Column(f"extra_noise_{unit}", f"inferred extra noise ({unit})", ".3g"),
+        Column(f"own_noise_{unit}", f"stated noise ({unit})", PLAIN),
+        Column(f"extra_noise_{unit}", f"inferred extra noise ({unit})", PLAIN),
         Column("reduced_chi2", "reduced chi-square", ".3g"),
         Column("p_value", "p-value", "p"),
         Column("verdict", "verdict"),

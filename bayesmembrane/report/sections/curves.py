@@ -111,7 +111,7 @@ def _look(ax: Axes, look: Panel, first: bool) -> None:
     how = look.points.how
     end = _at(how, float(np.max(look.points.deflection)))
     for curve in look.curves:
-        _curve(ax, curve, how)
+        _curve(ax, curve, look.points)
     last = max([end, *(_at(how, float(c.deflection[-1])) for c in look.curves)])
     lowest, top = _reach(look, last)
     if last > end * (1 + 1e-6):
@@ -151,11 +151,16 @@ def _at(how: Seen, deflection: float) -> float:
     return how.rest + how.travel_scale[0] * deflection
 
 
-def _curve(ax: Axes, curve: Fitted, how: Seen) -> None:
+def _curve(ax: Axes, curve: Fitted, points: Measured) -> None:
+    """The median: where the film was unloaded, too, in the order of the test, for a loop is seen as one."""
+    how = points.how
     x, force, c = how.along(curve.deflection), how.carried(curve.force), colour(curve.look)
     inside = ~curve.beyond
     band(ax, x, force, inside, Shade(c, 0.25))
-    ax.plot(x[inside], force[1][inside], color=c, zorder=3)
+    if np.any(np.diff(points.deflection) < 0) and np.all(np.isfinite(curve.residual[1])):
+        ax.plot(how.along(points.deflection), how.carried(points.force - curve.residual[1]), color=c, zorder=3)
+    else:
+        ax.plot(x[inside], force[1][inside], color=c, zorder=3)
     if np.any(curve.beyond):
         outside = curve.beyond.copy()
         outside[max(0, int(np.argmax(curve.beyond)) - 1)] = True  # joined to the inside

@@ -15,7 +15,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.left.heldout import Misfit
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.report.blocks import Column, Figure, Lead, Picture, Table
+from bayesmembrane.report.blocks import PLAIN, Column, Figure, Lead, Picture, Table
 from bayesmembrane.report.canvas import encoded, new_figure, style
 from bayesmembrane.report.style import FAINT, INK, MUTED, RANGE_COLOURS
 from bayesmembrane.words.brief import Brief
@@ -57,8 +57,8 @@ def errors(steps: Sequence[Step], last: Diagnosis) -> Table:
     held = "held out (too few points)" if v is None else f"held out: {set_aside(v)}"
     columns = (
         Column("model", f"root mean square ({unit})"),
-        Column("in_sample", "in sample", ".3g"),
-        Column("held_out", held, ".3g"),
+        Column("in_sample", "in sample", PLAIN),
+        Column("held_out", held, PLAIN),
     )
     rows = [
         (s.title, factor * s.error.rmse_N, None if s.held_out is None else factor * s.held_out.rmse_N) for s in steps

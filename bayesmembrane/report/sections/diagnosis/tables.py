@@ -8,7 +8,7 @@ from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.left.heldout import Misfit
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.registry import components
-from bayesmembrane.report.blocks import Column, Table, Value
+from bayesmembrane.report.blocks import PLAIN, Column, Table, Value
 from bayesmembrane.words.candidates import candidate_title, sizes
 from bayesmembrane.words.diagnosis import set_aside
 from bayesmembrane.words.hypothesis import effect_title, spoken
@@ -24,11 +24,11 @@ def error_columns(how: Seen) -> tuple[Column, ...]:
     unit = how.small[1]
     return (
         Column("model", "model"),
-        Column(f"rmse_{unit}", f"root mean square ({unit})", ".3g"),
-        Column(f"max_{unit}", f"largest ({unit})", ".3g"),
+        Column(f"rmse_{unit}", f"root mean square ({unit})", PLAIN),
+        Column(f"max_{unit}", f"largest ({unit})", PLAIN),
         Column("reduced_chi2", "reduced chi-square", ".3f"),
-        Column(f"heldout_rmse_{unit}", f"held out: root mean square ({unit})", ".3g"),
-        Column(f"heldout_max_{unit}", f"held out: largest ({unit})", ".3g"),
+        Column(f"heldout_rmse_{unit}", f"held out: root mean square ({unit})", PLAIN),
+        Column(f"heldout_max_{unit}", f"held out: largest ({unit})", PLAIN),
         Column("heldout_reduced_chi2", "held out: reduced chi-square", ".3f"),
         Column("heldout_coverage_90", "held out: inside the 90 % band", "%"),
     )
