@@ -45,7 +45,7 @@ demo: $(STAMP)
 	$(VENV)/bin/bayesmembrane demo
 
 test: lint
-	$(PY) -m pytest -n $(PYTEST_WORKERS)
+	$(PY) -m pytest -n $(PYTEST_WORKERS) --dist loadfile --no-loadscope-reorder
 
 lint: $(STAMP)
 	$(PY) -m ruff check .

@@ -11,6 +11,7 @@ from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.rigs.annulus import Annulus
 from tests.reference.slow_solver import force_curve
 from tests.seeds import move
+from tests.short_walks import shorten
 
 move()  # before any test module draws
 
@@ -46,3 +47,9 @@ def film() -> Film:
         return Measurement(deflection, force + error, Annulus(INNER, OUTER), Specimen("synthetic", 5e-5), force_sd=sd)
 
     return make
+
+
+@pytest.fixture
+def short_walks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sampling ends at a limit of 40 steps, and says so: for what becomes of draws, and not for what they are."""
+    shorten(monkeypatch.setattr)

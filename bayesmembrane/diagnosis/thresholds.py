@@ -140,7 +140,7 @@ class Sizes:
     """Of the largest deflection: lengths, as slack, a set, the frame's yielding at the largest force."""
     force: float = 0.01
     """Of the largest force: forces, as friction, an offset, a drift until the end."""
-    largest: float = 30.0
+    largest: float = 20.0
     """Times the expected size: nothing larger is looked for."""
 
 
@@ -236,7 +236,7 @@ class VerdictThresholds:
     """Of an ambiguous answer; if more are needed, nothing can be told."""
     carried: float = 0.05
     """Relative error of an energy from which on none of those known is said to hold."""
-    law_carried: float = 0.6
+    law_carried: float = 0.35
     """Relative error of a law from which on the effect is no longer the one that the library means."""
     foreign_carries: float = 0.1
     """Of the misfit beyond noise: if something foreign takes more of it than that, effects are not named beside it."""

@@ -40,9 +40,15 @@ below what such data can tell.
 """
 
 LAW = Parameter(
-    "ln_eta_law", "-", "log of the relative error of an effect's law", Normal(float(np.log(0.05)), 1.0), (-9.0, 0.7)
+    "ln_eta_law",
+    "-",
+    "log of the relative error of an effect's law",
+    Normal(float(np.log(0.05)), 1.0),
+    (-9.0, float(np.log(0.4))),
 )
-"""eta_e: half of the prior lies below 5 %, 95 % within 0.7 % to 37 %."""
+"""eta_e: half of the prior lies below 5 %, 95 % within 0.7 % to 37 %; what differs from a law by more than 40 % follows
+another one.
+"""
 
 STATE_LENGTHS = (0.15, 0.3, 0.6)
 """Of the whole range: over how much deflection the error of an energy changes. Equal parts of its variance."""

@@ -275,8 +275,12 @@ def _at_work(names: Sequence[str]) -> str:
 
 
 def _beside(found: Diagnosis) -> str:
-    """What is foreign beside the effects."""
-    return "" if found.foreign is None else f" Beside it: {foreign_sentence(found.foreign, _units(found))}"
+    """What is foreign beside the effects, or may be."""
+    if found.foreign is None:
+        return ""
+    p = 1 - found.probabilities.foreign.get(NOTHING, 1.0)
+    how = "Beside it" if p >= 0.5 else f"Perhaps beside it ({percent(p)})"
+    return f" {how}: {foreign_sentence(found.foreign, _units(found))}"
 
 
 def _member(j: Judged, found: Diagnosis) -> str:

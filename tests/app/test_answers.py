@@ -161,6 +161,7 @@ def test_valleys_with_an_effect_come_back_as_they_were(curve: Measurement, tmp_p
     np.testing.assert_array_equal(again.read().added.ranges[0].floor, found.result.added.ranges[0].floor)
 
 
+@pytest.mark.usefixtures("short_walks")
 def test_a_loop_is_read_back_with_its_runs_also_where_it_was_moved(curve: Measurement, tmp_path: Path) -> None:
     found = analyses.loop(curve, PLAIN, Work(out=tmp_path / "here", ess=100), runs=tmp_path / "here" / "runs")
     (tmp_path / "here").rename(tmp_path / "there")
@@ -173,6 +174,7 @@ def test_a_loop_is_read_back_with_its_runs_also_where_it_was_moved(curve: Measur
     assert first.diagnosis.verdict == before.diagnosis.verdict
 
 
+@pytest.mark.usefixtures("short_walks")
 def test_a_comparison_is_read_back(curve: Measurement, tmp_path: Path) -> None:
     found = bm.compare(curve, [PLAIN], ess=100, out=tmp_path)
     kinds = {f.kind: f.read() for f in lying([tmp_path])}

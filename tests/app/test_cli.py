@@ -202,6 +202,7 @@ def test_errors_of_a_strip_are_told_in_stress(run: Run, tmp_path: Path) -> None:
     assert 6e-3 <= shown[1] < 9e-3
 
 
+@pytest.mark.usefixtures("short_walks")
 def test_a_biaxial_measurement_is_sampled_compared_and_diagnosed(run: Run, tmp_path: Path) -> None:
     """Every verb on a neo-Hookean film held across, also on a part of it; what was not read is said on stderr."""
     l1 = np.array([1.2, 1.2, 1.5, 1.5, 1.9, 1.9])

@@ -12,6 +12,7 @@ import pytest
 from bayesmembrane.app import demo
 from bayesmembrane.app.analyses import Work
 from bayesmembrane.app.folders import lying
+from bayesmembrane.ground.jobs import workers
 from bayesmembrane.ground.registry import material, materials
 from bayesmembrane.report.page import TWIN
 
@@ -25,11 +26,13 @@ def test_the_verbs_can_be_sent_to_other_processes() -> None:
     assert len(then) == len(demo.LOOPS) + len(demo.VALLEYS)
 
 
+@pytest.mark.usefixtures("short_walks")
 def test_a_short_demonstration_and_its_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One material on both ranges, fitted, sampled, followed and compared; the page alone from the folder."""
     one = "neo_hookean"
     monkeypatch.setattr(demo, "materials", lambda: {one: material(one)})
     first = {f"{one}, {where}": partial(demo.calibrate, one, where) for where in demo.RANGES}
+    monkeypatch.setattr(demo, "workers", partial(workers, count=1))  # a fresh process takes longer than its work here
     monkeypatch.setattr(demo, "stages", lambda: (first, {"valleys": partial(demo.follow_valleys, one)}))
     told: set[str] = set()
     work = Work(0, tmp_path / "chains", 100.0, lambda label, now: told.add(label))

@@ -9,8 +9,8 @@ from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.api import unaided
 from tests.calibration.curves import ordinary
 
-SEEDS = range(12)
-SIX = (0, 8, 9)  # curves for the six parameters of Ogden, which take as long as the four other energies
+SEEDS = (0, 1, 3, 8, 9)  # of the hundred of the study
+SIX = (0, 8)  # curves for the six parameters of Ogden, which take as long as the four other energies
 ROUND_OFF = 1e-6
 # A neo-Hookean film is Gent's without a limit, and its coordinate ends at ln Jm = 16: I1 - 3 over Jm is left, and makes
 # the loss larger by 3e-7 to 1e-5 of itself on these curves.

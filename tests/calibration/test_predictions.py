@@ -57,7 +57,7 @@ def test_bands_hold_the_truth_and_widen_beyond_the_fit() -> None:
     force = shot(at) + 0.02 * np.random.default_rng(8).standard_normal(at.size)
     part = Measurement(at, force, Annulus(0.010, 0.035), Specimen("film", 50e-6)).up_to(0.06)
     claim = hypothesis("gent")
-    found = predict_draws(claim, part, sample(part, claim, RunSettings(seed=5)).draws())
+    found = predict_draws(claim, part, sample(part, claim, RunSettings(seed=5, ess=300)).draws())
     low, middle, high = found.curve
     truth, inner = shot(found.deflection), ~found.beyond
     sd = (high - low) / (2 * 1.645)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bayesmembrane.calibration.prior import Mass
+from bayesmembrane.calibration.sampling.proposals import mixture
 from bayesmembrane.comparison import jobs as comparison_jobs
 from bayesmembrane.comparison.compare import claimed, compare, ranges_of
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, Disagreement, together
@@ -26,6 +27,9 @@ from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.words.comparison import document, no_ranking, preferred
 from tests.ground.values import stored_equals_given
+from tests.short_walks import shorten
+
+FEW = (1, 2, 4)  # components of a density beside so plain a posterior
 
 
 def film(name: str = "gent", parameters: tuple[float, ...] = (7.0, 20.0), end: float = 0.06) -> Measurement:
@@ -42,7 +46,9 @@ def compared(tmp_path_factory):
     claims = [hypothesis(n) for n in ("neo_hookean", "gent")]
     whole = film()
     judging = Judging(402, 300, False, out, 1)
-    found = compare(whole.up_to(0.049), claims, judging, whole=whole, progress=lambda *words: told.append(words))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mixture, "COUNTS", FEW)
+        found = compare(whole.up_to(0.049), claims, judging, whole=whole, progress=lambda *words: told.append(words))
     return found, out, told, claims, whole
 
 
@@ -78,6 +84,7 @@ def test_what_is_stored_is_used_again(compared, monkeypatch):
         monkeypatch.setattr(comparison_jobs, name, never)
     again = compare(whole.up_to(0.049), claims, Judging(402, 300, False, out, 1), whole=whole)
     assert again.summary() == found.summary()
+    shorten(monkeypatch.setattr)
     with pytest.raises(AssertionError, match="computed again"):
         compare(whole.up_to(0.049), claims, Judging(403, 300, False, None, 1))
 
@@ -113,6 +120,7 @@ def test_a_hypothesis_that_cannot_be_fitted_does_not_spoil_the_others(monkeypatc
         return Mass(0.0, 5e-4) if posterior.hypothesis.material.name == "gent" else mass(posterior, seed)
 
     monkeypatch.setattr(comparison_jobs, "_mass", none_for_gent)
+    monkeypatch.setattr(mixture, "COUNTS", FEW)
     m = film("neo_hookean", (7.0,), 0.03).select(np.arange(4))
     claims = [hypothesis(n) for n in ("neo_hookean", "gent", "ogden")]
     found = compare(m, claims, Judging(405, 200, False, None, 1))

@@ -44,7 +44,8 @@ def test_nothing_is_missing_where_nothing_is(tmp_path, material, protocol, noise
 @pytest.mark.parametrize(
     ("kind", "material", "protocol", "seed"),
     [
-        ("viscoelastic", "neo_hookean", "two_speeds", 512),
+        # Relaxation is named below, too, on a strip.
+        pytest.param("viscoelastic", "neo_hookean", "two_speeds", 512, marks=pytest.mark.study),
         ("force_drift", "neo_hookean", "staircase", 513),
         ("friction", "mooney_rivlin", "staircase_twice", 514),
     ],
@@ -60,6 +61,9 @@ def test_a_clear_effect_is_named_and_explains_the_residual(tmp_path, kind, mater
     assert found.after.rmse_N < 1.1 * sd < found.before.rmse_N
     assert found.validation.after.rmse_N < min(1.3 * sd, found.validation.before.rmse_N)
     assert found.ranking[0].candidate.names == (kind,)
+    answer = json.loads(json.dumps(document(found)))
+    assert (answer["verdict"], list(answer["effects"])) == ("named", [kind])
+    assert answer["ranking"][0]["log_bayes_factor"] >= answer["ranking"][-1]["log_bayes_factor"]
 
 
 def test_an_effect_with_a_look_alike_stays_inside_the_answer(tmp_path) -> None:
@@ -95,15 +99,6 @@ def test_a_wrongly_declared_family_is_not_blamed_on_the_instrument(tmp_path) -> 
     assert found.hypothesis.effects == ()
 
 
-def test_the_summary_is_plain_json(tmp_path) -> None:
-    _, found = answered(tmp_path, "force_offset", "neo_hookean", "staircase", "white", 541)
-    answer = json.loads(json.dumps(document(found)))
-    assert answer["verdict"] in VERDICTS
-    assert answer["verdict"] == found.verdict
-    assert answer["ranking"][0]["log_bayes_factor"] >= answer["ranking"][-1]["log_bayes_factor"]
-    assert "force_offset" in answer["effects"]
-
-
 def test_too_few_points_are_refused() -> None:
     few = measured(np.linspace(0.01, 0.1, 8), np.linspace(0.005, 0.04, 8))
     with pytest.raises(SettingsError, match="points"):
@@ -113,7 +108,7 @@ def test_too_few_points_are_refused() -> None:
 @pytest.mark.parametrize(
     ("material", "protocol", "noise", "seed", "verdict"),
     [
-        ("gent", "staircase_twice", "white", 50091, "unknown"),
+        pytest.param("gent", "staircase_twice", "white", 50091, "unknown", marks=pytest.mark.study),
         # It falls on the way to a new maximum, where films tear.
         ("mooney_rivlin", "two_speeds", "ar1:0.5", 50086, "ambiguous"),
     ],

@@ -42,8 +42,14 @@ def test_the_grid_is_fine_enough(name):
     assert log_evidence(posterior(name), cells=60) == pytest.approx(exact(name), abs=0.005)
 
 
-@pytest.mark.parametrize("range_name", ["OP1", "OP2"])
-@pytest.mark.parametrize("name", MATERIALS)
+@pytest.mark.parametrize(
+    ("name", "range_name"),
+    [
+        *((name, end) for name in ("neo_hookean", "gent") for end in ("OP1", "OP2")),
+        ("mooney_rivlin", "OP2"),
+        pytest.param("mooney_rivlin", "OP1", marks=pytest.mark.study),
+    ],
+)
 def test_bridge_sampling_is_right_within_a_twentieth(name, range_name):
     x, log_posterior, _ = sampled(name, range_name=range_name)
     found = bridge(PosteriorTarget(posterior(name, range_name=range_name)), x, seed=7, log_posterior=log_posterior)
@@ -58,7 +64,9 @@ def test_nested_sampling_is_right_within_three_standard_errors(name):
     assert abs(found.log_evidence - exact(name)) < 3 * found.sd
 
 
-def test_evidence_under_another_mode_comes_from_the_draws_of_one():
+# Films that are not convex take long to be solved: "elliptic" allows many, and "none" all.
+@pytest.mark.parametrize("solved", [{"reached", "box"}, pytest.param({"elliptic"}, marks=pytest.mark.study)])
+def test_evidence_under_another_mode_comes_from_the_draws_of_one(solved):
     """Where a mode is not answered, it is said why; where it is, cubature agrees."""
     p = posterior("mooney_rivlin", range_name="OP2")
     x, _, _ = sampled("mooney_rivlin", range_name="OP2")
@@ -68,7 +76,7 @@ def test_evidence_under_another_mode_comes_from_the_draws_of_one():
     assert rows["reached"].log_evidence == pytest.approx(known - np.log(masses["reached"].value))
     answered = [m for m, r in rows.items() if r.missing is None]
     assert "reached" in answered
-    for mode in set(answered) - {"none"}:  # films that are not convex take long to be solved
+    for mode in solved & set(answered):
         wanted = exact("mooney_rivlin", mode, "OP2") - np.log(masses[mode].value)
         assert abs(rows[mode].log_evidence - wanted) < 3.5 * rows[mode].sd + 0.02
     # Whatever else is allowed adds to the integral that is not yet divided by the mass.
@@ -77,7 +85,7 @@ def test_evidence_under_another_mode_comes_from_the_draws_of_one():
     assert integral.get("none", np.inf) >= integral["reached"] - 1e-9
 
 
-@pytest.mark.parametrize("name", ["gent", "mooney_rivlin"])
+@pytest.mark.parametrize("name", ["gent", pytest.param("mooney_rivlin", marks=pytest.mark.study)])
 def test_prior_widths_agree_with_priors_of_that_width(name):
     """The reweighted change is that of the two cubatures, with the mass of either prior.
 

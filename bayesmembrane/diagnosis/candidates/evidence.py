@@ -33,10 +33,12 @@ class Block:
     """Columns (N, m), freed of noise, whose coefficients are N(0, eta^2).
 
     ln_eta : (mean, sd) of the normal prior of ln eta; None: eta is 1
+    most : of ln eta: what is further off is something else
     """
 
     columns: Array
     ln_eta: tuple[float, float] | None = None
+    most: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,12 @@ class Linear:
         """(h, 2) mean and sd of theta."""
         own = [b.ln_eta for b in self.blocks if b.ln_eta is not None]
         return np.array([(0.0, self.ln_scale_sd), *own])
+
+    @cached_property
+    def ends(self) -> tuple[Array, Array]:
+        """(h,), (h,) between which theta is looked for."""
+        low, high = (self.priors[:, 0] + s * FORM.reach * self.priors[:, 1] for s in (-1, 1))
+        return low, np.minimum(high, [np.inf, *(b.most for b in self.blocks if b.ln_eta is not None)])
 
     @cached_property
     def owner(self) -> Array:
@@ -139,7 +147,7 @@ def weighed(model: Linear, start: Array | None = None) -> Weighed:
     if start is not None and start.size == len(model.priors):
         starts.append(start)
     begin = max(starts, key=lambda t: model.log_density(t)[0])
-    low, high = (model.priors[:, 0] + s * FORM.reach * model.priors[:, 1] for s in (-1, 1))
+    low, high = model.ends
 
     def cost(theta: Array) -> tuple[float, Array]:
         value, slope = model.log_density(theta)

@@ -154,7 +154,7 @@ class Search:
     def _forms(self, candidate: Candidate) -> list[Block]:
         """The same freed of noise, with the priors of their relative sizes."""
         energy, *laws = (self.noise.white(c) for c in self._columns(candidate))
-        return [Block(energy, _moments(ENERGY)), *(Block(law, _moments(LAW)) for law in laws)]
+        return [_form(energy, ENERGY), *(_form(law, LAW) for law in laws)]
 
     def _freeing(self, parent: Candidate | None, capped: bool = True) -> Freeing:
         if parent is None:
@@ -245,6 +245,10 @@ def starts_with(bases: Sequence[Array], effect: Effect, measurement: Measurement
                     theta[0] = (effect.size.null or 0.0) + sign * share * scale
                     out.append(np.concatenate([base, effect.within_bounds(theta)]))
     return out
+
+
+def _form(columns: Array, eta: Parameter) -> Block:
+    return Block(columns, _moments(eta), eta.bounds[1])
 
 
 def _moments(p: Parameter) -> tuple[float, float]:

@@ -24,7 +24,7 @@ class Verdict:
     members : the hypotheses that it rests on, each with the most probable energy of its set of effects
     ranking : every hypothesis that was fitted, the most probable first
     probabilities : summed
-    foreign : what is foreign, where that is more probable than not
+    foreign : what is foreign, where it is not sure that there is nothing
     """
 
     verdict: str
@@ -55,10 +55,11 @@ def decided(case: OpenCase, total: Total) -> Verdict:
         best.setdefault(set_name(j.candidate, given), j)
     members = tuple(best[name] for name in _smallest(p.effects) if name in best)
     unknown = Verdict("unknown", (), total.ranking, p, strange)
+    sure = p.foreign.get(NOTHING, 1.0) < 0.5
     if not members or len(members) > VERDICT.most_members:
         return unknown
     first = members[0]
-    if strange is not None and strange.share * first.unexplained > VERDICT.foreign_carries:
+    if sure and strange is not None and strange.share * first.unexplained > VERDICT.foreign_carries:
         return unknown
     if [set_name(m.candidate, given) for m in members] == [NOTHING]:
         return unknown if strange else _without_effects(case, total, members)
@@ -68,9 +69,9 @@ def decided(case: OpenCase, total: Total) -> Verdict:
 
 
 def _strange(total: Total, given: Sequence[str]) -> Foreign | None:
-    """The most probable thing that is foreign, beside the most probable set; None if nothing more likely is."""
+    """The most probable thing that is foreign, beside the most probable set; None if there is surely nothing."""
     p = total.probabilities
-    if p.foreign.get(NOTHING, 1.0) >= 0.5:
+    if p.foreign.get(NOTHING, 1.0) >= VERDICT.sure:
         return None
     first, kind = next(key for key in total.joint if key[1] != NOTHING)
     same = [f for f in total.foreign if f.kind == kind]

@@ -41,9 +41,8 @@ class Mixture:
 
     def distance(self, x: Array) -> Array:
         """Squared Mahalanobis distances (B, K) of x (B, k)."""
-        inverse = np.linalg.inv(self.roots)
-        z = np.einsum("kij,bkj->bki", inverse, x[:, None, :] - self.means)
-        return np.asarray(np.einsum("bki,bki->bk", z, z))
+        z = np.linalg.inv(self.roots) @ (x.T - self.means[:, :, None])
+        return np.asarray(np.sum(z * z, axis=1).T)
 
     def draw(self, rng: np.random.Generator, count: int) -> Array:
         """Independent draws (count, k)."""
@@ -155,7 +154,7 @@ def _step(z: Array, share: Array, tail: Array, degrees: float) -> Mixture:
     w = share * tail
     total = np.maximum(np.sum(w, axis=0), 1e-12)
     means = (w.T @ z) / total[:, None]
-    d = z[:, None, :] - means
-    scatter = np.einsum("bk,bki,bkj->kij", w, d, d) / size[:, None, None]
+    d = z.T - means[:, :, None]
+    scatter = (d * w.T[:, None, :]) @ d.transpose(0, 2, 1) / size[:, None, None]
     roots = np.linalg.cholesky(scatter + (RIDGE + PULL * k / size)[:, None, None] * np.eye(k))
     return Mixture(np.log(size / len(z)), means, roots, degrees)
