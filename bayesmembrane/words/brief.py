@@ -195,9 +195,9 @@ def _unknown(course: Course) -> str:
     d = course.telling
     sure, further = _certain(d), " further" if course.named else ""
     start = f"{sure} is certain, yet " if sure else ""
-    if d.foreign is not None:
-        beside = listed(effect_title(n) for n in d.foreign.base.names)
-        return f"{start}{_foreign(d.foreign, d.measurement)}{f', beside {beside}' if beside and not sure else ''}"
+    if (strange := _strange(d)) is not None:
+        beside = listed(effect_title(n) for n in strange.base.names)
+        return f"{start}{_foreign(strange, d.measurement)}{f', beside {beside}' if beside and not sure else ''}"
     if d.members and d.validation is not None:
         covered = language.percent(d.validation.covered_after)
         return f"nothing{further} is named, for this predicts only {covered} of the points held out"
@@ -207,8 +207,14 @@ def _unknown(course: Course) -> str:
 
 
 def _beside(d: Diagnosis) -> str:
-    """What is foreign beside the effects."""
-    return "" if d.foreign is None else f", beside {_foreign(d.foreign, d.measurement)}"
+    """What is foreign beside the effects, if that is more probable than not."""
+    strange = _strange(d)
+    return "" if strange is None else f", beside {_foreign(strange, d.measurement)}"
+
+
+def _strange(d: Diagnosis) -> Foreign | None:
+    """What is foreign, where that is more probable than that nothing is."""
+    return d.foreign if d.probabilities.foreign.get(NOTHING, 1.0) < 0.5 else None
 
 
 def _certain(d: Diagnosis) -> str:
@@ -335,7 +341,8 @@ def _use_as_it_is(d: Diagnosis) -> str:
 
 
 def _when_unknown(d: Diagnosis) -> str:
-    if d.foreign is None:
+    strange = _strange(d)
+    if strange is None:
         return "Repeat the test, and do not extrapolate with this model."
     advice = {
         SUDDEN: "Look for a knock, a tear or a change of temperature then.",
@@ -343,7 +350,7 @@ def _when_unknown(d: Diagnosis) -> str:
         PLAY: "Take the play out of the drive, and test again.",
         CLIPPED: "Leave these readings out, or take a larger load cell.",
     }
-    return advice.get(d.foreign.kind, "Repeat the test: what comes again is no accident.")
+    return advice.get(strange.kind, "Repeat the test: what comes again is no accident.")
 
 
 def _tell_apart(d: Diagnosis) -> str:
