@@ -82,6 +82,7 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
         remaining=left,
         rig=case.measurement.rig,
         thickness=case.measurement.specimen.thickness,
+        measurement=case.measurement,
         detection=case.detection,
         null=null,
         best=best,

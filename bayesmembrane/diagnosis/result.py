@@ -44,6 +44,7 @@ class Diagnosis(Showable):
     probabilities : of sets of effects, of energies, of what is foreign, each summed over the others
     remaining : what the answer leaves; where there is none, what the most probable hypothesis does
     rig, thickness : of the measurement; m
+    measurement : the readings that were diagnosed: without outliers, of a long one those that were taken
     detection : tests of the model as given
     null, best : the model as given, and the most probable one
     ranking : every hypothesis that was fitted, the most probable first
@@ -69,6 +70,7 @@ class Diagnosis(Showable):
     remaining: Remaining
     rig: Fixture
     thickness: float
+    measurement: Measurement
     detection: Detection
     null: Candidate
     best: Candidate

@@ -8,7 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from bayesmembrane.words.language import percent, without_exponent
+from bayesmembrane.words.language import percent, three_digits, without_exponent
+
+PLAIN = "three digits"
+"""Form of a column: three digits without an exponent."""
 
 Value = str | float | int | bool | None
 
@@ -75,6 +78,8 @@ class Column:
             return value
         if self.form == "%":
             return percent(float(value))
+        if self.form == PLAIN:
+            return three_digits(float(value))
         if self.form == "p" and value < 1e-4:
             return "< 0.0001"
         return without_exponent(f"{value:{'.2g' if self.form == 'p' else self.form}}")
@@ -112,7 +117,33 @@ def _finite(value: Value) -> Value:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-Block = Text | Points | Heading | Figure | Table
+@dataclass(frozen=True)
+class Lead:
+    """The first screen of a page: what was tested, the answer with what it leaves, errors, what to do; one picture.
+
+    answer : a sentence without its end, and ``left`` that end
+    """
+
+    tested: str
+    answer: str
+    left: str
+    table: Table
+    following: str
+    figure: Figure
+
+    @property
+    def lines(self) -> list[str]:
+        """Its sentences."""
+        return [self.tested, f"{self.answer}, {self.left}.", self.following]
+
+    @property
+    def words(self) -> int:
+        """How many words one reads, those of the table and below the picture among them."""
+        cells = [self.table.caption, *(c.head for c in self.table.columns), *(c for r in self.table.cells() for c in r)]
+        return len(" ".join([*self.lines, *cells, self.figure.caption]).split())
+
+
+Block = Text | Points | Heading | Figure | Table | Lead
 
 
 @dataclass(frozen=True)

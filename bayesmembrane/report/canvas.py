@@ -1,7 +1,7 @@
 """What pictures share: their look, their size, how they are encoded, and what several sections draw.
 
-Arrays come in SI units; axes are in mm and N. A picture is drawn 900 px wide, so that nothing in it is too small on a
-page; curves are SVG, clouds and maps PNG. The pictures of a section are in that section.
+Arrays come in SI units; axes are in mm and N, or in stretch and MPa. A picture is drawn 900 px wide, so that nothing in
+it is too small on a page; curves are SVG, clouds and maps PNG. The pictures of a section are in that section.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from PIL import Image
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.report.blocks import Picture
 from bayesmembrane.report.style import INK, MUTED, colour, marker
+from bayesmembrane.words.seen import DISC, Seen
 
 WIDTH = 9.0  # inches: 900 px at 100 dpi
 DPI = 120
@@ -126,11 +127,12 @@ def _rounded(place: re.Match[bytes]) -> bytes:
 
 @dataclass(frozen=True)
 class Measured:
-    """Measured points: deflection (N,) m, force (N,) N, own standard deviation (N,) N or None."""
+    """Measured points: deflection (N,) m, force (N,) N, own standard deviation (N,) N or None; how it is seen."""
 
     deflection: Array
     force: Array
     sd: Array | None = None
+    how: Seen = DISC
 
     @property
     def marker_size(self) -> float:
@@ -141,9 +143,9 @@ class Measured:
 def errorbars(ax: Axes, points: Measured, filled: bool = True) -> None:
     """Points with two standard deviations to either side; hollow if they were not used."""
     ax.errorbar(
-        1e3 * points.deflection,
-        points.force,
-        None if points.sd is None else 2 * points.sd,
+        points.how.along(points.deflection),
+        points.how.carried(points.force),
+        None if points.sd is None else points.how.carried(2 * points.sd),
         fmt="o",
         color=INK,
         markersize=points.marker_size,

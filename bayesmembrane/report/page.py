@@ -16,7 +16,7 @@ from bayesmembrane.ground.errors import BayesmembraneError, SettingsError, Stora
 from bayesmembrane.ground.files import write_text
 from bayesmembrane.ground.plain import json_text
 from bayesmembrane.ground.registry import components
-from bayesmembrane.report.blocks import Column, Part, Table
+from bayesmembrane.report.blocks import Block, Column, Lead, Part, Table, Text
 from bayesmembrane.report.render import whole_page
 from bayesmembrane.report.runs import Shown, read
 from bayesmembrane.report.sections.base import Section, Subject
@@ -24,7 +24,7 @@ from bayesmembrane.words.language import listed
 
 GENERATOR = "bayesmembrane report"
 PAGE, TWIN = "index.html", "report.json"
-FOOTER = "Bands hold what data and priors leave open if the material is right. Forces in N or mN, lengths in mm."
+FOOTER = "Bands hold what data and priors leave open if the material is right."
 
 
 def warned(sentence: str) -> None:
@@ -61,7 +61,7 @@ def write_report(
         "answer": content.answer,
         "warnings": content.warnings,
         "left_out": gathering.left_out,
-        "tables": {b.name: b.records() for p in content.parts for b in p.blocks if isinstance(b, Table)},
+        "tables": {t.name: t.records() for t in content.tables},
     }
     write_text(out / TWIN, json_text(twin, indent=1), "the report")
     around = {"generator": GENERATOR, "footer": FOOTER, "left_out": gathering.left_out}
@@ -70,13 +70,20 @@ def write_report(
 
 @dataclass(frozen=True)
 class Content:
-    """What a page says: its title, the sentences at its top, and its parts."""
+    """What a page says: its title, the sentences at its top, its parts; a ``lead`` is drawn in place of the answer."""
 
     title: str
     subtitle: str
     answer: list[str]
     warnings: list[str]
     parts: list[Part]
+    lead: Lead | None = None
+
+    @property
+    def tables(self) -> list[Table]:
+        """Every table, that of the first screen first."""
+        blocks = [*([] if self.lead is None else [self.lead]), *(b for p in self.parts for b in p.blocks)]
+        return [b.table if isinstance(b, Lead) else b for b in blocks if isinstance(b, Lead | Table)]
 
 
 def sections() -> list[Section]:
@@ -87,16 +94,35 @@ def sections() -> list[Section]:
 def compose(results: Sequence[Any], title: str | None = None) -> Content:
     """What the sections make of ``results``, which are no folders."""
     every = sections()
+    leading = next(((section, lead) for section in every if (lead := section.lead(results)) is not None), None)
     told = [s for section in every if not section.aside for s in section.answer(results)]
     subject = _subject([s for s in (section.subject(results) for section in every) if s is not None])
-    about = f"What the force curve of {listed(subject.films)} says" if subject.films else "What the force curve says"
+    about = f"What the {subject.curve}{' of ' if subject.films else ''}{listed(subject.films)} says"
     parts = [part for section in every for part in section.parts(results)]
+    if leading is not None:
+        return _led(
+            leading[1], title or about, every, results, [s for s in told if s not in leading[0].answer(results)]
+        )
     return Content(
         title=title or about,
         subtitle=subject.sentence,
         answer=told or [s for section in every for s in section.answer(results)],
         warnings=[s for section in every for s in section.warnings(results)],
         parts=_named_once([*_general_table(every, results), *parts]),
+    )
+
+
+def _led(lead: Lead, title: str, every: list[Section], results: Sequence[Any], told: Sequence[str]) -> Content:
+    """A page that begins with a first screen; what the other sections answer comes after it."""
+    others = [Part("answers", "What the calibrations say", tuple(map(Text, told)))] if told else []
+    parts = [part for section in every for part in section.parts(results)]
+    return Content(
+        title=title,
+        subtitle="",
+        answer=lead.lines,
+        warnings=[s for section in every for s in section.warnings(results)],
+        parts=_named_once([*_general_table(every, results), *others, *parts]),
+        lead=lead,
     )
 
 
@@ -126,10 +152,17 @@ def _named_once(parts: Sequence[Part]) -> list[Part]:
         Part(
             once(p.key, keys, "-"),
             p.title,
-            tuple(replace(b, name=once(b.name, tables, " ")) if isinstance(b, Table) else b for b in p.blocks),
+            tuple(_renamed(b, lambda name: once(name, tables, " ")) for b in p.blocks),
         )
         for p in parts
     ]
+
+
+def _renamed(block: Block, name: Callable[[str], str]) -> Block:
+    """The same with its table under another name, if it has one."""
+    if isinstance(block, Lead):
+        return replace(block, table=replace(block.table, name=name(block.table.name)))
+    return replace(block, name=name(block.name)) if isinstance(block, Table) else block
 
 
 # ---- what is found -------------------------------------------------------------------------------------------------

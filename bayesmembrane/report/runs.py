@@ -21,10 +21,12 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.noise.white import White
+from bayesmembrane.report.blocks import Column
 from bayesmembrane.report.canvas import Measured
 from bayesmembrane.words.calibration import LOOSE, Case
 from bayesmembrane.words.hypothesis import spoken
-from bayesmembrane.words.language import millimetres, spoken_parameter
+from bayesmembrane.words.language import spoken_parameter
+from bayesmembrane.words.seen import Seen, alike, seen_on
 
 USUAL = White.name
 
@@ -157,7 +159,7 @@ class Shown:
             end=d.end,
             rmse=float(fit["rmse_N"] or 0.0),
             own_noise=fit["own_noise_N"],
-            extra_noise=None if noise is None else float(np.median(noise)),
+            extra_noise=None if noise is None else float(np.mean(noise)),
             dominated=self.dominated,
             p_value=fit["p_value"],
             modulus=(low, middle, high),
@@ -171,17 +173,29 @@ class Shown:
             last_force=(force[0], force[1], force[2]),
             lost={r: float(d.lost[i, -1]) for i, r in enumerate(d.reasons) if d.lost[i, -1] > 0},
             loose=self._loose(),
+            how=self.how,
         )
 
     @property
     def end(self) -> str:
-        """The largest fitted deflection: ``35.1 mm``."""
-        return millimetres(self.digest.end)
+        """The largest fitted deflection: ``35.1 mm``, ``a stretch of 2.5``."""
+        return self.how.place(self.digest.end)
+
+    @cached_property
+    def how(self) -> Seen:
+        """In which quantities and units people read this run's curve."""
+        return seen_on(self.film.rig, self.film.thickness, self.film.origin)
+
+    def read_as(self, name: str, unit: str) -> tuple[float, str]:
+        """(factor, unit) in which people read a parameter: effects and noise in the units of the rig."""
+        if name.startswith(f"{self.material}."):
+            return 1.0, unit
+        return self.film.rig.shown(self.film.thickness).get(unit, (1.0, unit))
 
     @property
     def points(self) -> Measured:
         """The fitted points."""
-        return Measured(self.digest.at, self.digest.force, self.digest.sd if self.digest.has_noise else None)
+        return Measured(self.digest.at, self.digest.force, self.digest.sd if self.digest.has_noise else None, self.how)
 
     def _extra_noise(self) -> Array | None:
         names = self.hypothesis.natural_names
@@ -203,6 +217,25 @@ class Shown:
 def by_points(shown: Sequence[Shown]) -> list[list[Shown]]:
     """Runs fitted to the same points, in order."""
     return [list(g) for _, g in groupby(in_order(shown), key=lambda s: (s.digest.end, s.data_hash))]
+
+
+def reach(s: Shown, shown: Sequence[Shown]) -> str:
+    """How far a run was fitted, as all of ``shown`` are told apart: with its points where others end there, too."""
+    same = {o.data_hash for o in shown if o.end == s.end}
+    return s.end if len(same) <= 1 else f"{s.end} ({s.digest.at.size} points)"
+
+
+def end_column(shown: Sequence[Shown]) -> Column:
+    """How far runs were fitted, in a table; the values are those of `ends`."""
+    how = alike(s.how for s in shown)
+    unit = "stretch" if how.rest else how.travel_scale[1]
+    return Column(f"end_{unit}", f"fitted up to ({unit})")
+
+
+def ends(shown: Sequence[Shown]) -> list[float]:
+    """The largest fitted deflection or stretch of each."""
+    how = alike(s.how for s in shown)
+    return [how.rest + how.travel_scale[0] * s.digest.end for s in shown]
 
 
 def in_order(shown: Sequence[Shown]) -> list[Shown]:

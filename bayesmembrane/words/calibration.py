@@ -15,6 +15,7 @@ from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import digits, interval, listed, millimetres, newtons, percent, spoken_parameter
+from bayesmembrane.words.seen import DISC, Seen, alike
 
 P_VALUE = 0.01
 """Below this the residuals are larger than the measurement's own noise allows."""
@@ -37,7 +38,7 @@ class Case:
     end : largest deflection that was fitted
     rmse : root mean square of the residual
     own_noise : root mean square of the noise that the measurement states, None if it states none
-    extra_noise : median of the inferred noise, None if none was inferred
+    extra_noise : mean of the inferred noise, None if none was inferred
     dominated : more than half of the posterior has an inferred noise above the stated one
     p_value : of the residuals under the stated noise, None if unknown
     modulus : quantiles of G d, N/m
@@ -50,6 +51,7 @@ class Case:
     last_force : quantiles of the force there, nan where most draws have none
     lost : share of the draws without a force there, by reason
     loose : parameters that the data hardly determine, with posterior over prior width
+    how : in which quantities and units people read it
     """
 
     name: str
@@ -70,6 +72,7 @@ class Case:
     last_force: tuple[float, float, float]
     lost: Mapping[str, float]
     loose: Mapping[str, float]
+    how: Seen = DISC
 
     @property
     def verdict(self) -> str:
@@ -115,16 +118,18 @@ def _by_range(cases: Sequence[Case]) -> list[list[Case]]:
 
 def describes(group: Sequence[Case]) -> str:
     """Which materials describe the curve of one range."""
-    end = millimetres(group[0].end)
+    end = group[0].how.place(group[0].end)
     by = {v: [c for c in group if c.verdict == v] for v in ("adequate", "strained", "misses", "unknown")}
     if by["unknown"]:
         best = sorted(group, key=lambda c: c.rmse)
+        if len(best) == 1:
+            return f"Up to {end}, {_named(best)} cannot be judged by itself: the measurement states no noise."
         tail = f"; the others: {_named(best[1:])}" if best[1:] else ""
         return (
             f"Up to {end} the measurement states no noise: a calibration alone cannot say which material is adequate. "
             f"The smallest root mean square residual has {_named(best[:1])}{tail}."
         )
-    noise = newtons(group[0].own_noise or 0.0)
+    noise = group[0].how.force(group[0].own_noise or 0.0)
     parts = []
     if by["adequate"]:
         verb = "describes" if len(by["adequate"]) == 1 else "describe"
@@ -151,7 +156,7 @@ def _missed(cases: Sequence[Case], others: bool, noise: str) -> str:
     if one:
         return f"{_named(cases)} does not describe the curve: {misfit}, {conclusion}"
     ordered = sorted(cases, key=lambda c: c.rmse)
-    others_told = listed(f"{c.name} ({newtons(c.rmse)})" for c in ordered[1:])
+    others_told = listed(f"{c.name} ({c.how.force(c.rmse)})" for c in ordered[1:])
     return (
         f"no material describes the curve: {misfit}, {conclusion}; the nearest is {_named(ordered[:1])}, then "
         f"{others_told}"
@@ -160,7 +165,7 @@ def _missed(cases: Sequence[Case], others: bool, noise: str) -> str:
 
 def _named(cases: Sequence[Case]) -> str:
     """Names with residuals; the first says what the number is."""
-    return listed(f"{c.name} ({'rms residual ' if i == 0 else ''}{newtons(c.rmse)})" for i, c in enumerate(cases))
+    return listed(f"{c.name} ({'rms residual ' if i == 0 else ''}{c.how.force(c.rmse)})" for i, c in enumerate(cases))
 
 
 def stiffness(group: Sequence[Case]) -> str:
@@ -189,13 +194,13 @@ def extrapolation(group: Sequence[Case]) -> str:
     beyond = [c for c in good or group if c.last > 1.001 * c.end]
     there = [c for c in beyond if all(math.isfinite(v) for v in c.last_force)]
     gone = [c for c in beyond if c not in there]
-    at = f"at {millimetres(beyond[0].last)}, beyond the fitted range," if beyond else ""
+    at = f"at {beyond[0].how.place(beyond[0].last)}, beyond the fitted range," if beyond else ""
     parts = []
     if there and (good or len(there) == 1):
-        parts.append(f"{at} the force would be {listed(f'{_span(c)} ({c.name})' for c in there)}")
+        parts.append(f"{at} the {beyond[0].how.load} would be {listed(f'{_span(c)} ({c.name})' for c in there)}")
     elif there:
         low, high = min(there, key=lambda c: c.last_force[0]), max(there, key=lambda c: c.last_force[2])
-        span = f"{newtons(low.last_force[0])} ({low.name}) to {newtons(high.last_force[2])} ({high.name})"
+        span = f"{low.how.force(low.last_force[0])} ({low.name}) to {high.how.force(high.last_force[2])} ({high.name})"
         parts.append(f"{at} the materials give anything from {span}")
     if gone:
         told = listed(f"{c.name} ({reasons(c.lost)})" for c in gone)
@@ -215,7 +220,7 @@ def extrapolation(group: Sequence[Case]) -> str:
 
 def _span(case: Case) -> str:
     low, _, high = case.last_force
-    return f"{newtons(low)} to {newtons(high)}"
+    return f"{case.how.force(low)} to {case.how.force(high)}"
 
 
 def reasons(lost: Mapping[str, float]) -> str:
@@ -255,7 +260,7 @@ def not_converged(case: Case) -> str:
         faults.append(f"R-hat is {case.r_hat:.3f} instead of at most 1.01, so that the ensembles disagree")
     if not faults:
         faults.append("the chains are shorter than 50 autocorrelation times")
-    return f"{case.name} up to {millimetres(case.end)}: sampling stopped early ({case.status}); {listed(faults)}."
+    return f"{case.name} up to {case.how.place(case.end)}: sampling stopped early ({case.status}); {listed(faults)}."
 
 
 def failures(case: Case) -> str:
@@ -263,17 +268,17 @@ def failures(case: Case) -> str:
     if case.failed <= FAILURES:
         return ""
     return (
-        f"{case.name} up to {millimetres(case.end)}: {percent(case.failed)} of the films could not be computed to 1e-6 "
-        "and count as impossible; if they lie near the posterior, it is narrower than it should be."
+        f"{case.name} up to {case.how.place(case.end)}: {percent(case.failed)} of the films could not be computed to "
+        "1e-6 and count as impossible; if they lie near the posterior, it is narrower than it should be."
     )
 
 
-def disagreement(name: str, end: float, largest: float) -> str:
+def disagreement(name: str, end: str, largest: float) -> str:
     """That two solvers differ, or ""."""
     if not largest > SAME_FORCE:
         return ""
     size = f"{largest:.1e} of the force, more than 1e-6"
-    return f"{name} up to {millimetres(end)}: the two solvers disagree by up to {size}."
+    return f"{name} up to {end}: the two solvers disagree by up to {size}."
 
 
 # ---- beyond the fitted points ----------------------------------------------------------------------------------------
@@ -287,7 +292,7 @@ def break_points(name: str, end: float, observed: Sequence[float], low: Sequence
     return f"{name} fitted up to {millimetres(end)}: {inside} of {len(observed)} inside the 90 % interval{missing}."
 
 
-def held_out(name: str, residual: Array) -> str:
+def held_out(name: str, residual: Array, how: Seen = DISC) -> str:
     """What a calibration says of points that it has not seen: ``residual`` (3, R) N, at 5, 50 and 95 %; nan where no
     force can be predicted.
     """
@@ -296,7 +301,7 @@ def held_out(name: str, residual: Array) -> str:
     if not np.any(known):
         return f"{name}: no force can be predicted at any of the {n} points beyond the fitted range."
     inside = int(np.sum((residual[0] <= 0) & (residual[2] >= 0)))
-    worst = newtons(float(np.nanmax(np.abs(residual[1]))))
+    worst = how.force(float(np.nanmax(np.abs(residual[1]))))
     missing = f", and {n - int(known.sum())} points have no prediction" if not np.all(known) else ""
     return (
         f"{name}: of the {n} points beyond the fitted range {inside} lie in the 90 % band; the median misses them by "
@@ -309,7 +314,11 @@ def overview(cases: Sequence[Case]) -> str:
     ends = sorted({c.end for c in cases})
     materials = list(dict.fromkeys(c.name for c in cases))
     runs = f"{len(cases)} calibrations" if len(cases) > 1 else "One calibration"
-    return f"{runs}: {listed(materials)}, fitted up to {listed(f'{1e3 * e:.4g}' for e in ends)} mm of deflection."
+    how = alike(c.how for c in cases)
+    if how.rest:
+        return f"{runs}: {listed(materials)}, fitted up to {listed(how.place(e) for e in ends)}."
+    reach = f"{listed(f'{1e3 * e:.4g}' for e in ends)} mm of deflection"
+    return f"{runs}: {listed(materials)}, fitted up to {reach}."
 
 
 VERDICTS = {"adequate": "describes the curve", "strained": "close, not within noise", "misses": "misses something"}

@@ -6,10 +6,12 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.total import set_name
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST
-from bayesmembrane.words.diagnosis import experiment_sentence, percent, set_aside, size_in_words
+from bayesmembrane.words.diagnosis import experiment_sentence, percent, set_aside
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.next_test import spoken_test
+from bayesmembrane.words.seen import seen
+from bayesmembrane.words.sizes import flagged_size
 
 
 def candidate_title(candidate: Candidate, null: Candidate) -> str:
@@ -21,15 +23,11 @@ def candidate_title(candidate: Candidate, null: Candidate) -> str:
     return " and ".join(added) or "nothing: the model as it was"
 
 
-def sizes(candidate: Candidate, null: Candidate) -> list[str]:
-    """``slip 0.0021``: sizes of the effects that a candidate adds, in the units that people read."""
-    have = {e.name for e in null.hypothesis.effects}
-    values = candidate.parameters
+def sizes(candidate: Candidate, d: Diagnosis) -> list[str]:
+    """``slip 0.0021``: sizes of the effects that a candidate adds, in the units that people read, flagged."""
+    have = {e.name for e in d.null.hypothesis.effects}
     added = [e for e in candidate.hypothesis.effects if e.name not in have]
-    return [
-        f"{spoken_parameter(f'{e.name}.{e.size.name}')} {size_in_words(values[f'{e.name}.{e.size.name}'], e.size.unit)}"
-        for e in added
-    ]
+    return [flagged_size(e, candidate, d.measurement) for e in added]
 
 
 def rivals(d: Diagnosis) -> list[str]:
@@ -38,12 +36,12 @@ def rivals(d: Diagnosis) -> list[str]:
     given = d.null.names
     for j in d.members:
         p = d.probabilities.effects.get(set_name(j.candidate, given), 0.0)
-        size = ", ".join(sizes(j.candidate, d.null))
+        size = ", ".join(sizes(j.candidate, d))
         told.append(f"{candidate_title(j.candidate, d.null)}{f' ({size})' if size else ''}: {percent(p)}.")
     clear = [e for e in d.experiments if e.separation >= NEXT_TEST.clear]
     dim = [e for e in d.experiments if e.separation < NEXT_TEST.clear]
-    rest = [f"{spoken_test(e.test)} ({e.separation:.1f} standard deviations)" for e in dim]
-    told += [f"To tell them apart: {experiment_sentence(e)}." for e in clear]
+    rest = [f"{spoken_test(e.test, d.rig)} ({e.separation:.1f} standard deviations)" for e in dim]
+    told += [f"To tell them apart: {experiment_sentence(e, d.rig)}." for e in clear]
     if not clear:
         told.append("None of the further tests that were simulated would tell them apart.")
     if rest:
@@ -58,6 +56,7 @@ def validation_sentence(d: Diagnosis) -> str:
     if d.validation is None or d.verdict in ("adequate", "unknown"):
         return ""
     v = d.validation
+    factor, unit = seen(d.measurement).small
     names = {c.hypothesis.label(): spoken(c.hypothesis) for c in (j.candidate for j in d.ranking)}
     chosen = names.get(v.chosen, v.chosen)
     same = (
@@ -65,7 +64,7 @@ def validation_sentence(d: Diagnosis) -> str:
         if v.chosen == d.best.hypothesis.label()
         else f"the others choose {chosen} instead: the choice rests on the points left out"
     )
-    fall = f"their root mean square goes from {1e3 * v.before.rmse_N:.3g} to {1e3 * v.after.rmse_N:.3g} mN"
+    fall = f"their root mean square goes from {factor * v.before.rmse_N:.3g} to {factor * v.after.rmse_N:.3g} {unit}"
     return f"Set aside before looking: {set_aside(v)}. Without these points {same}; {fall}."
 
 

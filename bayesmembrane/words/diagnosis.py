@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, UNNAMED, WAVE, Foreign
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged
@@ -18,14 +19,11 @@ from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.diagnosis.thresholds import VERDICT, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words.hypothesis import effect_title, spoken
+from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.shape import shape_in_words
-
-Units = Mapping[str, tuple[float, str]]
-"""By SI unit, (factor, unit) in which people read it: `Fixture.shown`."""
-
-SCALES: Units = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "N": (1e3, "mN"), "N/s": (1e3, "mN/s")}
-"""Those of a lifted disc."""
+from bayesmembrane.words.sizes import flagged_size
+from bayesmembrane.words.units import Units, size_in_words
 
 
 def document(found: Diagnosis) -> dict[str, Any]:
@@ -86,9 +84,9 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "absorbed": absorbed_sentences(found),
         "next_measurements": [
             {
-                "what": spoken_test(e.test),
+                "what": spoken_test(e.test, found.rig),
                 "separation": None if np.isinf(e.separation) else e.separation,
-                "sentence": experiment_sentence(e),
+                "sentence": experiment_sentence(e, found.rig),
             }
             for e in found.experiments
         ],
@@ -179,18 +177,11 @@ def set_aside(held: HeldOut | None) -> str:
     return "the second cycle" if held.cycles == 2 else f"cycle {held.cycle}"
 
 
-def experiment_sentence(experiment: Experiment) -> str:
+def experiment_sentence(experiment: Experiment, rig: Fixture) -> str:
     """What a further measurement would show."""
     if np.isinf(experiment.separation):
-        return f"{spoken_test(experiment.test)}: shows one of them directly"
-    return f"{spoken_test(experiment.test)}: {experiment.separation:.1f} standard deviations apart"
-
-
-def size_in_words(value: float, unit: str, shown: Units = SCALES) -> str:
-    """A value in SI in the unit that people read."""
-    factor, name = shown.get(unit, (1.0, unit.removeprefix("-")))
-    digits = 5 if unit == "-" and abs(value - 1) < WORDS.near_one else 3
-    return f"{factor * value:.{digits}g} {name}".strip()
+        return f"{spoken_test(experiment.test, rig)}: shows one of them directly"
+    return f"{spoken_test(experiment.test, rig)}: {experiment.separation:.1f} standard deviations apart"
 
 
 def foreign_sentence(f: Foreign, shown: Units) -> str:
@@ -265,7 +256,7 @@ def _material(found: Diagnosis) -> str:
 def _ambiguous(found: Diagnosis) -> str:
     names = "; or ".join(_member(j, found) for j in found.members)
     nexts = found.experiments
-    advice = f" To tell them apart: {experiment_sentence(nexts[0])}." if nexts else ""
+    advice = f" To tell them apart: {experiment_sentence(nexts[0], found.rig)}." if nexts else ""
     return (
         f"{_misses(found)}{_common(found)}this measurement cannot tell which of these it is: {names}. {_error(found)}"
         f"{advice}{_beside(found)}"
@@ -295,7 +286,11 @@ def _beside(found: Diagnosis) -> str:
 def _member(j: Judged, found: Diagnosis) -> str:
     have = set(found.null.names)
     if set(j.candidate.names) == have:
-        return f"no effect, but the energy {j.candidate.hypothesis.material.title}"
+        material = j.candidate.hypothesis.material
+        same = material is found.null.hypothesis.material
+        if same:
+            return f"no effect, but a form that is {100 * j.candidate.energy_error:.2g} % off {material.title}"
+        return f"no effect, but the energy {material.title}"
     return _added(j.candidate, found)
 
 
@@ -377,15 +372,10 @@ def _error(found: Diagnosis) -> str:
 
 def _added(candidate: Candidate, found: Diagnosis) -> str:
     """Titles and sizes of the effects that a candidate adds, and its energy if that is another one."""
-    null, units = found.null.hypothesis, _units(found)
+    null = found.null.hypothesis
     have = {e.name for e in null.effects}
-    values = candidate.parameters
-    words = []
-    for effect in candidate.hypothesis.effects:
-        if effect.name in have:
-            continue
-        p = effect.size
-        words.append(f"{effect.title} ({p.name} {size_in_words(values[f'{effect.name}.{p.name}'], p.unit, units)})")
+    added = [e for e in candidate.hypothesis.effects if e.name not in have]
+    words = [f"{e.title} ({flagged_size(e, candidate, found.measurement)})" for e in added]
     other = candidate.hypothesis.material.title
     return " and ".join(words) + (f" with {other}" if other != null.material.title else "")
 
@@ -393,7 +383,8 @@ def _added(candidate: Candidate, found: Diagnosis) -> str:
 def _bounds(candidate: Candidate) -> str:
     if not candidate.at_bound:
         return ""
-    return f" An estimate lies at its bound ({', '.join(candidate.at_bound)}): take it as a limit, not as a value."
+    names = listed(map(spoken_parameter, candidate.at_bound))
+    return f" An estimate lies at its bound ({names}): take it as a limit, not as a value."
 
 
 def _power(found: Diagnosis) -> str:

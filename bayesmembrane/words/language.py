@@ -53,6 +53,12 @@ def digits(value: float) -> str:
     return f"{value:.{min(decimals, 6)}f}"
 
 
+def three_digits(value: float) -> str:
+    """``0.0000938``, ``22.5``: as ``.3g``, without an exponent where that is short."""
+    text = f"{value:.3g}"
+    return f"{float(text):.9f}".rstrip("0") if "e-" in text and abs(value) >= 1e-7 else without_exponent(text)
+
+
 def without_exponent(text: str) -> str:
     """A formatted number without an exponent where that is short, and with a true minus sign."""
     if "e" in text and abs(float(text)) < 1e7 and abs(float(text)) >= 1e-4:

@@ -7,6 +7,7 @@ from typing import Any
 from bayesmembrane.diagnosis.left.discrepancy import Discrepancy
 from bayesmembrane.diagnosis.loop import Loop, Round, Stage, moved
 from bayesmembrane.words import diagnosis as words
+from bayesmembrane.words.seen import Seen, seen
 
 
 def document(found: Loop) -> dict[str, Any]:
@@ -14,7 +15,7 @@ def document(found: Loop) -> dict[str, Any]:
     return {
         "rounds": [round_document(r) for r in found.rounds],
         "sentence": sentence(found),
-        "left": None if found.left is None else left_sentence(found.left),
+        "left": None if found.left is None else left_sentence(found.left, seen(found.rounds[0].diagnosis.measurement)),
     }
 
 
@@ -44,12 +45,11 @@ def sentence(found: Loop) -> str:
     return start + words.sentence(found.rounds[-1].diagnosis) + thinned
 
 
-def left_sentence(left: Discrepancy) -> str:
+def left_sentence(left: Discrepancy, how: Seen) -> str:
     """Size and scale of what is kept without a name."""
-    return (
-        f"What is left is kept without a name: about {1e3 * left.amplitude:.3g} mN, varying over "
-        f"{1e3 * left.length:.3g} mm of the disc's way."
-    )
+    length = f"{how.travel_scale[0] * left.length:.3g}"
+    way = f"{length} of stretch along the test" if how.rest else f"{length} {how.travel_scale[1]} of the disc's way"
+    return f"What is left is kept without a name: about {how.error(left.amplitude)}, varying over {way}."
 
 
 def _stage(found: Stage) -> dict[str, Any]:

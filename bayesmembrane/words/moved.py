@@ -8,10 +8,13 @@ import numpy as np
 
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.words.calibration import LOOSE
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed, spoken_parameter
 
 MATTERS = 1.0  # standard deviations: a smaller change of a parameter is none
+TOUCHES = 0.1  # of the width of the 90 %: a bound as near to its end cuts the estimate off
+FAR = 1e-3  # of the prior's probability: an estimate beyond is one that the prior did not expect
 SAME = 1e-3  # of its value: parameters whose parts differ by less move together
 
 
@@ -20,6 +23,7 @@ class Change:
     """A number before and after: posterior means and standard deviations; nan where a model does not have it.
 
     unit : as people read it; ``material`` tells a property of the film from one of the test
+    remark : what must be known of the value after: a bound, or a prior that decides it; "" if nothing
     """
 
     name: str
@@ -27,6 +31,7 @@ class Change:
     before: tuple[float, float]
     after: tuple[float, float]
     material: bool
+    remark: str = ""
 
     @property
     def share(self) -> float:
@@ -44,14 +49,30 @@ def changes(before: Run, after: Run) -> list[Change]:
     out = [Change("shear modulus", "MPa", modulus_of(before), modulus_of(after), True)]
     old, new = _posterior(before), _posterior(after)
     nothing = (float("nan"), float("nan"))
+    remarks = remarks_on(after)
+    units = after.measurement.rig.shown(after.measurement.specimen.thickness)
     for name in dict.fromkeys([*new, *old]):
         unit = (new.get(name) or old[name])[1]
         b, a = (found[name][0] if name in found else nothing for found in (old, new))
-        noise = name.startswith("noise.")
         own = name.partition(".")[0] in (before.hypothesis.material.name, after.hypothesis.material.name)
-        factor, shown = (1e3, "mN") if noise and unit == "N" else (1.0, unit)
-        out.append(Change(name, shown, _times(factor, b), _times(factor, a), own))
+        factor, shown = (1.0, unit) if own else units.get(unit, (1.0, unit))
+        out.append(Change(name, shown, _times(factor, b), _times(factor, a), own, remarks.get(name, "")))
     return out
+
+
+def remarks_on(run: Run) -> dict[str, str]:
+    """By name of the coordinate, what must be known of its estimate: it lies at a bound, or its prior decides it."""
+    told = {}
+    for p, x in zip(run.hypothesis.parameters, run.draws().T, strict=True):
+        low, middle, high = (float(q) for q in np.quantile(x, (0.05, 0.5, 0.95)))
+        prior = [float(p.prior.quantile(q)) for q in (0.05, 0.95)]
+        if min(low - p.bounds[0], p.bounds[1] - high) < TOUCHES * (high - low):
+            told[p.name] = "at its bound"
+        elif high - low >= LOOSE * (prior[1] - prior[0]):
+            told[p.name] = "the prior decides"
+        elif not FAR < float(p.prior.distribution().cdf(middle)) < 1 - FAR:
+            told[p.name] = "far out in its prior"
+    return told
 
 
 def _times(factor: float, pair: tuple[float, float]) -> tuple[float, float]:

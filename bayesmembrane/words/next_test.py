@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.ground.registry import component
 from bayesmembrane.next_test.further import FurtherTest, Kind
 
@@ -13,15 +14,20 @@ ASSUMPTION = (
 )
 
 
-def spoken_test(test: FurtherTest) -> str:
-    """What to do, as a clause: ``the same film from 35.1 to 43.9 mm``."""
+def spoken_test(test: FurtherTest, present: Fixture | None = None) -> str:
+    """What to do, as a clause: ``the same film from 35.1 to 43.9 mm``; on the rig of the ``present`` test."""
+    stretched = present is not None and present.homogeneous
     match test.kind:
         case Kind.REPEAT:
             return "the same test once more"
         case Kind.FURTHER:
             risk = ", further than it was tested (it may break)" if test.beyond else ""
+            if stretched:
+                return f"the same film from {_stretch(test.start, present)} to {_stretch(test.end, present)}{risk}"
             return f"the same film from {1e3 * test.start:.3g} to {1e3 * test.end:.3g} mm{risk}"
         case Kind.SMALL:
+            if stretched:
+                return f"small stretches, up to {_stretch(test.end, present)}"
             return f"small deflections, up to {1e3 * test.end:.3g} mm"
         case Kind.OTHER_RIG:
             rig: Any = component("rigs", test.rig)
@@ -36,3 +42,8 @@ def spoken_test(test: FurtherTest) -> str:
             return f"the same test {test.change}"
         case Kind.BLANK:
             return "a blank run on a rigid dummy, which shows the frame's yielding alone"
+
+
+def _stretch(deflection: float, rig: Fixture | None) -> str:
+    assert rig is not None
+    return rig.place(deflection)

@@ -10,6 +10,7 @@ from bayesmembrane.words.candidates import bounds, validation_sentence
 from bayesmembrane.words.diagnosis import sentence
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.moved import modulus_of, moved_sentences
+from bayesmembrane.words.seen import seen
 
 
 def answer(found: Loop) -> list[str]:
@@ -26,10 +27,10 @@ def answer(found: Loop) -> list[str]:
 
 
 def subject(found: Loop) -> str:
-    """Film, model and range that a loop started from."""
+    """Film, model, readings and range that a loop started from."""
     m = found.rounds[0].before.run.measurement
-    end = 1e3 * float(np.max(m.deflection))
-    return f"{m.specimen.name}, {spoken(found.rounds[0].diagnosis.null.hypothesis)} up to {end:.4g} mm"
+    end = seen(m).place(float(np.max(m.deflection)))
+    return f"{m.specimen.name}, {spoken(found.rounds[0].diagnosis.null.hypothesis)}, {len(m)} readings up to {end}"
 
 
 def validation_sentences(found: Loop) -> list[str]:

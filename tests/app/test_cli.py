@@ -186,7 +186,7 @@ def test_an_effect_that_cannot_be_is_refused_in_a_sentence(run: Run, effects: st
 
 
 def test_errors_of_a_strip_are_told_in_stress(run: Run, tmp_path: Path) -> None:
-    """A step of 12 kPa between the legs of a strip, whatever its width, is read off the table as kPa."""
+    """A step of 12 kPa between the legs of a strip, whatever its width, is read off the table in MPa."""
     stretch = np.concatenate([np.linspace(1.02, 1.6, 30), np.linspace(1.58, 1.04, 28)])
     stress = 1e-1 * (stretch - stretch**-2) + np.where(np.arange(58) < 30, 6e-3, -6e-3)
     rows = [f"{t},{x},{s + 1e-5 * (-1) ** t}" for t, (x, s) in enumerate(zip(stretch, stress, strict=True))]
@@ -195,11 +195,11 @@ def test_errors_of_a_strip_are_told_in_stress(run: Run, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(rig)
     code, out, err = run("diagnose", tmp_path / "c.csv", "--specimen", tmp_path / "c.toml", "--material", "neo_hookean")
     assert code == 0, err
-    assert "root mean square, kPa" in out
+    assert "root mean square, MPa" in out
     (line,) = (x for x in out.splitlines() if "before" in x and "heldout" not in x)
     shown = [float(x) for x in line.replace("│", " ").split()[1:3]]
-    assert shown[0] == pytest.approx(6, rel=0.05)
-    assert 6 <= shown[1] < 9
+    assert shown[0] == pytest.approx(6e-3, rel=0.05)
+    assert 6e-3 <= shown[1] < 9e-3
 
 
 @pytest.mark.usefixtures("short_walks")

@@ -22,7 +22,8 @@ from bayesmembrane.diagnosis.explanation.total import Judged
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.words.diagnosis import sentence, size_in_words
+from bayesmembrane.words.diagnosis import sentence
+from bayesmembrane.words.units import size_in_words
 from tests.studies.paper_curve_bands import HEAD, bands
 from tests.studies.paper_curve_bands import lines as bands_lines
 

@@ -11,8 +11,9 @@ from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.base import Rig
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
-from bayesmembrane.words.diagnosis import SCALES, size_in_words, thinning_sentence
+from bayesmembrane.words.diagnosis import thinning_sentence
 from bayesmembrane.words.shape import shape_in_words
+from bayesmembrane.words.units import SCALES, size_in_words
 
 THICKNESS = 1e-3
 STRETCH = np.concatenate([np.linspace(1.01, 1.5, 30), np.linspace(1.49, 1.01, 30)])
@@ -35,12 +36,12 @@ def test_a_residual_in_stress_reads_alike_whatever_the_strip_measures(width: flo
     stress = np.where(m.leg > 0, 700.0, -300.0)
     stress[29] = 2000.0
     told = describe(m, stress * width * THICKNESS)
-    rms = np.sqrt(np.mean(stress**2)) / 1e3
+    rms = np.sqrt(np.mean(stress**2)) / 1e6
     assert told.startswith(
-        f"The residual has a root mean square of {rms:.3g} kPa and reaches 2 kPa at a stretch of 1.5."
+        f"The residual has a root mean square of {rms:.3g} MPa and reaches 0.002 MPa at a stretch of 1.5."
     )
-    gap = (np.mean(stress[m.leg > 0]) - np.mean(stress[m.leg < 0])) / 1e3
-    assert f"Loading legs lie {gap:.3g} kPa above unloading legs." in told
+    gap = (np.mean(stress[m.leg > 0]) - np.mean(stress[m.leg < 0])) / 1e6
+    assert f"Loading legs lie {gap:.3g} MPa above unloading legs." in told
     assert "mN" not in told
     assert "mm" not in told
 
@@ -57,11 +58,11 @@ def test_units_of_a_strip_undo_what_its_size_does() -> None:
     rig = Uniaxial(0.08, 0.02)
     shown = rig.shown(THICKNESS)
     area = 0.02 * THICKNESS
-    assert shown["N"] == (pytest.approx(1e-3 / area), "kPa")
+    assert shown["N"] == (pytest.approx(1e-6 / area), "MPa")
     assert size_in_words(0.25 * 0.08, "m", shown) == "0.25 in stretch"
-    assert size_in_words(3e3 * area, "N", shown) == "3 kPa"
-    assert size_in_words(3e3 * area, "N/s", shown) == "3 kPa/s"
-    assert size_in_words(0.25 * 0.08 / (3e3 * area), "m/N", shown) == "0.0833 1/kPa"
+    assert size_in_words(3e3 * area, "N", shown) == "0.003 MPa"
+    assert size_in_words(3e3 * area, "N/s", shown) == "0.003 MPa/s"
+    assert size_in_words(0.25 * 0.08 / (3e3 * area), "m/N", shown) == "83.3 1/MPa"
     assert size_in_words(0.5, "-", shown) == "0.5"
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from bayesmembrane.words.language import interval, listed, newtons, percent, sentence, spoken_parameter
+from bayesmembrane.words.language import interval, listed, newtons, percent, sentence, spoken_parameter, three_digits
 
 
 @pytest.mark.parametrize(
@@ -20,6 +20,14 @@ from bayesmembrane.words.language import interval, listed, newtons, percent, sen
 )
 def test_forces_in_words(value: float, text: str) -> None:
     assert newtons(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0000938123, "0.0000938"), (0.000178, "0.000178"), (22.51, "22.5"), (12345.0, "12,300"), (2e-12, "2e-12")],
+)
+def test_three_digits_have_no_exponent_where_that_is_short(value: float, text: str) -> None:
+    assert three_digits(value) == text
 
 
 @pytest.mark.parametrize(

@@ -215,19 +215,18 @@ class Strip(Rig, ABC):
 
     def shown(self, thickness: float) -> Mapping[str, tuple[float, str]]:
         """Nominal stress, force over width and thickness, and stretch: what was measured, whatever the strip's size."""
-        kPa = 1e-3 / (self.width * thickness)
-        per_kPa = 1 / (self.length * kPa)
+        MPa = 1e-6 / (self.width * thickness)
         return {
             "m": (1 / self.length, "in stretch"),
-            "m/N": (per_kPa, "1/kPa"),
-            "N": (kPa, "kPa"),
-            "N/s": (kPa, "kPa/s"),
+            "m/N": (1 / (self.length * MPa), "1/MPa"),
+            "N": (MPa, "MPa"),
+            "N/s": (MPa, "MPa/s"),
         }
 
     def remark_on_units(self, thickness: float) -> str:
         shown = self.shown(thickness)
         return (
-            f"forces are nominal stress times width times thickness, 1 N for {shown['N'][0]:.4g} kPa, and 1 mm of "
+            f"forces are nominal stress times width times thickness, 1 N for {shown['N'][0]:.4g} MPa, and 1 mm of "
             f"deflection is {1e-3 * shown['m'][0]:.4g} of stretch"
         )
 

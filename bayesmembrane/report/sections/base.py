@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
-from bayesmembrane.report.blocks import Block, Part
+from bayesmembrane.report.blocks import Block, Lead, Part
 from bayesmembrane.report.render import fragment
 
 Kind = TypeVar("Kind")
@@ -29,10 +29,11 @@ class Glance:
 
 @dataclass(frozen=True)
 class Subject:
-    """What a page is about: the names of the films, and a sentence below the title."""
+    """What a page is about: the names of the films, a sentence below the title, and what kind of curve they gave."""
 
     films: tuple[str, ...]
     sentence: str
+    curve: str = "force curve"
 
 
 class Section(ABC):
@@ -69,6 +70,10 @@ class Section(ABC):
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
         """Sentences for the top of the page: what to read if one reads nothing else."""
         return ()
+
+    def lead(self, results: Sequence[Any]) -> Lead | None:
+        """The first screen, if the page has one result that it is about; it stands for the section's `answer`."""
+        return None
 
     def warnings(self, results: Sequence[Any]) -> Sequence[str]:
         """Sentences that must be seen before anything else; none if all is well."""

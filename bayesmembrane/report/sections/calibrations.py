@@ -13,15 +13,16 @@ from matplotlib.ticker import MaxNLocator
 
 from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.ground.stored import read
-from bayesmembrane.report.blocks import Block, Column, Figure, Picture, Table, Text, points
+from bayesmembrane.report.blocks import PLAIN, Block, Column, Figure, Picture, Table, Text, points
 from bayesmembrane.report.canvas import Interval, draw_interval, encoded, new_figure, style
-from bayesmembrane.report.runs import Shown, in_order
+from bayesmembrane.report.runs import Shown, end_column, ends, in_order
 from bayesmembrane.report.sections.base import Section, Subject, of_kind
 from bayesmembrane.report.style import FAINT, with_unit
 from bayesmembrane.words.beside_paper import LossPair, losses
 from bayesmembrane.words.calibration import answer, details, overview, verdict
 from bayesmembrane.words.hypothesis import material_title
 from bayesmembrane.words.language import listed, spoken_parameter
+from bayesmembrane.words.seen import alike
 
 
 class CalibrationsSection(Section):
@@ -57,7 +58,9 @@ class CalibrationsSection(Section):
         shown = in_order(of_kind(results, Shown))
         if not shown:
             return None
-        return Subject(tuple(dict.fromkeys(s.film.name for s in shown)), overview([s.case for s in shown]))
+        films = tuple(dict.fromkeys(s.film.name for s in shown))
+        curves = list(dict.fromkeys(s.how.curve for s in shown))
+        return Subject(films, overview([s.case for s in shown]), curves[0] if len(curves) == 1 else "force curve")
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
@@ -65,34 +68,36 @@ class CalibrationsSection(Section):
 
 def fits_table(shown: Sequence[Shown]) -> Table:
     """How well each run's curve fits, judged by the measurement's own noise."""
+    how = alike(s.how for s in shown)
+    (small, unit), (large, whole) = how.small, how.load_scale
     columns = (
         Column("run", "material"),
-        Column("end_mm", "fitted up to (mm)"),
+        end_column(shown),
         Column("points", "points", "d"),
         Column("parameters", "parameters", "d"),
-        Column("rmse_mN", "rms residual (mN)", ".3g"),
-        Column("max_mN", "largest residual (mN)", ".3g"),
-        Column("loss_N", "loss (N)"),
-        Column("own_noise_mN", "stated noise (mN)", ".3g"),
-        Column("extra_noise_mN", "inferred extra noise (mN)", ".3g"),
+        Column(f"rmse_{unit}", f"rms residual ({unit})", PLAIN),
+        Column(f"max_{unit}", f"largest residual ({unit})", PLAIN),
+        Column(f"loss_{whole}", f"loss ({whole})"),
+        Column(f"own_noise_{unit}", f"stated noise ({unit})", PLAIN),
+        Column(f"extra_noise_{unit}", f"inferred extra noise ({unit})", PLAIN),
         Column("reduced_chi2", "reduced chi-square", ".3g"),
         Column("p_value", "p-value", "p"),
         Column("verdict", "verdict"),
     )
     rows = []
-    for s in shown:
+    for s, end in zip(shown, ends(shown), strict=True):
         fit, case = s.goodness, s.case
         rows.append(
             (
                 s.name,
-                1e3 * s.digest.end,
+                end,
                 int(s.digest.at.size),
                 s.hypothesis.curve_size,
-                1e3 * (fit["rmse_N"] or 0.0),
-                1e3 * (fit["max_N"] or 0.0),
-                fit["loss_N"],
-                _milli(fit["own_noise_N"]),
-                _milli(case.extra_noise),
+                small * (fit["rmse_N"] or 0.0),
+                small * (fit["max_N"] or 0.0),
+                _times(large, fit["loss_N"]),
+                _times(small, fit["own_noise_N"]),
+                _times(small, case.extra_noise),
                 fit["reduced_chi2"],
                 fit["p_value"],
                 verdict(case),
@@ -100,15 +105,15 @@ def fits_table(shown: Sequence[Shown]) -> Table:
         )
     return Table(
         "fits",
-        "Residuals of the most probable draw of each run: forces in N and mN, deflections in mm. Chi-square and "
+        "Residuals of the most probable draw of each run. Chi-square and "
         "p-value use the noise that the measurement states, never the inferred one.",
         columns,
         tuple(rows),
     )
 
 
-def _milli(value: float | None) -> float | None:
-    return None if value is None else 1e3 * value
+def _times(factor: float, value: float | None) -> float | None:
+    return None if value is None else factor * value
 
 
 def losses_table(compared: Sequence[Compared]) -> Table:
@@ -153,12 +158,12 @@ def _forest(runs: Sequence[Shown]) -> Figure:
         for i, name in enumerate(h.natural_names)
     }
     units = dict(zip(h.natural_names, h.natural_units, strict=True))
-    ends = listed(f"{1e3 * s.digest.end:.4g}" for s in runs)
+    reach = listed(s.end for s in runs)
     names = listed(f"{spoken_parameter(n)} ({units[n]})" for n in parameters)
     return Figure(
         forest_picture(parameters, units),
-        alt=f"Intervals of the parameters of {runs[0].name} for the fitted ranges {ends} mm",
-        caption=f"{runs[0].name}: medians and 90 % intervals of {names}, fitted up to {ends} mm. Intervals that do not "
+        alt=f"Intervals of the parameters of {runs[0].name} fitted up to {reach}",
+        caption=f"{runs[0].name}: medians and 90 % intervals of {names}, fitted up to {reach}. Intervals that do not "
         "overlap say that one set of parameters cannot serve both ranges.",
     )
 

@@ -8,9 +8,10 @@ from typing import Any
 from bayesmembrane.calibration.posterior import Outcome
 from bayesmembrane.physics.convexity import RESTRICTING
 from bayesmembrane.report.blocks import Block, Column, Table, Value
-from bayesmembrane.report.runs import Shown, in_order
+from bayesmembrane.report.runs import Shown, end_column, ends, in_order
 from bayesmembrane.report.sections.base import Section, of_kind
 from bayesmembrane.words.calibration import disagreement
+from bayesmembrane.words.seen import alike
 
 MODES = tuple(m.name for m in RESTRICTING)
 
@@ -31,7 +32,7 @@ class ChecksSection(Section):
         for s in in_order(of_kind(results, Shown)):
             largest = s.crosscheck.get("largest")
             if isinstance(largest, float):
-                told.append(disagreement(s.name, s.digest.end, largest))
+                told.append(disagreement(s.name, s.end, largest))
         return [t for t in told if t]
 
 
@@ -39,7 +40,7 @@ def masses_table(shown: Sequence[Shown]) -> Table:
     """What the convexity prior leaves, and how many posterior draws meet the stronger modes."""
     columns = (
         Column("run", "material"),
-        Column("end_mm", "fitted up to (mm)"),
+        end_column(shown),
         Column("mode", "prior used"),
         *(Column(f"mass_{m}", f"prior mass, {m}", "%") for m in MODES),
         *(Column(f"draws_{m}", f"posterior draws, {m}", "%") for m in MODES),
@@ -47,12 +48,12 @@ def masses_table(shown: Sequence[Shown]) -> Table:
     rows = tuple(
         (
             s.name,
-            1e3 * s.digest.end,
+            end,
             s.hypothesis.convexity.name,
             *(s.masses[m][0] if m in s.masses else None for m in MODES),
             *(s.digest.convex.get(m) for m in MODES),
         )
-        for s in shown
+        for s, end in zip(shown, ends(shown), strict=True)
     )
     caption = (
         "Convexity, shares in %: part of the untruncated prior that each mode leaves, and part of the posterior draws "
@@ -64,18 +65,19 @@ def masses_table(shown: Sequence[Shown]) -> Table:
 
 def crosscheck_table(shown: Sequence[Shown]) -> Table:
     """What the second solver found."""
+    unit = "stretch" if alike(s.how for s in shown).rest else "mm"
     columns = (
         Column("run", "material"),
-        Column("end_mm", "fitted up to (mm)"),
+        end_column(shown),
         Column("draws", "films solved twice", "d"),
         Column("compared", "forces compared", "d"),
         Column("largest", "largest relative difference (-)", ".1e"),
-        Column("at_mm", "met at (mm)"),
+        Column(f"at_{unit}", f"met at ({unit})"),
         Column("missing", "forces that one solver lacks", "d"),
     )
     keys = ("draws", "compared", "largest", "at_mm", "missing")
     rows: tuple[tuple[Value, ...], ...] = tuple(
-        (s.name, 1e3 * s.digest.end, *(s.crosscheck.get(k) for k in keys)) for s in shown
+        (s.name, end, *(_met(s, k) for k in keys)) for s, end in zip(shown, ends(shown), strict=True)
     )
     caption = (
         "A sample of the posterior draws of each run, computed a second time with the other solver, which works by "
@@ -84,16 +86,22 @@ def crosscheck_table(shown: Sequence[Shown]) -> Table:
     return Table("crosscheck", caption, columns, rows)
 
 
+def _met(s: Shown, key: str) -> Value:
+    """What a cross-check found; where it was met as people read it."""
+    value: Value = s.crosscheck.get(key)
+    return s.how.rest + s.how.travel_scale[0] * 1e-3 * value if key == "at_mm" and isinstance(value, float) else value
+
+
 def outcomes_table(shown: Sequence[Shown]) -> Table:
     """What became of all evaluations."""
     reasons = [o.label for o in Outcome if any(s.outcomes.get(o.label) for s in shown)]
     columns = (
         Column("run", "material"),
-        Column("end_mm", "fitted up to (mm)"),
+        end_column(shown),
         *(Column(r.replace(" ", "_"), r, ",d") for r in reasons),
     )
     rows: tuple[tuple[Value, ...], ...] = tuple(
-        (s.name, 1e3 * s.digest.end, *(int(s.outcomes.get(r, 0)) for r in reasons)) for s in shown
+        (s.name, end, *(int(s.outcomes.get(r, 0)) for r in reasons)) for s, end in zip(shown, ends(shown), strict=True)
     )
     caption = (
         "What became of all evaluations, in numbers of films: all but ok have no posterior density; unresolved and "

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.report.blocks import Block, Figure, Picture, points
 from bayesmembrane.report.canvas import Measured, Shade, band, encoded, errorbars, legend_columns, new_figure, style
-from bayesmembrane.report.runs import Shown, by_points
+from bayesmembrane.report.runs import Shown, by_points, reach
 from bayesmembrane.report.sections.base import Section, of_kind
 from bayesmembrane.report.style import FAINT, INK, MUTED, SHADE, colour, linestyle, marker
 from bayesmembrane.words.calibration import held_out
 from bayesmembrane.words.language import listed
+from bayesmembrane.words.seen import Seen
 
 
 class CurvesSection(Section):
@@ -30,32 +31,35 @@ class CurvesSection(Section):
     order = 30
 
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
-        return [b for group in by_points(of_kind(results, Shown)) for b in _blocks(group)]
+        shown = of_kind(results, Shown)
+        return [b for group in by_points(shown) for b in _blocks(group, reach(group[0], shown))]
 
 
-def _blocks(group: Sequence[Shown]) -> list[Block]:
-    names, end = listed(s.name for s in group), group[0].end
+def _blocks(group: Sequence[Shown], end: str) -> list[Block]:
+    names, how = listed(s.name for s in group), group[0].how
     figure = Figure(
-        first_look([look_of(group)]),
-        alt=f"Measured force against deflection up to {end} with the curves of {names}, and their residuals",
-        caption=f"Force (N) against deflection (mm), fitted up to {end}: median curves and 90 % bands of {names}. "
-        "Beyond the fitted range curves are dashed and bands hatched: there only the form of the energy and the priors "
-        "speak. Below: measured minus median force (N); the grey band is two standard deviations of the stated noise. "
+        first_look([look_of(group, end)]),
+        alt=f"{how.origin.capitalize()} {how.load} against {how.travel} up to {end} with the curves of {names}, and "
+        "their residuals",
+        caption=f"{how.load.capitalize()} ({how.load_scale[1]}) against {how.travel_label}, fitted up to {end}: median "
+        f"curves and 90 % bands of {names}. Beyond the fitted range curves are dashed and bands hatched: there only "
+        f"the form of the energy and the priors speak. Below: {how.origin} minus median {how.load} "
+        f"({how.load_scale[1]}); the grey band is two standard deviations of the stated noise. "
         "The vertical axis of the residuals is logarithmic away from zero where it has to be.",
     )
-    return [figure, *points([held_out(s.name, s.digest.rest_residual) for s in group if s.digest.rest_at.size])]
+    return [figure, *points([held_out(s.name, s.digest.rest_residual, s.how) for s in group if s.digest.rest_at.size])]
 
 
-def look_of(group: Sequence[Shown]) -> Panel:
+def look_of(group: Sequence[Shown], end: str) -> Panel:
     """The picture of runs that were fitted to the same points."""
     d = group[0].digest
     rest = None
     if d.rest_at.size:
-        rest = Measured(d.rest_at, d.rest_force, d.rest_sd if np.all(np.isfinite(d.rest_sd)) else None)
+        rest = Measured(d.rest_at, d.rest_force, d.rest_sd if np.all(np.isfinite(d.rest_sd)) else None, group[0].how)
     curves = tuple(
         Fitted(s.look, s.digest.deflection, s.digest.curve, s.digest.beyond, s.digest.residual, s.name) for s in group
     )
-    return Panel(group[0].points, curves, rest, f"Fitted up to {group[0].end}")
+    return Panel(group[0].points, curves, rest, f"Fitted up to {end}")
 
 
 # ---- the picture -----------------------------------------------------------------------------------------------------
@@ -104,11 +108,12 @@ def first_look(looks: Sequence[Panel], kind: str = "svg") -> Picture:
 
 
 def _look(ax: Axes, look: Panel, first: bool) -> None:
-    end = 1e3 * float(np.max(look.points.deflection))
+    how = look.points.how
+    end = _at(how, float(np.max(look.points.deflection)))
     for curve in look.curves:
-        _curve(ax, curve)
-    last = max([end, *(1e3 * float(c.deflection[-1]) for c in look.curves)])
-    lowest, top = _reach(look, 1e-3 * last)
+        _curve(ax, curve, look.points)
+    last = max([end, *(_at(how, float(c.deflection[-1])) for c in look.curves)])
+    lowest, top = _reach(look, last)
     if last > end * (1 + 1e-6):
         ax.axvspan(end, last, color=SHADE, zorder=0)
         narrow = last - end < 0.3 * last
@@ -127,49 +132,62 @@ def _look(ax: Axes, look: Panel, first: bool) -> None:
     if look.rest is not None and look.rest.deflection.size:
         errorbars(ax, look.rest, filled=False)
     ax.set_ylim(lowest - 0.02 * top, top)
-    ax.set_xlim(0, last)
+    ax.set_xlim(how.rest, last)
     ax.set_title(look.heading)
     ax.grid(color=FAINT, linewidth=0.6)
     if first:
-        ax.set_ylabel("force (N)")
+        ax.set_ylabel(how.load_label)
 
 
 def _reach(look: Panel, last: float) -> tuple[float, float]:
-    """The vertical axis: all measured points up to the deflection ``last``, m, with a margin."""
+    """The vertical axis: all points up to ``last`` on the other axis, with a margin."""
     parts = [look.points] + ([look.rest] if look.rest is not None else [])
-    seen = np.concatenate([p.force[p.deflection <= last * (1 + 1e-9)] for p in parts])
+    how = look.points.how
+    seen = np.concatenate([how.carried(p.force[how.along(p.deflection) <= last * (1 + 1e-9)]) for p in parts])
     return min(0.0, 1.12 * float(np.min(seen))), 1.12 * float(np.max(seen))
 
 
-def _curve(ax: Axes, curve: Fitted) -> None:
-    x, c = 1e3 * curve.deflection, colour(curve.look)
+def _at(how: Seen, deflection: float) -> float:
+    return how.rest + how.travel_scale[0] * deflection
+
+
+def _curve(ax: Axes, curve: Fitted, points: Measured) -> None:
+    """The median: where the film was unloaded, too, in the order of the test, for a loop is seen as one."""
+    how = points.how
+    x, force, c = how.along(curve.deflection), how.carried(curve.force), colour(curve.look)
     inside = ~curve.beyond
-    band(ax, x, curve.force, inside, Shade(c, 0.25))
-    ax.plot(x[inside], curve.force[1][inside], color=c, zorder=3)
+    band(ax, x, force, inside, Shade(c, 0.25))
+    if np.any(np.diff(points.deflection) < 0) and np.all(np.isfinite(curve.residual[1])):
+        ax.plot(how.along(points.deflection), how.carried(points.force - curve.residual[1]), color=c, zorder=3)
+    else:
+        ax.plot(x[inside], force[1][inside], color=c, zorder=3)
     if np.any(curve.beyond):
         outside = curve.beyond.copy()
         outside[max(0, int(np.argmax(curve.beyond)) - 1)] = True  # joined to the inside
-        band(ax, x, curve.force, outside, Shade(c, 0.12, "////"))
-        ax.plot(x[outside], curve.force[1][outside], color=c, linestyle=(0, (4, 2)), linewidth=1.5, zorder=3)
+        band(ax, x, force, outside, Shade(c, 0.12, "////"))
+        ax.plot(x[outside], force[1][outside], color=c, linestyle=(0, (4, 2)), linewidth=1.5, zorder=3)
 
 
 def _look_residuals(ax: Axes, look: Panel, first: bool) -> None:
-    x, n = 1e3 * look.points.deflection, look.points.deflection.size
-    if look.points.sd is not None:
+    how = look.points.how
+    x, n = how.along(look.points.deflection), look.points.deflection.size
+    left = [how.carried(c.residual[1]) for c in look.curves]
+    own = None if look.points.sd is None else how.carried(look.points.sd)
+    if own is not None:
         order = np.argsort(x)
-        sd = 2 * look.points.sd[order]
+        sd = 2 * own[order]
         ax.fill_between(x[order], -sd, sd, color=FAINT, lw=0, zorder=1)
     ax.axhline(0, color=INK, linewidth=0.8)
-    for curve in look.curves:
+    for curve, residual in zip(look.curves, left, strict=True):
         c = colour(curve.look)
         mark = marker(curve.look) if n <= 60 else "none"
         line = linestyle(curve.look)
-        ax.plot(x, curve.residual[1], color=c, linewidth=1.1, linestyle=line, marker=mark, markersize=3.5)
-    _residual_scale(ax, [c.residual[1] for c in look.curves], look.points.sd)
-    ax.set_xlabel("deflection (mm)")
+        ax.plot(x, residual, color=c, linewidth=1.1, linestyle=line, marker=mark, markersize=3.5)
+    _residual_scale(ax, left, own)
+    ax.set_xlabel(how.travel_label)
     ax.grid(color=FAINT, linewidth=0.6)
     if first:
-        ax.set_ylabel("residual (N)")
+        ax.set_ylabel(f"residual ({how.load_scale[1]})")
 
 
 def _residual_scale(ax: Axes, residuals: Sequence[Array], sd: Array | None) -> None:
@@ -194,14 +212,15 @@ def _same_limits(axes: Sequence[Axes]) -> None:
 
 def _look_legend(looks: Sequence[Panel]) -> list[Any]:
     curves = {c.label: c for look in looks for c in look.curves}
+    origin = looks[0].points.how.origin
     handles: list[Any] = [
-        Line2D([], [], color=INK, marker="o", linestyle="none", markersize=4.5, label="measured (bars: 2 sd)")
+        Line2D([], [], color=INK, marker="o", linestyle="none", markersize=4.5, label=f"{origin} (bars: 2 sd)")
     ]
     if any(look.rest is not None and look.rest.deflection.size for look in looks):
         handles.append(
             Line2D(
                 [], [], color=INK, marker="o", markerfacecolor="white", linestyle="none", markersize=4.5,
-                label="measured, not used",
+                label=f"{origin}, not used",
             )
         )  # fmt: skip
     for name, c in curves.items():

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.report.blocks import Block, Table, Text, facts_table
-from bayesmembrane.report.runs import Shown, ShownFilm, by_points
+from bayesmembrane.report.runs import Shown, ShownFilm, by_points, reach
 from bayesmembrane.report.sections.base import Section, of_kind
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.origin import origin
@@ -29,16 +29,19 @@ class DataSection(Section):
         out: list[Block] = [Text(origin(r)) for r in of_kind(results, Reconstruction)]
         before = ""
         for group in by_points(shown):
-            out.append(_table(group[0], before))
+            out.append(_table(group[0], before, reach(group[0], shown)))
             before = group[0].film.origin
         return out
 
 
-def _table(s: Shown, before: str) -> Table:
+def _table(s: Shown, before: str, end: str) -> Table:
     """What is known of a measurement; an origin that is that of the table ``before`` is not told again."""
-    d, film = s.digest, s.film
+    d, film, how = s.digest, s.film, s.how
+    factor, unit = how.small
+    of = "" if how.rest else f" of {how.travel}"
+    low, high = (float(f(how.carried(d.force))) for f in (np.min, np.max))
     noise = (
-        f"stated noise {1e3 * float(np.min(d.sd)):.3g} to {1e3 * float(np.max(d.sd)):.3g} mN (sd)"
+        f"stated noise {factor * float(np.min(d.sd)):.3g} to {factor * float(np.max(d.sd)):.3g} {unit} (sd)"
         if d.has_noise
         else "no stated noise: it is inferred"
     )
@@ -46,15 +49,15 @@ def _table(s: Shown, before: str) -> Table:
         "specimen": film.name,
         "thickness": f"{1e6 * film.thickness:.4g} um",
         "rig": _rig(film),
-        "points": f"{d.at.size}, from {1e3 * float(np.min(d.at)):.4g} to {s.end} of deflection",
-        "forces": f"{float(np.min(d.force)):.4g} to {float(np.max(d.force)):.4g} N; {noise}",
-        "whole measurement": f"up to {1e3 * d.full_range:.4g} mm",
+        "points": f"{d.at.size}, from {how.place(float(np.min(d.at)))} to {s.end}{of}",
+        "stresses" if how.rest else "forces": f"{low:.4g} to {high:.4g} {how.load_scale[1]}; {noise}",
+        "whole measurement": f"up to {how.place(d.full_range)}",
         "files": ", ".join(f for f in film.files if f) or "-",
         "origin": "as above" if before and film.origin == before else film.origin or "not stated",
         "notes": "; ".join(film.notes) or "none",
         "data hash (SHA-256)": s.data_hash,
     }
-    return facts_table(f"data up to {s.end}", f"The measurement, fitted up to {s.end}.", facts)
+    return facts_table(f"data up to {end}", f"The {how.curve}, fitted up to {end}.", facts)
 
 
 def _rig(film: ShownFilm) -> str:

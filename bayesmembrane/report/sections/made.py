@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.physics.cache import Tally
 from bayesmembrane.report.blocks import Block, Column, Table, Value, fact, facts_table
-from bayesmembrane.report.runs import Shown, in_order
+from bayesmembrane.report.runs import Shown, end_column, ends, in_order
 from bayesmembrane.report.sections.base import Section, of_kind
 
 
@@ -45,7 +45,7 @@ def sampling_table(shown: Sequence[Shown]) -> Table:
     """How each run was sampled."""
     columns = (
         Column("run", "material"),
-        Column("end_mm", "fitted up to (mm)"),
+        end_column(shown),
         Column("status", "status"),
         Column("ess", "ESS, worst (-)", ".0f"),
         Column("r_hat", "R-hat, worst (-)", ".4f"),
@@ -62,7 +62,7 @@ def sampling_table(shown: Sequence[Shown]) -> Table:
     rows = tuple(
         (
             s.name,
-            1e3 * s.digest.end,
+            end,
             s.sampling.status,
             s.case.ess,
             s.case.r_hat,
@@ -76,7 +76,7 @@ def sampling_table(shown: Sequence[Shown]) -> Table:
             s.case.failed,
             s.sampling.seconds,
         )
-        for s in shown
+        for s, end in zip(shown, ends(shown), strict=True)
     )
     return Table("sampling", "How each run was sampled: steps without unit, time in s.", columns, rows)
 
@@ -85,7 +85,7 @@ def cache_table(shown: Sequence[Shown], total: Tally | None = None) -> Table:
     """What the curve cache did in each run, beside the films that were solved directly; and in all."""
     columns = (
         Column("run", "material"),
-        Column("end_mm", "fitted up to (mm)"),
+        end_column(shown),
         Column("hits", "found", ",d"),
         Column("from_disk", "curves read from disk", ",d"),
         Column("misses", "solved and kept", ",d"),
@@ -97,7 +97,7 @@ def cache_table(shown: Sequence[Shown], total: Tally | None = None) -> Table:
     )
     keys = [c.key for c in columns[2:]]
     rows: list[tuple[Value, ...]] = [
-        (s.name, 1e3 * s.digest.end, *(s.cache.get(k) for k in keys)) for s in shown if s.cache
+        (s.name, end, *(s.cache.get(k) for k in keys)) for s, end in zip(shown, ends(shown), strict=True) if s.cache
     ]
     if total is not None:
         summary = total.summary()
@@ -114,8 +114,8 @@ def cache_table(shown: Sequence[Shown], total: Tally | None = None) -> Table:
 def own_facts_table(shown: Sequence[Shown], common: Mapping[str, Any]) -> Table:
     """Settings in which the runs differ."""
     names = list(dict.fromkeys(k for s in shown for k in s.facts if k not in common))
-    columns = (Column("run", "material"), Column("end_mm", "fitted up to (mm)"), *(Column(n, n) for n in names))
+    columns = (Column("run", "material"), end_column(shown), *(Column(n, n) for n in names))
     rows: tuple[tuple[Value, ...], ...] = tuple(
-        (s.name, 1e3 * s.digest.end, *(fact(s.facts.get(n)) for n in names)) for s in shown
+        (s.name, end, *(fact(s.facts.get(n)) for n in names)) for s, end in zip(shown, ends(shown), strict=True)
     )
     return Table("settings_of_runs", "Settings in which the runs differ.", columns, rows)

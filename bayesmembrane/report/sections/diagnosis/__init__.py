@@ -8,11 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.diagnosis.left.heldout import held_out
 from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.stored import read
-from bayesmembrane.report.blocks import Block, Figure, Heading, Part, Text, points
+from bayesmembrane.report.blocks import Block, Figure, Heading, Lead, Part, Text, points
 from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
 from bayesmembrane.report.sections.diagnosis.figures import Place, Residual, residual_picture
+from bayesmembrane.report.sections.diagnosis.lead import lead, steps_of
 from bayesmembrane.report.sections.diagnosis.tables import (
     before_and_after,
     confounded_table,
@@ -20,9 +23,11 @@ from bayesmembrane.report.sections.diagnosis.tables import (
     ranking_table,
 )
 from bayesmembrane.words import diagnosis as words
+from bayesmembrane.words.brief import of_diagnosis
 from bayesmembrane.words.candidates import bounds, rivals, validation_sentence
 from bayesmembrane.words.hypothesis import spoken
-from bayesmembrane.words.language import sentence
+from bayesmembrane.words.language import listed, sentence
+from bayesmembrane.words.seen import seen
 
 
 class DiagnosisSection(Section):
@@ -47,12 +52,21 @@ class DiagnosisSection(Section):
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
         return [words.sentence(d) for d in of_kind(results, Diagnosis)]
 
+    def lead(self, results: Sequence[Any]) -> Lead | None:
+        found = of_kind(results, Diagnosis)
+        return lead_of(found[0]) if len(found) == 1 else None
+
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
         return [Glance("diagnosis", spoken(d.null.hypothesis), finding(d)) for d in of_kind(results, Diagnosis)]
 
     def subject(self, results: Sequence[Any]) -> Subject | None:
-        names = [spoken(d.null.hypothesis) for d in of_kind(results, Diagnosis)]
-        return Subject((), f"A diagnosis of {', '.join(names)}.") if names else None
+        found = of_kind(results, Diagnosis)
+        if not found:
+            return None
+        names = ", ".join(spoken(d.null.hypothesis) for d in found)
+        curves = list(dict.fromkeys(seen(d.measurement).curve for d in found))
+        films = tuple(dict.fromkeys(d.measurement.specimen.name for d in found))
+        return Subject(films, f"A diagnosis of {names}.", curves[0] if len(curves) == 1 else "force curve")
 
 
 def finding(d: Diagnosis) -> str:
@@ -60,9 +74,16 @@ def finding(d: Diagnosis) -> str:
     return f"{d.verdict}: {spoken(d.hypothesis)}" if d.explains else d.verdict
 
 
+def lead_of(d: Diagnosis) -> Lead:
+    """Its first screen."""
+    return lead(of_diagnosis(d), steps_of(d), d)
+
+
 def _part(d: Diagnosis, end: str) -> Part:
+    """All of a diagnosis; one of several, with an ``end`` to its names, begins with its first screen."""
     told = [*(s for s in [validation_sentence(d)] if s), *bounds(d)]
     blocks: list[Block] = [
+        *([lead_of(d)] if end else []),
         Text(words.sentence(d)),
         *points(told),
         _residuals(d),
@@ -74,19 +95,42 @@ def _part(d: Diagnosis, end: str) -> Part:
     return Part(f"diagnosis{end.strip()}", f"What may be missing: {spoken(d.null.hypothesis)}", tuple(blocks))
 
 
+def place_of(d: Diagnosis, sd: Array | None = None) -> Place:
+    """Where the points lie, which were set aside, and their noise."""
+    m = d.measurement
+    mask = held_out(m) if d.validation is not None else np.zeros(len(m), dtype=bool)
+    return Place(m.deflection, m.time, m.leg, m.cycle, mask, d.noise.each if sd is None else sd, seen(m))
+
+
 def _residuals(d: Diagnosis) -> Figure:
-    n = d.null.residual.size
-    place = Place(None, None, np.ones(n, np.int8), np.ones(n, np.int64), np.zeros(n, np.bool_), d.noise.each)
-    rows = [Residual(f"As given: {spoken(d.null.hypothesis)}, rms {1e3 * d.before.rmse_N:.3g} mN", d.null.residual)]
+    how = seen(d.measurement)
+    rows = [
+        Residual(
+            f"As given: {spoken(d.null.hypothesis)}, root mean square {how.error(d.before.rmse_N)}", d.null.residual
+        )
+    ]
     if d.best is not d.null:
-        title = f"The most probable: {spoken(d.best.hypothesis)}, rms {1e3 * d.after.rmse_N:.3g} mN"
+        title = f"The most probable: {spoken(d.best.hypothesis)}, root mean square {how.error(d.after.rmse_N)}"
         rows.append(Residual(title, d.best.residual))
-    return Figure(
-        residual_picture(place, rows),
-        alt="Residuals " + " and ".join(f"{r.title[0].lower()}{r.title[1:]}" for r in rows),
-        caption="Measured less fitted force (mN) in the order of the test (point, -). Grey: what the measurement's own "
-        "noise does. The line is the mean of neighbours: where it leaves the middle of the band, something is missing.",
+    return residuals_figure(place_of(d), rows)
+
+
+def residuals_figure(place: Place, rows: Sequence[Residual]) -> Figure:
+    """What models leave, the first one above."""
+    how = place.how
+    against = [how.travel, place.along[1].partition(" ")[0]]
+    against += ["by cycle"] if np.unique(place.cycle).size > 1 else []
+    order = "; the model as given above, the one with what was found below" if len(rows) > 1 else ""
+    hollow = ""
+    if np.any(place.held_out):
+        hollow = " All points were fitted here; the hollow ones are those held out for the errors of the table."
+    caption = (
+        f"{how.origin.capitalize()} less fitted {how.load} ({how.small[1]}) against {listed(against)}{order}. Grey: "
+        "what noise does. The lines are means of neighbours: where they leave the middle of the band, or loading and "
+        f"unloading part, something is missing.{hollow}"
     )
+    alt = "Residuals " + " and ".join(f"{r.title[0].lower()}{r.title[1:]}" for r in rows)
+    return Figure(residual_picture(place, rows), alt, caption)
 
 
 def explanations(d: Diagnosis, heading: str, name: str) -> list[Block]:

@@ -17,6 +17,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.report.blocks import Picture
 from bayesmembrane.report.canvas import encoded, new_figure, style
 from bayesmembrane.report.style import FAINT, INK, MUTED, RANGE_COLOURS
+from bayesmembrane.words.seen import Seen
 
 LEGS = ((1, "loading", RANGE_COLOURS[0], "o"), (-1, "unloading", RANGE_COLOURS[1], "v"))
 PARTS = 24  # means that make a line against deflection or time
@@ -37,19 +38,21 @@ class Residual:
 class Place:
     """Where the N points lie, and how much noise they have.
 
-    deflection : (N,) m, or None where only the order of the points is known
+    deflection : (N,) m
     time : (N,) s or None
     leg, cycle : (N,) +1 loading, -1 unloading; number of the cycle
     held_out : (N,) True where a point was set aside
     sd : (N,) N, the measurement's own noise
+    how : in which quantities and units people read it
     """
 
-    deflection: Array | None
+    deflection: Array
     time: Array | None
     leg: NDArray[np.int8]
     cycle: NDArray[np.int64]
     held_out: NDArray[np.bool_]
     sd: Array
+    how: Seen
 
     @property
     def along(self) -> tuple[Array, str]:
@@ -60,7 +63,7 @@ class Place:
 
 
 def residual_picture(place: Place, rows: Sequence[Residual], kind: str = "png") -> Picture:
-    """A row for each model, the first one above: against deflection, along the test, and by cycle.
+    """A row for each model, the first one above: against deflection or stretch, along the test, and by cycle.
 
     All rows have one scale, unless the last one would vanish in it; then its title says how much it is enlarged.
     """
@@ -72,7 +75,7 @@ def residual_picture(place: Place, rows: Sequence[Residual], kind: str = "png") 
         parts = figure.subfigures(len(rows), 1, squeeze=False)[:, 0]
         panels = []
         for i, (part, row) in enumerate(zip(parts, rows, strict=True)):
-            panels.append(_row(part, place, row.residual, 1e3 * (tops[i] if enlarged else max(tops))))
+            panels.append(_row(part, place, row.residual, place.how.small[0] * (tops[i] if enlarged else max(tops))))
             more = f" (axis enlarged {tops[0] / tops[i]:.2g} times)" if enlarged and i else ""
             part.suptitle(fill(row.title + more, LONGEST), x=0.01, ha="left", fontsize=11.5, fontweight="bold")
         cycles = [p["cycle (-)"] for p in panels if "cycle (-)" in p]
@@ -87,8 +90,8 @@ def residual_picture(place: Place, rows: Sequence[Residual], kind: str = "png") 
 
 
 def _row(part: Any, place: Place, residual: Array, top: float) -> dict[str, Axes]:
-    """The panels of one model by the name of their horizontal axis, up to ``top`` mN."""
-    names = [place.along[1]] if place.deflection is None else ["deflection (mm)", place.along[1]]
+    """The panels of one model by the name of their horizontal axis, up to ``top`` in the units shown."""
+    names = [place.how.travel_label, place.along[1]]
     if np.unique(place.cycle).size > 1:
         names.append("cycle (-)")
     ratios = [2.2 if name == "cycle (-)" else 4.0 for name in names]
@@ -97,14 +100,14 @@ def _row(part: Any, place: Place, residual: Array, top: float) -> dict[str, Axes
         if name == "cycle (-)":
             _by_cycle(ax, place, residual)
             continue
-        if name == "deflection (mm)":
+        if name == place.how.travel_label:
             _against_deflection(ax, place, residual)
         else:
             _along(ax, place, residual)
         ax.set_ylim(-top, top)
         ax.tick_params(labelleft=i == 0)
         if i == 0:
-            ax.set_ylabel("measured less fitted (mN)")
+            ax.set_ylabel(place.how.left_label)
     return panels
 
 
@@ -115,24 +118,26 @@ def discrepancy_picture(place: Place, residual: Array, mean: Array, sd: Array, k
         axes = figure.subplots(1, 2, sharey=True)
         at, label = place.along
         shade = 0.25 if len(_legs(place.leg)) <= 3 else 0.12
-        for ax, x, name in ((axes[0], _millimetres(place), "deflection (mm)"), (axes[1], at, label)):
-            _noise(ax, x, place.sd)
+        for ax, x, name in ((axes[0], place.how.along(place.deflection), place.how.travel_label), (axes[1], at, label)):
+            _noise(ax, x, place)
             for sign, _, colour, symbol in LEGS:
                 own = place.leg == sign
-                ax.plot(x[own], 1e3 * residual[own], symbol, color=colour, markersize=2.2, alpha=0.35, zorder=2)
+                ax.plot(
+                    x[own], place.how.left(residual)[own], symbol, color=colour, markersize=2.2, alpha=0.35, zorder=2
+                )
             for part in _legs(place.leg):
                 colour = LEGS[0 if place.leg[part[0]] > 0 else 1][2]
-                low, high = (1e3 * (mean + s * sd)[part] for s in (-2, 2))
+                low, high = (place.how.left(mean + s * sd)[part] for s in (-2, 2))
                 ax.fill_between(x[part], low, high, color=colour, alpha=shade, linewidth=0, zorder=3)
-                ax.plot(x[part], 1e3 * mean[part], color=colour, linewidth=1.6, zorder=4)
+                ax.plot(x[part], place.how.left(mean)[part], color=colour, linewidth=1.6, zorder=4)
             ax.axhline(0, color=MUTED, linewidth=0.8, zorder=1)
             ax.set_xlabel(name)
-        axes[0].set_ylabel("measured less fitted (mN)")
+        axes[0].set_ylabel(place.how.left_label)
         legs = [s for s in LEGS if np.any(place.leg == s[0])]
         handles: list[Line2D | Patch] = [
             Line2D([], [], color=c, label=f"kept without a name, {name}") for _, name, c, _ in legs
         ]
-        handles.append(Patch(color=BAND, label="the load cell's own noise, 2 sd"))
+        handles.append(Patch(color=BAND, label="noise, 2 sd"))
         figure.legend(handles=handles, loc="outside upper center", ncols=3)
         return encoded(figure, kind)
 
@@ -140,26 +145,22 @@ def discrepancy_picture(place: Place, residual: Array, mean: Array, sd: Array, k
 # ---- panels ----------------------------------------------------------------------------------------------------------
 
 
-def _millimetres(place: Place) -> Array:
-    return 1e3 * np.asarray(place.deflection)
-
-
 def _against_deflection(ax: Axes, place: Place, residual: Array) -> None:
-    x = _millimetres(place)
-    _noise(ax, x, place.sd)
+    x = place.how.along(place.deflection)
+    _noise(ax, x, place)
     _points(ax, x, place, residual)
     for sign, _, colour, _ in LEGS:
         own = place.leg == sign
         if np.count_nonzero(own) >= 2 * PARTS:
-            _mean_line(ax, x[own], residual[own], colour)
+            _mean_line(ax, x[own], place.how.left(residual)[own], colour)
 
 
 def _along(ax: Axes, place: Place, residual: Array) -> None:
     x = place.along[0]
-    _noise(ax, x, place.sd)
+    _noise(ax, x, place)
     _points(ax, x, place, residual)
     if x.size >= 2 * PARTS:
-        _mean_line(ax, x, residual, INK)
+        _mean_line(ax, x, place.how.left(residual), INK)
 
 
 def _by_cycle(ax: Axes, place: Place, residual: Array) -> None:
@@ -170,14 +171,14 @@ def _by_cycle(ax: Axes, place: Place, residual: Array) -> None:
             own = (place.cycle == c) & (place.leg == sign)
             if not np.any(own):
                 continue
-            size = 1e3 * float(np.sqrt(np.mean(residual[own] ** 2)))
+            size = place.how.small[0] * float(np.sqrt(np.mean(residual[own] ** 2)))
             face = "white" if np.all(place.held_out[own]) else colour
             x = c - 0.14 * sign
             ax.plot([x, x], [0, size], color=colour, linewidth=1.2, zorder=2)
             ax.plot([x], [size], symbol, color=colour, markerfacecolor=face, markersize=6, zorder=3)
-    noise = 1e3 * float(np.sqrt(np.mean(place.sd**2)))
+    noise = place.how.small[0] * float(np.sqrt(np.mean(place.sd**2)))
     ax.axhspan(0, noise, color=BAND, alpha=0.6, linewidth=0, zorder=0)
-    ax.set_ylabel("root mean square (mN)")
+    ax.set_ylabel(f"root mean square ({place.how.small[1]})")
     ax.set_xticks(cycles[:: max(1, cycles.size // 6)])
     ax.set_xlim(cycles[0] - 0.6, cycles[-1] + 0.6)
     ax.set_ylim(0, 1.1 * max(ax.get_ylim()[1], 1.1 * noise))
@@ -190,7 +191,7 @@ def _points(ax: Axes, x: Array, place: Place, residual: Array) -> None:
             own = (place.leg == sign) & (place.held_out == held)
             face = "white" if held else colour
             ax.plot(
-                *(x[own], 1e3 * residual[own], symbol),
+                *(x[own], place.how.left(residual)[own], symbol),
                 color=colour,
                 markerfacecolor=face,
                 markeredgewidth=0.7,
@@ -206,13 +207,14 @@ def _mean_line(ax: Axes, x: Array, residual: Array, colour: str) -> None:
     """Means of neighbours along x: what the eye should follow through the noise."""
     order = np.argsort(x, kind="stable")
     at, value = zip(*((x[p].mean(), residual[p].mean()) for p in np.array_split(order, PARTS)), strict=True)
-    ax.plot(at, 1e3 * np.array(value), color="white", linewidth=4.0, zorder=4)
-    ax.plot(at, 1e3 * np.array(value), color=colour, linewidth=2.0, zorder=5)
+    ax.plot(at, value, color="white", linewidth=4.0, zorder=4)
+    ax.plot(at, value, color=colour, linewidth=2.0, zorder=5)
 
 
-def _noise(ax: Axes, x: Array, sd: Array) -> None:
+def _noise(ax: Axes, x: Array, place: Place) -> None:
+    sd = place.how.left(place.sd)
     order = np.argsort(x, kind="stable")
-    ax.fill_between(x[order], -2e3 * sd[order], 2e3 * sd[order], color=BAND, alpha=0.6, linewidth=0, zorder=0)
+    ax.fill_between(x[order], -2 * sd[order], 2 * sd[order], color=BAND, alpha=0.6, linewidth=0, zorder=0)
 
 
 def _legs(leg: NDArray[np.int8]) -> list[NDArray[np.intp]]:
@@ -222,7 +224,7 @@ def _legs(leg: NDArray[np.int8]) -> list[NDArray[np.intp]]:
 
 def _handles(place: Place) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = []
-    for sign, name, colour, symbol in LEGS if place.deflection is not None else [(1, "reading", *LEGS[0][2:])]:
+    for sign, name, colour, symbol in LEGS:
         if np.any(place.leg == sign):
             handles.append(Line2D([], [], color=colour, marker=symbol, linewidth=0, markersize=5, label=name))
     if np.any(place.held_out):
@@ -232,4 +234,4 @@ def _handles(place: Place) -> list[Line2D | Patch]:
     if place.leg.size >= 2 * PARTS:
         handles.append(Line2D([], [], color=INK, linewidth=2.0, label="mean of neighbours"))
     cyclic = " (by cycle: 1 sd)" if np.unique(place.cycle).size > 1 else ""
-    return [*handles, Patch(color=BAND, label=f"noise alone: 2 sd{cyclic}")]
+    return [*handles, Patch(color=BAND, label=f"noise, 2 sd{cyclic}")]

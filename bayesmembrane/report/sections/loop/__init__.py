@@ -6,22 +6,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from bayesmembrane.diagnosis.left.heldout import held_out
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.stored import read
-from bayesmembrane.report.blocks import Block, Figure, Heading, Part, Text, points
+from bayesmembrane.report.blocks import Block, Figure, Heading, Lead, Part, Text, points
 from bayesmembrane.report.runs import Shown
 from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
-from bayesmembrane.report.sections.diagnosis import explanations, finding, limits
-from bayesmembrane.report.sections.diagnosis.figures import Place, Residual, discrepancy_picture, residual_picture
+from bayesmembrane.report.sections.diagnosis import explanations, finding, limits, place_of, residuals_figure
+from bayesmembrane.report.sections.diagnosis.figures import Place, Residual, discrepancy_picture
+from bayesmembrane.report.sections.diagnosis.lead import Step, lead
 from bayesmembrane.report.sections.loop.tables import errors_table, moved_table, scores_table
 from bayesmembrane.report.sections.loop.way import Waypoint, waypoints
+from bayesmembrane.words.brief import of_loop
 from bayesmembrane.words.diagnosis import set_aside
 from bayesmembrane.words.hypothesis import spoken
-from bayesmembrane.words.language import listed
 from bayesmembrane.words.loop import left_sentence
 from bayesmembrane.words.moved import changes
 from bayesmembrane.words.rounds import (
@@ -34,6 +32,7 @@ from bayesmembrane.words.rounds import (
     subject,
     validation_sentences,
 )
+from bayesmembrane.words.seen import seen
 
 
 class LoopSection(Section):
@@ -61,6 +60,10 @@ class LoopSection(Section):
             return [*answer(loops[0]), *moved(loops[0])[:1]]
         return [f"{subject(found)}: {' '.join(answer(found))}" for found in loops]
 
+    def lead(self, results: Sequence[Any]) -> Lead | None:
+        loops = of_kind(results, Loop)
+        return lead_of(loops[0]) if len(loops) == 1 else None
+
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
         return [Glance("loop", subject(found), finding(deciding(found))) for found in of_kind(results, Loop)]
 
@@ -69,17 +72,26 @@ class LoopSection(Section):
         if not loops or of_kind(results, Shown):
             return None  # the calibrations tell more
         films = dict.fromkeys(found.rounds[0].before.run.measurement.specimen.name for found in loops)
-        return Subject(tuple(films), f"What was missing: {'; '.join(map(subject, loops))}.")
+        curves = list(dict.fromkeys(seen(found.rounds[0].diagnosis.measurement).curve for found in loops))
+        curve = curves[0] if len(curves) == 1 else "force curve"
+        return Subject(tuple(films), f"What was missing: {'; '.join(map(subject, loops))}.", curve)
+
+
+def lead_of(found: Loop) -> Lead:
+    """Its first screen."""
+    return lead(of_loop(found), steps_of(found), found.rounds[-1].diagnosis)
 
 
 def _part(found: Loop, number: int) -> Part:
+    """All of a loop; one of several, with a ``number``, begins with its first screen."""
     end = f" {number}" if number else ""
     first, last = found.rounds[0].diagnosis, found.rounds[-1].diagnosis
     way = waypoints(found)
     where = set_aside(first.validation)
-    blocks: list[Block] = [Text(text) for text in answer(found)]
+    blocks: list[Block] = [lead_of(found)] if number else []
+    blocks += [Text(text) for text in answer(found)]
     blocks += points([*validation_sentences(found), *bound_sentences(found), *moved(found), *rival_sentences(found)])
-    blocks.append(_residuals(found, way))
+    blocks.append(residuals_figure(_place(found), residual_rows(way)))
     blocks += [errors_table(way, where, f"loop errors{end}"), scores_table(way, f"loop scores{end}")]
     blocks += _left(found, last)
     before, after = stages(found)
@@ -94,11 +106,24 @@ def _part(found: Loop, number: int) -> Part:
     return Part(f"loop{end.strip()}", f"What was missing: {subject(found)}", tuple(blocks))
 
 
-def place_of(found: Loop) -> Place:
-    """Where the points lie, which were set aside, and their noise as the last diagnosis has it."""
-    m, d = found.rounds[0].before.run.measurement, found.rounds[-1].diagnosis
-    mask = held_out(m) if d.validation is not None else np.zeros(len(m), dtype=bool)
-    return Place(m.deflection, m.time, m.leg, m.cycle, mask, d.noise.each)
+def _place(found: Loop) -> Place:
+    """Where the points lie, with their noise as the last diagnosis has it."""
+    return place_of(found.rounds[0].diagnosis, found.rounds[-1].diagnosis.noise.each)
+
+
+def steps_of(found: Loop) -> list[Step]:
+    """The model as given, the last one that was added, and of an ambiguous answer the first of the rivals."""
+    way = waypoints(found)
+    first = way[0]
+    if len(way) == 1:
+        return [_step("as given", first)]
+    added = [_step("after", m) for m in way[1:] if m.added]
+    rivals = [_step("if the first", m) for m in way[1:] if not m.added]
+    return [_step("before", first), *added[-1:], *rivals[:1]]
+
+
+def _step(title: str, m: Waypoint) -> Step:
+    return Step(title, m.of, m.candidate.residual, m.error, m.held_out)
 
 
 def residual_rows(way: Sequence[Waypoint]) -> list[Residual]:
@@ -114,32 +139,18 @@ def residual_rows(way: Sequence[Waypoint]) -> list[Residual]:
 
 
 def _row_title(word: str, m: Waypoint) -> str:
-    return f"{word}: {m.title}, rms {1e3 * m.error.rmse_N:.3g} mN"
-
-
-def _residuals(found: Loop, way: Sequence[Waypoint]) -> Figure:
-    place, rows = place_of(found), residual_rows(way)
-    against = ["deflection", place.along[1].partition(" ")[0]]
-    against += ["by cycle"] if np.unique(place.cycle).size > 1 else []
-    order = "; the model as given above, the one with what was found below" if len(rows) > 1 else ""
-    caption = (
-        f"Measured less fitted force (mN) against {listed(against)}{order}. Grey: what the measurement's own noise "
-        "does. The lines are means of neighbours: where they leave the middle of the band, or loading and unloading "
-        "part, something is missing. All points were fitted here; the hollow ones are those set aside for the held-out "
-        "errors of the table."
-    )
-    alt = "Residuals " + " and ".join(f"{r.title[0].lower()}{r.title[1:]}" for r in rows)
-    return Figure(residual_picture(place, rows), alt, caption)
+    return f"{word}: {m.title}, root mean square {seen(m.of.measurement).error(m.error.rmse_N)}"
 
 
 def _left(found: Loop, last: Diagnosis) -> list[Block]:
     if found.left is None:
         return []
+    kept = left_sentence(found.left, seen(last.measurement))
     caption = (
-        f"{left_sentence(found.left)} Lines and bands: mean and two standard deviations of the process that is kept "
-        "for it along the way of the disc; it has no name, and predicts nothing for another test."
+        f"{kept} Lines and bands: mean and two standard deviations of the process that is kept "
+        "for it along the test; it has no name, and predicts nothing for another test."
     )
-    picture = discrepancy_picture(place_of(found), last.null.residual, found.left.mean, found.left.sd)
+    picture = discrepancy_picture(_place(found), last.null.residual, found.left.mean, found.left.sd)
     model = spoken(last.null.hypothesis)
     alt = f"What {model} leaves, with the mean and the band of the process kept for it"
     return [

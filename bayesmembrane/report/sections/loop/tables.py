@@ -6,17 +6,20 @@ from collections.abc import Sequence
 
 from bayesmembrane.ground.registry import components
 from bayesmembrane.report.blocks import Column, Table
-from bayesmembrane.report.sections.diagnosis.tables import ERRORS, error_cells, errors_caption
+from bayesmembrane.report.sections.diagnosis.tables import error_cells, error_columns, errors_caption
 from bayesmembrane.report.sections.loop.way import Waypoint
 from bayesmembrane.words.hypothesis import effect_title
 from bayesmembrane.words.language import spoken_parameter
 from bayesmembrane.words.moved import Change
+from bayesmembrane.words.noises import noise_title
+from bayesmembrane.words.seen import seen
 
 
 def errors_table(found: Sequence[Waypoint], where: str, name: str) -> Table:
     """Errors of every model on the way, in sample and on points that were set aside."""
-    rows = tuple((_labelled(m), *error_cells(m.error), *error_cells(m.held_out), m.covered) for m in found)
-    return Table(name, errors_caption(where), ERRORS, rows)
+    how = seen(found[0].of.measurement)
+    rows = tuple((_labelled(m), *error_cells(m.error, how), *error_cells(m.held_out, how), m.covered) for m in found)
+    return Table(name, errors_caption(where), error_columns(how), rows)
 
 
 def _labelled(model: Waypoint) -> str:
@@ -27,6 +30,7 @@ def scores_table(found: Sequence[Waypoint], name: str) -> Table:
     """Evidence, prediction of left-out points and coverage of the models that were sampled."""
     columns = (
         Column("model", "model"),
+        Column("noise", "noise model"),
         Column("log_evidence", "ln Z", ".2f"),
         Column("log_evidence_sd", "+-", ".2f"),
         Column("elpd_loo", "elpd, leave one out", ".1f"),
@@ -34,14 +38,24 @@ def scores_table(found: Sequence[Waypoint], name: str) -> Table:
         Column("coverage_90", "inside the 90 % band", "%"),
     )
     rows = tuple(
-        (_labelled(m), s.log_evidence, s.log_evidence_sd, s.elpd_loo, s.loo_se, s.coverage)
+        (
+            _labelled(m),
+            noise_title(s.run.hypothesis.noise.name),
+            s.log_evidence,
+            s.log_evidence_sd,
+            s.elpd_loo,
+            s.loo_se,
+            s.coverage,
+        )
         for m in found
         if (s := m.stage) is not None
     )
+    points = len(found[0].of.measurement)
     caption = (
-        "From the posteriors: evidence by bridge sampling, expected log predictive density of points left out one by "
-        "one (with its standard error), and the part of the measured points that the 90 % predictive band holds. The "
-        "band contains the noise that a model infers, so that it can cover what it does not explain."
+        f"From the posteriors of {points} readings: evidence by bridge sampling, expected log predictive density of "
+        "points left out one by one (with its standard error), and the part of the measured points that the "
+        "90 % predictive band holds. The band contains the noise that a model infers, so that it can cover what it "
+        "does not explain."
     )
     return Table(name, caption, columns, rows)
 
@@ -57,13 +71,14 @@ def moved_table(found: Sequence[Change], name: str) -> Table:
         Column("after_sd", "sd", ".2g"),
         Column("change", "change (%)", "+.3g"),
         Column("in_sd", "change (sd before)", "+.2g"),
+        Column("remark", "remark"),
     )
-    rows = tuple((_parameter(c), c.unit, *c.before, *c.after, 100 * c.share, c.in_sd) for c in found)
+    rows = tuple((_parameter(c), c.unit, *c.before, *c.after, 100 * c.share, c.in_sd, c.remark or None) for c in found)
     caption = (
         "Posterior mean and standard deviation in the first and in the last calibration. A change of many standard "
         "deviations says that the first one was sure of a wrong value."
     )
-    return Table(name, caption, columns, rows)
+    return Table(name, caption, columns, rows).without_empty()
 
 
 def _parameter(c: Change) -> str:

@@ -16,6 +16,7 @@ class Waypoint:
     """One model on the way.
 
     title : material and effects as people say them
+    of : the diagnosis that it belongs to
     candidate : at its most probable parameters
     error, held_out : in sample; on points that were set aside, with the model fitted to the others, or None
     stage : its posterior, or None if it was not sampled
@@ -24,6 +25,7 @@ class Waypoint:
     """
 
     title: str
+    of: Diagnosis
     candidate: Candidate
     error: Misfit
     held_out: Misfit | None
@@ -37,10 +39,14 @@ def waypoints(loop: Loop) -> list[Waypoint]:
     first = loop.rounds[0]
     d = first.diagnosis
     out = [_waypoint(d, d.null, d.before, first.before, before=True)]
-    for r in loop.rounds:
+    for r, following in zip(loop.rounds, [*loop.rounds[1:], None], strict=True):
         d = r.diagnosis
         if d.verdict == "ambiguous":
             out += _undecided(r)
+        elif r.changed and following is not None and len(following.diagnosis.measurement) == len(d.measurement):
+            # The next diagnosis fits it again: one model has one error.
+            again = following.diagnosis
+            out.append(_waypoint(again, again.null, again.before, r.after, before=True))
         elif d.explains:
             stage = r.after if r.changed else None
             out.append(replace(_waypoint(d, d.best, d.after, stage, before=False), added=stage is not None))
@@ -58,6 +64,7 @@ def _undecided(r: Round) -> list[Waypoint]:
         *(
             Waypoint(
                 spoken(j.candidate.hypothesis),
+                d,
                 j.candidate,
                 misfit_of(j.candidate.residual, sd, j.candidate.x.size),
                 None,
@@ -72,6 +79,6 @@ def _undecided(r: Round) -> list[Waypoint]:
 def _waypoint(d: Diagnosis, candidate: Candidate, error: Misfit, stage: Stage | None, before: bool) -> Waypoint:
     v, title = d.validation, spoken(candidate.hypothesis)
     if v is None:
-        return Waypoint(title, candidate, error, None, stage)
+        return Waypoint(title, d, candidate, error, None, stage)
     held, covered = (v.before, v.covered_before) if before else (v.after, v.covered_after)
-    return Waypoint(title, candidate, error, held, stage, covered=covered)
+    return Waypoint(title, d, candidate, error, held, stage, covered=covered)

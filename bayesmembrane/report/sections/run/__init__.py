@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bayesmembrane.calibration import store
 from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.calibration.run import Run, stored_predictions
 from bayesmembrane.report.blocks import Block, Figure, Heading, Part, Text
 from bayesmembrane.report.render import fragment
-from bayesmembrane.report.runs import Shown, in_order, read
+from bayesmembrane.report.runs import Shown, in_order, reach, read
 from bayesmembrane.report.sections.base import Glance, Section, of_kind
 from bayesmembrane.report.sections.run.draws import (
     Marginal,
@@ -25,7 +27,7 @@ from bayesmembrane.report.sections.run.film import Plane, Shapes, convexity_map,
 from bayesmembrane.report.sections.run.tables import coordinates_table, parameters_table
 from bayesmembrane.words.calibration import convergence, describes, extrapolation, unknown, verdict, warnings
 from bayesmembrane.words.hypothesis import spoken
-from bayesmembrane.words.language import listed, newtons, percent, spoken_parameter
+from bayesmembrane.words.language import listed, percent, spoken_parameter
 from bayesmembrane.words.sampling import sentences, smooth_sentence
 
 MOST_CORNER = 4000  # draws in a corner plot
@@ -52,7 +54,7 @@ class RunSection(Section):
         shown = [*of_kind(results, Shown), *map(read, of_kind(results, Run))]
         compared = of_kind(results, Compared)
         return [
-            Part(s.key, f"{s.name}, fitted up to {s.end}", tuple(_blocks(s, _beside(s, compared))))
+            Part(s.key, f"{s.name}, fitted up to {reach(s, shown)}", tuple(_blocks(s, _beside(s, compared))))
             for s in in_order(shown)
         ]
 
@@ -60,13 +62,14 @@ class RunSection(Section):
         return warnings([s.case for s in in_order(of_kind(results, Shown))])
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
+        shown = in_order(of_kind(results, Shown))
         return [
             Glance(
                 "calibration",
-                f"{s.name}, up to {s.end}",
-                f"rms residual {newtons(s.case.rmse)}, {verdict(s.case)}; {s.sampling.status}",
+                f"{s.name}, up to {reach(s, shown)}",
+                f"rms residual {s.how.force(s.case.rmse)}, {verdict(s.case)}; {s.sampling.status}",
             )
-            for s in in_order(of_kind(results, Shown))
+            for s in shown
         ]
 
     def text(self, result: Any) -> str:
@@ -111,13 +114,14 @@ def _sentences(s: Shown) -> list[str]:
 
 
 def _residuals(s: Shown) -> Figure:
-    unit = "in units of the stated noise (sd)" if s.digest.has_noise else "in N"
+    unit = "in units of the stated noise (sd)" if s.digest.has_noise else f"in {s.how.load_scale[1]}"
     return Figure(
         residual_picture(s.points, s.digest.residual, s.look),
-        alt=f"Residuals of {s.name} against deflection {unit}",
-        caption=f"{s.name}: measured minus computed force {unit} against deflection (mm), with the 90 % band of the "
-        "posterior. The grey bands are one and two standard deviations. Residuals that follow each other with one "
-        "sign say that the curve has another shape, or that the errors of the points depend on each other.",
+        alt=f"Residuals of {s.name} against {s.how.travel} {unit}",
+        caption=f"{s.name}: {s.how.origin} minus computed {s.how.load} {unit} against {s.how.travel_label}, with the "
+        "90 % band of the posterior. The grey bands are one and two standard deviations. Residuals that follow each "
+        "other with one sign say that the curve has another shape, or that the errors of the points depend on each "
+        "other.",
     )
 
 
@@ -140,7 +144,9 @@ def _calibrated(s: Shown) -> list[Block]:
 
 def _corner(s: Shown, compared: Compared | None) -> Figure:
     h = s.hypothesis
-    thin = s.natural[:: max(1, len(s.natural) // MOST_CORNER)]
+    read = [s.read_as(n, u) for n, u in zip(h.natural_names, h.natural_units, strict=True)]
+    units = [u for _, u in read]
+    thin = s.natural[:: max(1, len(s.natural) // MOST_CORNER)] * np.array([f for f, _ in read])
     optimum = published = None
     marked = ""
     if compared is not None:
@@ -151,9 +157,9 @@ def _corner(s: Shown, compared: Compared | None) -> Figure:
         marked = (
             " Crosses: our least-squares optimum under the convexity prior, and the paper's, where they lie inside."
         )
-    names = listed(f"{spoken_parameter(n)} ({u})" for n, u in zip(h.natural_names, h.natural_units, strict=True))
+    names = listed(f"{spoken_parameter(n)} ({u})" for n, u in zip(h.natural_names, units, strict=True))
     return Figure(
-        corner_plot(thin, h.natural_names, h.natural_units, s.look, optimum, published),
+        corner_plot(thin, h.natural_names, units, s.look, optimum, published),
         alt=f"Corner plot of the parameters of {s.name}",
         caption=f"{s.name}: posterior of {names}, one by one and in pairs (regions that hold 50 % and 90 %; dashed: "
         f"5, 50 and 95 %; axes are logarithmic where a parameter spans more than a decade).{marked}",
@@ -161,11 +167,14 @@ def _corner(s: Shown, compared: Compared | None) -> Figure:
 
 
 def _coordinates(s: Shown) -> str:
-    return listed(f"{spoken_parameter(p.name)} ({p.unit})" for p in s.hypothesis.parameters)
+    return listed(f"{spoken_parameter(p.name)} ({s.read_as(p.name, p.unit)[1]})" for p in s.hypothesis.parameters)
 
 
 def _priors(s: Shown) -> Figure:
-    marginals = [Marginal(p.name, p.unit, s.prior[:, i], s.x[:, i]) for i, p in enumerate(s.hypothesis.parameters)]
+    marginals = []
+    for i, p in enumerate(s.hypothesis.parameters):
+        factor, unit = s.read_as(p.name, p.unit)
+        marginals.append(Marginal(p.name, unit, factor * s.prior[:, i], factor * s.x[:, i]))
     return Figure(
         prior_posterior(marginals, s.look),
         alt=f"Prior and posterior of the sampled coordinates of {s.name}",
@@ -190,13 +199,14 @@ def _map(s: Shown) -> Figure:
     d = s.digest
     shares = listed(f"{m} {percent(v)}" for m, v in d.convex.items())
     alike = s.film.rig.homogeneous
+    places = "stretches (-)" if alike else "deflections (mm)"
     states = "the state of the film" if alike else "the states that its film passes from the ring to the disc"
-    plane = Plane(d.map_1, d.map_2, d.eigenvalue, d.shape_at, d.state_1, d.state_2)
+    plane = Plane(d.map_1, d.map_2, d.eigenvalue, d.shape_at, d.state_1, d.state_2, s.how)
     return Figure(
         convexity_map(plane, s.material),
         alt=f"Map of the convexity of {s.name} over the stretches, with the states that the film reaches",
         caption=f"{s.name}: least eigenvalue of the Hessian of the energy over G d (-) in the plane of the stretches "
-        f"(-), for the draw nearest to the median curve, and {states} at several deflections (mm). Convexity prior: "
+        f"(-), for the draw nearest to the median curve, and {states} at several {places}. Convexity prior: "
         f"{s.hypothesis.convexity.name}; posterior draws that meet each mode: {shares}.",
     )
 

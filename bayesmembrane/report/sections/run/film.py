@@ -15,6 +15,7 @@ from bayesmembrane.report.blocks import Picture
 from bayesmembrane.report.canvas import Measured, encoded, new_figure, style
 from bayesmembrane.report.style import ALARM, FAINT, INK, SHADE, colour, marker
 from bayesmembrane.words.hypothesis import material_title
+from bayesmembrane.words.seen import DISC, Seen
 
 
 def residual_picture(points: Measured, quantiles: Array, look: str, kind: str = "svg") -> Picture:
@@ -22,8 +23,9 @@ def residual_picture(points: Measured, quantiles: Array, look: str, kind: str = 
     with style():
         figure = new_figure(3.4)
         ax = figure.subplots()
-        scale = points.sd if points.sd is not None else np.ones(points.deflection.size)
-        x, z, c = 1e3 * points.deflection, quantiles / scale, colour(look)
+        how = points.how
+        z = quantiles / points.sd if points.sd is not None else how.carried(quantiles)
+        x, c = how.along(points.deflection), colour(look)
         if points.sd is not None:
             ax.axhspan(-2, 2, color=SHADE, zorder=0)
             ax.axhspan(-1, 1, color=FAINT, zorder=0)
@@ -33,9 +35,10 @@ def residual_picture(points: Measured, quantiles: Array, look: str, kind: str = 
         largest = float(np.nanmax(np.abs(z))) if np.any(np.isfinite(z)) else 0.0
         reach = 1.1 * (max(largest, 3.0) if points.sd is not None else largest or 1.0)
         ax.set_ylim(-reach, reach)
-        ax.set_xlim(left=0)
-        ax.set_xlabel("deflection (mm)")
-        ax.set_ylabel("measured - computed\n" + ("(noise sd)" if points.sd is not None else "(N)"))
+        ax.set_xlim(left=how.rest)
+        ax.set_xlabel(how.travel_label)
+        unit = "noise sd" if points.sd is not None else how.load_scale[1]
+        ax.set_ylabel(f"{how.origin} - computed\n({unit})")
         ax.grid(axis="x", color=FAINT, linewidth=0.6)
         return encoded(figure, kind)
 
@@ -56,6 +59,7 @@ class Plane:
     at: Array
     state_1: Array
     state_2: Array
+    how: Seen = DISC
 
 
 def convexity_map(plane: Plane, material: str) -> Picture:
@@ -77,7 +81,8 @@ def convexity_map(plane: Plane, material: str) -> Picture:
         spot = "o" if alike else ""
         for k in range(deflections.size):
             ax.plot(state_1[k], state_2[k], marker=spot, color="white", linewidth=4)
-            name = f"{1e3 * deflections[k]:.3g} mm"
+            value = plane.how.rest + plane.how.travel_scale[0] * float(deflections[k])
+            name = f"{value:.3g}" if plane.how.rest else f"{value:.3g} {plane.how.travel_scale[1]}"
             ax.plot(state_1[k], state_2[k], marker=spot, color=shades[k], linewidth=2.2, label=name)
         ax.set_xlim(float(l1[0]), float(l1[-1]))
         ax.set_ylim(float(l2[0]), float(l2[-1]))
@@ -86,7 +91,13 @@ def convexity_map(plane: Plane, material: str) -> Picture:
         bar = figure.colorbar(mesh, ax=ax, pad=0.015)
         bar.set_label("least eigenvalue / $Gd$ (-)")
         bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:.4g}"))
-        ax.legend(title="reached at", loc="upper right", frameon=True, framealpha=0.9, edgecolor="none")
+        ax.legend(
+            title="reached at a stretch of" if plane.how.rest else "reached at",
+            loc="upper right",
+            frameon=True,
+            framealpha=0.9,
+            edgecolor="none",
+        )
         ax.set_title(f"{material_title(material)}: blue is convex, red is not")
         return encoded(figure, "png")
 

@@ -30,13 +30,14 @@ def parameters_table(s: Shown, compared: Compared | None = None) -> Table:
     paper = compared.published if compared else {}
     rows = []
     for i, (name, unit) in enumerate(zip(s.hypothesis.natural_names, s.hypothesis.natural_units, strict=True)):
-        own, values = name.partition(".")[2], s.natural[:, i]
+        factor, read = s.read_as(name, unit)
+        own, values = name.partition(".")[2], factor * s.natural[:, i]
         material = name.startswith(f"{s.material}.")
         low, high = hdi(values)
         rows.append(
             (
                 spoken_parameter(name),
-                unit,
+                read,
                 float(np.mean(values)),
                 float(np.std(values)),
                 low,

@@ -1,0 +1,368 @@
+"""What one reads who has two minutes: what was tested, the answer and what it leaves, what to do next.
+
+Made of a diagnosis or a loop alone. The table and the picture that belong to it are in the report.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, WAVE, Foreign
+from bayesmembrane.diagnosis.explanation.total import NOTHING, set_name
+from bayesmembrane.diagnosis.left.shape import ResidualShape, residual_shape
+from bayesmembrane.diagnosis.loop import Loop, Stage
+from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
+from bayesmembrane.ground.registry import components
+from bayesmembrane.words import language
+from bayesmembrane.words.diagnosis import percent, set_title
+from bayesmembrane.words.hypothesis import effect_title, spoken
+from bayesmembrane.words.language import listed
+from bayesmembrane.words.moved import MATTERS, modulus_of
+from bayesmembrane.words.next_test import spoken_test
+from bayesmembrane.words.seen import MEASURED, seen
+from bayesmembrane.words.shape import PARTS
+from bayesmembrane.words.sizes import bound_of_material as _bound
+from bayesmembrane.words.sizes import flagged_size
+from bayesmembrane.words.units import size_in_words
+
+MOST_TOLD = 3
+"""Explanations whose probability is told."""
+MOST_SIZES = 3
+"""Effects whose size is told with it; what is not told on the first screen is below."""
+ANSWERED = ("named", "material", "ambiguous")
+"""Verdicts that rest on another model than the one that was given."""
+
+
+@dataclass(frozen=True)
+class Brief:
+    """The sentences of a first screen.
+
+    tested : film, readings, range, model
+    answer : probabilities and verdict, a sentence without its end
+    left : that end: how much the answer leaves, where, of what kind
+    following : what to do next
+    """
+
+    tested: str
+    answer: str
+    left: str
+    following: str
+
+    @property
+    def lines(self) -> list[str]:
+        """The sentences."""
+        return [self.tested, f"{self.answer}, {self.left}.", self.following]
+
+
+@dataclass(frozen=True)
+class Course:
+    """The diagnoses that a first screen is about: the ``first``, those that ``named`` something, and the ``last``."""
+
+    first: Diagnosis
+    named: tuple[Diagnosis, ...]
+    last: Diagnosis
+
+    @property
+    def telling(self) -> Diagnosis:
+        """The one that the verdict rests on."""
+        return self.named[-1] if self.named and self.last.verdict == "adequate" else self.last
+
+
+def of_diagnosis(d: Diagnosis) -> Brief:
+    """Of a diagnosis alone."""
+    return _brief(Course(d, (d,) if d.explains else (), d), _next(d))
+
+
+def of_loop(found: Loop) -> Brief:
+    """Of a closed loop: what all rounds came to."""
+    course = course_of(found)
+    following = _next(course.last)
+    before, after = found.rounds[0].before, found.rounds[-1].after
+    if course.named and course.last.verdict == "adequate":
+        following = _use(before, after)
+    elif any(r.changed for r in found.rounds) and course.last.explains:
+        following = f"Run the loop on from {spoken(course.last.hypothesis)}: it stopped before the end."
+    return _brief(course, following)
+
+
+def course_of(found: Loop) -> Course:
+    """The diagnoses of a loop."""
+    every = [r.diagnosis for r in found.rounds]
+    return Course(every[0], tuple(d for d in every if d.explains), every[-1])
+
+
+def _brief(course: Course, following: str) -> Brief:
+    d = course.telling
+    return Brief(
+        tested(course.first), f"{_probabilities(course)}: {_ANSWERS[d.verdict](course)}", left(course), following
+    )
+
+
+# ---- what was tested -------------------------------------------------------------------------------------------------
+
+
+def tested(d: Diagnosis) -> str:
+    """``film (reconstructed): 700 readings, 3 cycles up to 30 mm, against Yeoh.``"""
+    m, how = d.measurement, seen(d.measurement)
+    origin = "" if how.origin == MEASURED else f" ({how.origin}, not measured)"
+    what = "readings" if how.origin == MEASURED else "points"
+    cycles = np.unique(m.cycle).size
+    of = f" in {cycles} cycles" if cycles > 1 else " of a loop" if np.any(m.leg < 0) else ""
+    aside = "" if d.set_aside is None else f" ({len(d.set_aside.numbers)} set aside)"
+    readings = f"{len(m)} {what}{aside}{of} up to {how.place(float(np.max(m.deflection)))}"
+    model = "" if d.declared else ", the nearest of all energies"
+    return f"{m.specimen.name}{origin}: {readings}, against {spoken(d.null.hypothesis)}{model}."
+
+
+# ---- the answer ------------------------------------------------------------------------------------------------------
+
+
+def _probabilities(course: Course) -> str:
+    """``98 % friction in the guide (level 12 mN), 1 % no effect``: what each round named, then the telling one's."""
+    d = course.telling
+    earlier = [_told(x, set_name(x.best, x.null.names), course) for x in course.named if x is not d]
+    start = f"{', '.join(earlier)}, then " if earlier else ""
+    return start + ", ".join(_every(course))
+
+
+def _every(course: Course) -> list[str]:
+    d = course.telling
+    p = d.probabilities
+    probable = [name for name, q in p.effects.items() if q >= WORDS.probable][:MOST_TOLD]
+    sizes = np.cumsum([len(name.split("+")) for name in probable])
+    told = [_told(d, n, course, bool(k <= MOST_SIZES)) for n, k in zip(probable, sizes, strict=True)]
+    foreign = 1.0 - p.foreign.get(NOTHING, 1.0)
+    if foreign >= WORDS.probable:
+        told.insert(0 if foreign > 0.5 else len(told), f"{percent(foreign)} something foreign")
+    if d.verdict == "material":
+        told.append(f"{percent(p.energies.get(d.material, 0.0))} the energy {d.best.hypothesis.material.title}")
+    return told
+
+
+def _told(d: Diagnosis, name: str, course: Course, sized: bool = True) -> str:
+    """A set of effects with its probability; where the answer rests on it with the sizes, as they were fitted last."""
+    p = percent(d.probabilities.effects.get(name, 0.0))
+    of = next((j.candidate for j in d.members if set_name(j.candidate, d.null.names) == name), None)
+    if of is None or name == NOTHING or not sized:
+        return f"{p} {set_title(name)}"
+    if course.last is not d and set(name.split("+")) <= set(course.last.null.names):
+        of = course.last.null
+    own = [e for e in of.hypothesis.effects if e.name in name.split("+")]
+    return f"{p} {listed(f'{e.title} ({flagged_size(e, of, d.measurement)})' for e in own)}"
+
+
+def _adequate(course: Course) -> str:
+    name = spoken(course.telling.null.hypothesis)
+    return f"{name} describes the curve" if course.telling.detection.adequate else f"{name} needs no effect"
+
+
+def _named(course: Course) -> str:
+    d, null, best = course.telling, course.first.null.hypothesis, course.telling.best
+    if course.last is d and d.detection.adequate:
+        return _improbable(d)
+    best = best if course.last is d else course.last.null
+    count = len(best.names) - len(null.effects)
+    who, verb = ("it", "explains") if count == 1 else ("both" if count == 2 else "together they", "explain")
+    other = f", with {_energy(best)}," if best.hypothesis.material is not null.material or _bound(best) else ""
+    much = "the curve" if len(course.named) > 1 else f"{_explained(d)} of what {spoken(null)} misses"
+    return f"{who} {verb}{other} {much}{_beside(d)}"
+
+
+def _material(course: Course) -> str:
+    d = course.telling
+    if d.detection.adequate:
+        return _improbable(d)
+    return f"{_energy(d.best)} explains {_explained(d)} of what {spoken(d.null.hypothesis)} misses"
+
+
+def _improbable(d: Diagnosis) -> str:
+    return f"{spoken(d.null.hypothesis)} follows the curve, but by less probable parameters{_beside(d)}"
+
+
+def _ambiguous(course: Course) -> str:
+    d = course.telling
+    sure = _certain(d)
+    which = f"only {sure} is certain" if sure else "this curve cannot tell which"
+    return f"{which}; the first explains {_explained(d)} of what is missed{_beside(d)}"
+
+
+def _unknown(course: Course) -> str:
+    d = course.telling
+    sure, further = _certain(d), " further" if course.named else ""
+    start = f"{sure} is certain, yet " if sure else ""
+    if (strange := _strange(d)) is not None:
+        beside = listed(effect_title(n) for n in strange.base.names)
+        return f"{start}{_foreign(strange, d.measurement)}{f', beside {beside}' if beside and not sure else ''}"
+    if d.members and d.validation is not None:
+        covered = language.percent(d.validation.covered_after)
+        return f"nothing{further} is named, for this predicts only {covered} of the points held out"
+    if d.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
+        return f"{start}none of the energies has this form"
+    return f"{start}too many explanations fit, and nothing{further} is named"
+
+
+def _beside(d: Diagnosis) -> str:
+    """What is foreign beside the effects, if that is more probable than not."""
+    strange = _strange(d)
+    return "" if strange is None else f", beside {_foreign(strange, d.measurement)}"
+
+
+def _strange(d: Diagnosis) -> Foreign | None:
+    """What is foreign, where that is more probable than that nothing is."""
+    return d.foreign if d.probabilities.foreign.get(NOTHING, 1.0) < 0.5 else None
+
+
+def _certain(d: Diagnosis) -> str:
+    """Effects that are in all that is probable; "" if there is none, or nothing else is probable anyway."""
+    names = {n for key in d.probabilities.effects for n in key.split("+")} - {NOTHING}
+    sure = sorted(n for n in names if d.probabilities.of_effect(n) >= VERDICT.sure)
+    alone = d.probabilities.effects.get("+".join(sure), 0.0) >= VERDICT.sure
+    return "" if alone else listed(map(effect_title, sure))
+
+
+_ANSWERS = {
+    "adequate": _adequate,
+    "named": _named,
+    "material": _material,
+    "ambiguous": _ambiguous,
+    "unknown": _unknown,
+}
+
+
+def _explained(d: Diagnosis) -> str:
+    share = d.remaining.share
+    return "all" if share == 0.0 else language.percent(1.0 - share)
+
+
+def _energy(candidate: Candidate) -> str:
+    """The energy, with what lies at its bound."""
+    return candidate.hypothesis.material.title + (f" ({bound})" if (bound := _bound(candidate)) else "")
+
+
+def _foreign(f: Foreign, m: Measurement) -> str:
+    """What is foreign, as a clause."""
+    shown = m.rig.shown(m.specimen.thickness)
+    size = size_in_words(f.size, "N", shown)
+    if f.kind == SUDDEN:
+        when = f"reading {f.place + 1}" if f.moment is None else f"{f.moment:.4g} s"
+        step = f"{100 * abs(f.size):.2g} %" if f.relative else size.removeprefix("-")
+        return f"a sudden {'rise' if f.size > 0 else 'drop'} of the force by {step} at {when}"
+    if f.kind == WAVE:
+        return f"a wave of {size} every {size_in_words(f.period, 'm' if f.against == 'deflection' else 's', shown)}"
+    if f.kind == PLAY:
+        return f"a play of {size_in_words(f.size, 'm', shown)} in the drive"
+    if f.kind == CLIPPED:
+        return f"the load cell at its limit of {size} from reading {f.place + 1} on"
+    return f"something smooth, about {100 * f.size:.2g} % of the force, that no effect here leaves"
+
+
+# ---- what is left ----------------------------------------------------------------------------------------------------
+
+
+def left(course: Course) -> str:
+    """How much the answer leaves, where, and of what kind, as a clause: as the last diagnosis has it."""
+    d = course.last
+    if noise_alone(d):
+        return "leaving noise alone"
+    error, residual = (d.after, d.best.residual) if d.verdict in ANSWERED else (d.before, d.null.residual)
+    place = where(residual_shape(d.measurement, residual))
+    return f"leaving {error.rmse_N / d.noise.sd:.2g} times the noise{f', mostly {place}' if place else ''}, {_kind(d)}"
+
+
+def noise_alone(d: Diagnosis) -> bool:
+    """True if what the answer leaves is noise."""
+    r = d.remaining
+    if d.verdict == "adequate" and d.detection.adequate:
+        return True
+    return d.verdict != "unknown" and r.reduced_chi2 < WORDS.little_chi2 and r.share < WORDS.little_share
+
+
+def _kind(d: Diagnosis) -> str:
+    r = d.remaining
+    if r.carried < WORDS.carried:
+        return "of no kind that is known here"
+    laws = [f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in r.law_errors.items() if e > WORDS.law_error]
+    return f"smooth as if {listed([f'the energy were {100 * r.energy_error:.2g} %', *laws])} off"
+
+
+def where(shape: ResidualShape) -> str:
+    """``on unloading in the lower third``; "" if it is everywhere."""
+    words = []
+    up, down = shape.loading or 0.0, shape.unloading or 0.0
+    if min(up, down) > 0 and max(up, down) > WORDS.uneven * min(up, down):
+        words.append(f"on {'loading' if up > down else 'unloading'}")
+    sizes = [size for _, size in shape.cycles]
+    if len(sizes) > 1 and max(sizes) > WORDS.uneven * np.median(sizes):
+        words.append(f"in cycle {shape.cycles[int(np.argmax(sizes))][0]}")
+    filled = [s for s in shape.thirds if s > 0]
+    if len(filled) > 1 and max(filled) > WORDS.uneven * min(filled):
+        words.append(f"in the {PARTS[int(np.argmax(shape.thirds))]} third")
+    return " ".join(words)
+
+
+# ---- what to do next -------------------------------------------------------------------------------------------------
+
+
+def _next(d: Diagnosis) -> str:
+    if d.verdict == "adequate":
+        return _use_as_it_is(d)
+    if d.verdict == "unknown":
+        return _when_unknown(d)
+    if d.verdict == "ambiguous":
+        return _tell_apart(d)
+    v, name = d.validation, spoken(d.best.hypothesis)
+    if v is not None and v.chosen != d.best.hypothesis.label():
+        return f"Repeat the test: without {_held(d)} another model would have been chosen."
+    if d.verdict == "material":
+        return f"Calibrate {name}, or show by another test that {d.null.hypothesis.material.title} is right."
+    return f"Calibrate with it in the model: {name}."
+
+
+def _held(d: Diagnosis) -> str:
+    return "the points held out" if d.validation is None or d.validation.cycles == 1 else "the last cycle"
+
+
+def _use_as_it_is(d: Diagnosis) -> str:
+    known, m = components("effects"), d.measurement
+    shown = m.rig.shown(m.specimen.thickness)
+    finite = sorted((v / known[n]().size.scale, n, v) for n, v in d.power.items() if np.isfinite(v))
+    start = f"Use {spoken(d.null.hypothesis)} over this range"
+    if not d.detection.adequate or not finite:
+        return f"{start}."
+    seen_from = listed(
+        f"{effect_title(n)} of {size_in_words(v, known[n]().size.unit, shown)}" for _, n, v in finite[:2]
+    )
+    return f"{start}: {seen_from} would have shown."
+
+
+def _when_unknown(d: Diagnosis) -> str:
+    strange = _strange(d)
+    if strange is None:
+        return "Repeat the test, and do not extrapolate with this model."
+    advice = {
+        SUDDEN: "Look for a knock, a tear or a change of temperature then.",
+        WAVE: "Look at the drive, its gear, and what vibrates.",
+        PLAY: "Take the play out of the drive, and test again.",
+        CLIPPED: "Leave these readings out, or take a larger load cell.",
+    }
+    return advice.get(strange.kind, "Repeat the test: what comes again is no accident.")
+
+
+def _tell_apart(d: Diagnosis) -> str:
+    best = next(iter(d.experiments), None)
+    if best is None or best.separation < NEXT_TEST.clear:
+        return "No further test that was simulated tells them apart: rely on what holds for each of them."
+    apart = "" if np.isinf(best.separation) else f" ({best.separation:.2g} times the noise apart)"
+    return f"To tell them apart: {spoken_test(best.test, d.rig)}{apart}."
+
+
+def _use(before: Stage, after: Stage) -> str:
+    """Which modulus to use."""
+    (new, sd), (old, was_sure) = modulus_of(after.run), modulus_of(before.run)
+    instead = "as without" if abs(new - old) <= MATTERS * was_sure else f"not {old:.4g}"
+    return f"Use {spoken(after.run.hypothesis)}: shear modulus {new:.4g} +- {sd:.2g} MPa, {instead}."

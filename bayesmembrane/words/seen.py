@@ -1,0 +1,106 @@
+"""How people see a curve: which quantities and units its rig shows, and whether its points were measured at all."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from bayesmembrane.data.fixture import Fixture
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.words.language import digits, newtons, three_digits
+
+MEASURED = "measured"
+_NOT_MEASURED = ("reconstructed", "synthetic", "simulated")
+
+
+def made(origin: str) -> str:
+    """``measured``, or how else the points came about: the first word of their statement of origin."""
+    first = re.match(r"\W*(?:statement\W+)?(\w+)", origin)
+    word = first[1].lower() if first else ""
+    return word if word in _NOT_MEASURED else MEASURED
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Value shown = ``rest`` + factor times SI, for deflections (m) and forces (N).
+
+    travel, load : "deflection" and "force", or "stretch" and "stress"
+    small : (factor, unit) of what a model leaves of the forces
+    origin : "measured", "reconstructed", "synthetic", ...
+    """
+
+    travel: str
+    travel_scale: tuple[float, str]
+    rest: float
+    load: str
+    load_scale: tuple[float, str]
+    small: tuple[float, str]
+    origin: str = MEASURED
+
+    def along(self, deflection: Array) -> Array:
+        """(N,) what is on the horizontal axis."""
+        return self.rest + self.travel_scale[0] * deflection
+
+    def carried(self, force: Array) -> Array:
+        """(N,) what is on the vertical axis."""
+        return self.load_scale[0] * force
+
+    def left(self, residual: Array) -> Array:
+        """(N,) residuals as they are drawn."""
+        return self.small[0] * residual
+
+    def error(self, value: float) -> str:
+        """A residual in N in words: ``4.02 mN``."""
+        return f"{three_digits(self.small[0] * value)} {self.small[1]}"
+
+    def force(self, value: float) -> str:
+        """A force in N in words, three digits: mN below 0.1 N; of a strip its stress."""
+        return newtons(value) if not self.rest else f"{digits(self.load_scale[0] * value)} {self.load_scale[1]}"
+
+    def place(self, deflection: float) -> str:
+        """A deflection in m in words, to follow "up to": ``30 mm``, ``a stretch of 2.5``."""
+        value = self.rest + self.travel_scale[0] * deflection
+        return f"a {self.travel} of {value:.4g}" if self.rest else f"{value:.4g} {self.travel_scale[1]}"
+
+    @property
+    def curve(self) -> str:
+        """``force curve``, ``reconstructed stress curve``."""
+        return f"{self.load} curve" if self.origin == MEASURED else f"{self.origin} {self.load} curve"
+
+    @property
+    def travel_label(self) -> str:
+        return f"{self.travel} ({self.travel_scale[1]})"
+
+    @property
+    def load_label(self) -> str:
+        return f"{self.load} ({self.load_scale[1]})"
+
+    @property
+    def left_label(self) -> str:
+        return f"{self.origin} less fitted ({self.small[1]})"
+
+
+DISC = Seen("deflection", (1e3, "mm"), 0.0, "force", (1.0, "N"), (1e3, "mN"))
+"""A lifted disc, measured."""
+
+
+def alike(every: Iterable[Seen]) -> Seen:
+    """How several curves are seen in one table: as they all are, or as a lifted disc where rigs differ."""
+    first, *others = every
+    same = all((o.travel_scale, o.rest, o.small) == (first.travel_scale, first.rest, first.small) for o in others)
+    return first if same else DISC
+
+
+def seen_on(rig: Fixture, thickness: float, origin: str = "") -> Seen:
+    """How a curve on this rig is seen; ``origin`` is the statement of where its points come from."""
+    shown = rig.shown(thickness)
+    if rig.homogeneous:
+        return Seen("stretch", (shown["m"][0], "-"), 1.0, "stress", shown["N"], shown["N"], made(origin))
+    return Seen("deflection", shown["m"], 0.0, "force", (1.0, "N"), shown["N"], made(origin))
+
+
+def seen(measurement: Measurement) -> Seen:
+    """How this measurement is seen."""
+    return seen_on(measurement.rig, measurement.specimen.thickness, measurement.provenance.origin)

@@ -1,0 +1,39 @@
+"""How large an effect is, in words, flagged where it stands: far beyond what is usual, or at a bound."""
+
+from __future__ import annotations
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.standard import expected_size
+from bayesmembrane.physics.effects.base import Effect
+from bayesmembrane.words.language import spoken_parameter
+from bayesmembrane.words.units import SCALES, Units, size_in_words
+
+IMPLAUSIBLE = 5.0
+"""Times the usual size, from which on a size is flagged."""
+
+
+def usual_size(effect: Effect, measurement: Measurement, shown: Units = SCALES) -> str:
+    """What is usual before the data, for a test that reached what this one did."""
+    return size_in_words(expected_size(effect, measurement), effect.size.unit, shown)
+
+
+def flagged_size(effect: Effect, candidate: Candidate, measurement: Measurement) -> str:
+    """``loss 0.66, implausible: usual 0.1``: the size of one of its effects, with what must be known of it."""
+    shown = measurement.rig.shown(measurement.specimen.thickness)
+    p = effect.size
+    value = candidate.parameters[f"{effect.name}.{p.name}"]
+    told = [f"{spoken_parameter(f'{effect.name}.{p.name}')} {size_in_words(value, p.unit, shown)}"]
+    times = abs(value - (p.null or 0.0)) / expected_size(effect, measurement)
+    if times >= IMPLAUSIBLE:
+        told.append(f"implausible: usual {usual_size(effect, measurement, shown)}")
+    own = [n.partition(".")[2] for n in candidate.at_bound if n.startswith(f"{effect.name}.")]
+    told += [("" if n == p.name else f"{n.replace('_', ' ')} ") + "at its bound" for n in own]
+    return ", ".join(told)
+
+
+def bound_of_material(candidate: Candidate) -> str:
+    """``, c2/c1 at its bound`` of the energy's own parameters; "" where none is."""
+    effects = {e.name for e in candidate.hypothesis.effects}
+    own = [spoken_parameter(n) for n in candidate.at_bound if n.partition(".")[0] not in effects]
+    return f"{', '.join(own)} at {'its bound' if len(own) == 1 else 'their bounds'}" if own else ""
