@@ -308,6 +308,8 @@ class LoopThresholds:
 class WordsThresholds:
     """From where on something is worth a sentence."""
 
+    listed_sets: int = 4
+    """Sets of an ambiguous answer that are told with their sizes; of more the rest are counted."""
     listed_readings: int = 6
     """Of those set aside, the numbers that are told."""
     visible_effects: int = 3

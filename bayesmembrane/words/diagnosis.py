@@ -254,7 +254,10 @@ def _material(found: Diagnosis) -> str:
 
 
 def _ambiguous(found: Diagnosis) -> str:
-    names = "; or ".join(_member(j, found) for j in found.members)
+    told, more = found.members[: WORDS.listed_sets], len(found.members) - WORDS.listed_sets
+    names = "; or ".join(_member(j, found) for j in told) + (
+        f"; or one of {more} less probable sets" if more > 0 else ""
+    )
     nexts = found.experiments
     advice = f" To tell them apart: {experiment_sentence(nexts[0], found.rig)}." if nexts else ""
     return (
