@@ -40,23 +40,20 @@ below what such data can tell.
 """
 
 LAW = Parameter(
-    "ln_eta_law",
-    "-",
-    "log of the relative error of an effect's law",
-    Normal(float(np.log(0.05)), 1.0),
-    (-9.0, float(np.log(0.4))),
+    "ln_eta_law", "-", "log of the relative error of an effect's law", Normal(float(np.log(0.05)), 1.0), (-9.0, 0.7)
 )
-"""eta_e: half of the prior lies below 5 %, 95 % within 0.7 % to 37 %; what differs from a law by more than 40 % follows
-another one.
-"""
+"""eta_e: half of the prior lies below 5 %, 95 % within 0.7 % to 37 %."""
 
 LOCAL = Parameter(
     "ln_eta_local", "-", "log of the relative error where a test starts, turns or goes slack",
-    Normal(float(np.log(1e-3)), 1.5), (-17.0, float(np.log(0.1))),
+    Normal(float(np.log(1e-3)), 1.5), (-17.0, 0.0),
 )  # fmt: skip
 """eta_l, of the largest force: half of the prior lies below 0.1 %, 95 % within 0.005 % to 2 %. No drive starts or turns
 at once, and no film goes slack at once.
 """
+
+LARGEST = {ENERGY.name: 1.0, LAW.name: 0.4, LOCAL.name: 0.1}
+"""Relative errors beyond which it is no longer that law, and beyond which nothing is believed of a diagnosis."""
 
 STATE_LENGTHS = (0.15, 0.3, 0.6)
 """Of the whole range: over how much deflection the error of an energy changes. Equal parts of its variance."""

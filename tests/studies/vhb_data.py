@@ -67,7 +67,7 @@ def fast_cycle(folder: Path = FOLDER) -> Measurement:
 
 def kPa(force: Array | float) -> Array:
     """Nominal stress in kPa of forces in N."""
-    return np.asarray(RIG.shown(TAPE.thickness)["N"][0] * np.asarray(force))
+    return np.asarray(force) / (RIG.width * TAPE.thickness) / 1e3
 
 
 def scatter(measurement: Measurement) -> float:

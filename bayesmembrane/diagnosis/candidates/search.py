@@ -18,7 +18,16 @@ from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.thresholds import FORM, SEARCH, TINY
 from bayesmembrane.ground.parameters import Array, Normal, Parameter, frozen
 from bayesmembrane.physics.effects.base import Effect
-from bayesmembrane.physics.form_error import ENERGY, LAW, LOCAL, FormFactors, form_columns, form_factors, traces
+from bayesmembrane.physics.form_error import (
+    ENERGY,
+    LARGEST,
+    LAW,
+    LOCAL,
+    FormFactors,
+    form_columns,
+    form_factors,
+    traces,
+)
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -252,7 +261,7 @@ def starts_with(bases: Sequence[Array], effect: Effect, measurement: Measurement
 
 
 def _form(columns: Array, eta: Parameter) -> Block:
-    return Block(columns, _moments(eta), eta.bounds[1])
+    return Block(columns, _moments(eta), float(np.log(LARGEST[eta.name])))
 
 
 def _moments(p: Parameter) -> tuple[float, float]:

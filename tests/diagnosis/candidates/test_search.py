@@ -14,7 +14,7 @@ from bayesmembrane.diagnosis.candidates.search import Search, starts_with
 from bayesmembrane.diagnosis.candidates.standard import standard
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
-from bayesmembrane.physics.form_error import traces
+from bayesmembrane.physics.form_error import form_columns, traces
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
@@ -113,11 +113,8 @@ def _inverse(search: Search, found: Candidate) -> Array:
     """(N, N) inverse of noise and form error, freed of noise, at the fit."""
     eta = np.exp(found.theta)
     fitted = search.measurement.force - found.residual
-    columns = [eta[1] * fitted[:, None] * search.factors.state]
-    laws = iter(eta[2:])
-    for effect, trace in zip(found.hypothesis.effects, found.traces, strict=True):
-        if not effect.exact:
-            columns.append(next(laws) * trace[:, None] * search.factors.progress)
+    columns = form_columns(search.factors, fitted, found.hypothesis.effects, found.traces)
+    columns = [size * c for size, c in zip(eta[1:], columns, strict=True)]
     white = search.noise.white(np.column_stack(columns))
     return np.linalg.inv(eta[0] ** 2 * np.eye(N) + white @ white.T)
 
