@@ -150,5 +150,5 @@ def test_every_verb_takes_it_and_the_page_shows_it(place: Path) -> None:
     for said in ("Isihara", "weight of disc or grip", "proportional", "Secant stiffness", "pulled half as far"):
         assert said in page, said
     assert "Left out" not in page
-    assert "What was missing: strip, Isihara with weight of disc or grip up to 160 mm" in page
+    assert "What was missing: strip, Isihara with weight of disc or grip" in page
     assert "What may be missing: Isihara<" in page

@@ -143,6 +143,12 @@ class Search:
         u = axes.to_u(candidate.x)
         return np.asarray(axes.slope(u) * axes.local(u))
 
+    def place(self, candidate: Candidate) -> Array:
+        """(k,) the coefficients of `linear` at the fit itself."""
+        axes = standard(candidate.hypothesis, self.measurement)
+        u = axes.to_u(candidate.x)
+        return np.asarray(u / axes.local(u))
+
     @property
     def scale_sd(self) -> float:
         """sd of ln of the noise over its reference."""

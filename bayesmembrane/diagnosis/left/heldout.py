@@ -88,9 +88,9 @@ def validate(search: Search, before: Candidate, after: Candidate, rivals: Rivals
     part = _on_the_others(search, mask)
     fits = {}
     for candidate in {c.label: c for c in (before, after, *(c for c, _ in rivals))}.values():
-        found = part.fit(candidate.hypothesis, [candidate.x], candidate.at(~mask))
-        if found is not None:
-            fits[candidate.label] = part.polished(found)
+        found = part.polished(replace(candidate.at(~mask), log_evidence=-np.inf))
+        if np.isfinite(found.log_evidence):
+            fits[candidate.label] = found
     if before.label not in fits or after.label not in fits:
         return None
     first, covered_first = _predicted(part, fits[before.label], search, mask)
@@ -124,7 +124,9 @@ def _predicted(part: Search, fit: Candidate, search: Search, mask: NDArray[np.bo
     columns = [own, *form_columns(search.factors, force, fit.hypothesis.effects, trace)]
     here = np.column_stack(columns)[mask]
     mean, covariance = part.linear(fit).coefficients(fit.theta)
-    k = fit.x.size
-    residual = (whole.force - force)[mask] - here[:, k:] @ mean[k:]
+    mean[: fit.x.size] -= part.place(
+        fit
+    )  # the curve is that at the fit; the linear model knows the last bit of the way
+    residual = (whole.force - force)[mask] - here @ mean
     band = HELD_OUT.band * np.sqrt(np.einsum("ni,ij,nj->n", here, covariance, here) + sd**2)
     return misfit_of(residual, search.noise.each[mask]), float(np.mean(np.abs(residual) <= band))
