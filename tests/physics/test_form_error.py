@@ -14,6 +14,7 @@ from bayesmembrane.physics.form_error import (
     progress,
     states,
     traces,
+    unsteady,
 )
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -94,3 +95,16 @@ def test_one_law_that_may_be_off_adds_one_coordinate_however_many_there_are() ->
     assert one.noise == two.noise
     assert one.parameters[-1].name == "noise.ln_eta_law"
     assert one.natural_names[-3:] == ("noise.sd", "noise.eta", "noise.eta_law")
+
+
+def test_unsteady_readings_are_those_at_the_start_at_turns_and_at_slack_ends() -> None:
+    up = np.linspace(0.0, 0.02, 11)
+    deflection = np.concatenate([up, up[-2::-1], up[1:]])
+    force = np.maximum(100.0 * deflection - 0.5 * (np.arange(31) > 10) * (np.arange(31) < 20), 0.0)
+    m = Measurement(deflection, force, Annulus(0.010, 0.035), Specimen("film", 5e-5))
+    found = set(unsteady(m).tolist())
+    assert {0, 1, 2} <= found  # the start
+    assert {10, 11, 12, 20, 21, 22} <= found  # either turn
+    assert {18, 19} <= found  # slack on the way down
+    assert not {5, 15, 25} & found
+    assert np.array_equal(form_factors(m).local, np.eye(31)[:, sorted(found)])

@@ -134,3 +134,14 @@ def test_evidence_under_another_noise_is_that_of_a_new_fit(cyclic) -> None:
     anew = other.fit(PLAIN, [plain.x])
     assert anew is not None
     assert other.weighed_anew(plain).log_evidence == pytest.approx(other.polished(anew).log_evidence, abs=0.3)
+
+
+@pytest.mark.parametrize("name", ["viscoelastic", "mullins", "permanent_set"])
+def test_a_polished_fit_is_where_its_linear_model_has_its_mode(cyclic, name) -> None:
+    search, plain = cyclic
+    found = beside(search, plain, name)
+    mean, covariance = search.linear(found).coefficients(found.theta)
+    k = found.x.size
+    inside = ~standard(found.hypothesis, search.measurement).one_sided  # at a bound the mode may lie beyond
+    off = (mean[:k] - search.place(found)) / np.sqrt(np.diag(covariance))[:k]
+    assert np.max(np.abs(off[inside])) < 0.5
