@@ -32,7 +32,7 @@ from bayesmembrane.ground.stored import answer, answer_folders, store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.page import write_report
 
-TITLE = "What the published force curve of a 50 um silicone film says about five materials"
+TITLE = "What the reconstructed force curve of a 50 um silicone film says about five materials"
 RANGES = ("OP1", "OP2")
 VALLEYS = ("yeoh", "mooney_rivlin", "gent")
 # What the loop is closed on: the paper's curve over both of its ranges, and a cyclic curve with something hidden in it.

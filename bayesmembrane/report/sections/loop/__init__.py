@@ -58,7 +58,7 @@ class LoopSection(Section):
         loops = of_kind(results, Loop)
         if len(loops) == 1:
             return [*answer(loops[0]), *moved(loops[0])[:1]]
-        return [f"{subject(found)}: {' '.join(answer(found))}" for found in loops]
+        return [f"{subject(found)}: {' '.join(of_loop(found).lines[1:])}" for found in loops]
 
     def lead(self, results: Sequence[Any]) -> Lead | None:
         loops = of_kind(results, Loop)
