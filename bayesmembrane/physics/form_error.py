@@ -53,7 +53,7 @@ at once, and no film goes slack at once.
 """
 
 LARGEST = {ENERGY.name: 1.0, LAW.name: 0.4, LOCAL.name: 0.1}
-"""Relative errors beyond which it is no longer that law, and beyond which nothing is believed of a diagnosis."""
+"""The largest relative error that a diagnosis offers: what differs more from a law follows another one."""
 
 STATE_LENGTHS = (0.15, 0.3, 0.6)
 """Of the whole range: over how much deflection the error of an energy changes. Equal parts of its variance."""
@@ -162,14 +162,20 @@ def _kernel(a: Array, b: Array, lengths: tuple[float, ...]) -> Array:
     return np.asarray(np.mean([np.exp(-0.5 * square / length**2) for length in lengths], axis=0))
 
 
-def form_columns(factors: FormFactors, force: Array, effects: Sequence[Effect], traces: Array) -> list[Array]:
-    """Columns (N, m) N that a form error is a sum of, per unit of its relative size: of the energy, with the ``force``
-    (N,) N; then of every effect whose law could be off, with its trace of ``traces`` (E, N) N; at last of what
-    is not steady.
+def form_columns(
+    factors: FormFactors, force: Array, effects: Sequence[Effect], traces: Array
+) -> list[tuple[Parameter, Array]]:
+    """(size, columns (N, m) N) that a form error is a sum of, per unit of its relative size: of the energy, with the
+    ``force`` (N,) N; then of every effect whose law could be off, with its trace of ``traces`` (E, N) N; at last of
+    what is not steady.
     """
     laws = [trace for effect, trace in zip(effects, traces, strict=True) if not effect.exact]
-    local = [] if factors.local is None else [float(np.max(np.abs(force))) * factors.local]
-    return [force[:, None] * factors.state, *(trace[:, None] * factors.progress for trace in laws), *local]
+    local = [] if factors.local is None else [(LOCAL, float(np.max(np.abs(force))) * factors.local)]
+    return [
+        (ENERGY, force[:, None] * factors.state),
+        *((LAW, trace[:, None] * factors.progress) for trace in laws),
+        *local,
+    ]
 
 
 def traces(forward: Forward, x: ArrayLike, force: Array) -> Array:

@@ -136,7 +136,7 @@ def _every(course: Course) -> list[str]:
     probable = [name for name, q in p.effects.items() if q >= WORDS.probable][:MOST_TOLD]
     sizes = np.cumsum([len(name.split("+")) for name in probable])
     told = [_told(d, n, course, bool(k <= MOST_SIZES)) for n, k in zip(probable, sizes, strict=True)]
-    foreign = 1.0 - p.foreign.get(NOTHING, 1.0)
+    foreign = p.anything_foreign
     if foreign >= WORDS.probable:
         told.insert(0 if foreign > 0.5 else len(told), f"{percent(foreign)} something foreign")
     if d.verdict == "material":
@@ -214,13 +214,12 @@ def _beside(d: Diagnosis) -> str:
 
 def _strange(d: Diagnosis) -> Foreign | None:
     """What is foreign, where that is more probable than that nothing is."""
-    return d.foreign if d.probabilities.foreign.get(NOTHING, 1.0) < 0.5 else None
+    return d.foreign if d.probabilities.anything_foreign > 0.5 else None
 
 
 def _certain(d: Diagnosis) -> str:
     """Effects that are in all that is probable; "" if there is none, or nothing else is probable anyway."""
-    names = {n for key in d.probabilities.effects for n in key.split("+")} - {NOTHING}
-    sure = sorted(n for n in names if d.probabilities.of_effect(n) >= VERDICT.sure)
+    sure = d.probabilities.sure()
     alone = d.probabilities.effects.get("+".join(sure), 0.0) >= VERDICT.sure
     return "" if alone else listed(map(effect_title, sure))
 

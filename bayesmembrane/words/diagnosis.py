@@ -16,7 +16,7 @@ from bayesmembrane.diagnosis.left.heldout import HeldOut
 from bayesmembrane.diagnosis.reference.outliers import SetAside
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
-from bayesmembrane.diagnosis.thresholds import VERDICT, WORDS
+from bayesmembrane.diagnosis.thresholds import WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed, spoken_parameter
@@ -107,7 +107,7 @@ def probability_sentence(found: Diagnosis) -> str:
     """The most probable sets of effects, and what is foreign where it counts."""
     p = found.probabilities
     told = [f"{set_title(name)} {percent(q)}" for name, q in p.effects.items() if q >= WORDS.probable][:3]
-    foreign = 1.0 - p.foreign.get(NOTHING, 1.0)
+    foreign = p.anything_foreign
     if foreign >= WORDS.probable:
         told.append(f"something foreign {percent(foreign)}")
     return f"Probability: {', '.join(told)}."
@@ -281,8 +281,8 @@ def _beside(found: Diagnosis) -> str:
     """What is foreign beside the effects, or may be."""
     if found.foreign is None:
         return ""
-    p = 1 - found.probabilities.foreign.get(NOTHING, 1.0)
-    how = "Beside it" if p >= 0.5 else f"Perhaps beside it ({percent(p)})"
+    p = found.probabilities.anything_foreign
+    how = "Beside it" if p > 0.5 else f"Perhaps beside it ({percent(p)})"
     return f" {how}: {foreign_sentence(found.foreign, _units(found))}"
 
 
@@ -299,7 +299,7 @@ def _member(j: Judged, found: Diagnosis) -> str:
 
 def _unknown(found: Diagnosis) -> str:
     waves, units = found.detection.periodicity, _units(found)
-    if found.foreign is not None and found.probabilities.foreign.get(NOTHING, 1.0) < 0.5:
+    if found.foreign is not None and found.probabilities.anything_foreign > 0.5:
         base = found.foreign.base.names
         beside = f" beside {' and '.join(effect_title(n) for n in base)}" if base else ""
         return (
@@ -324,8 +324,7 @@ def _unknown(found: Diagnosis) -> str:
 
 def _certain(found: Diagnosis) -> str:
     """Effects that are in all that is probable: what is known where the whole is not."""
-    p, names = found.probabilities, {n for key in found.probabilities.effects for n in key.split("+")} - {NOTHING}
-    sure = sorted(n for n in names if p.of_effect(n) >= VERDICT.sure)
+    sure = found.probabilities.sure()
     return f"{_at_work(sure)} all that is probable, yet " if sure else ""
 
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cholesky, lapack, solve_triangular
 from scipy.optimize import minimize
 from scipy.special import log_ndtr, logsumexp, ndtr, ndtri
@@ -208,7 +209,8 @@ def log_inside(mean: Array, covariance: Array, low: Array, high: Array) -> float
         return total + float(np.sum(single[joint]))
     scale = sd[joint]
     correlation = covariance[np.ix_(joint, joint)] / np.outer(scale, scale)
-    return total + _log_joint((low[joint] - mean[joint]) / scale, (high[joint] - mean[joint]) / scale, correlation)
+    together = _log_joint((low[joint] - mean[joint]) / scale, (high[joint] - mean[joint]) / scale, correlation)
+    return total + (together if np.isfinite(together) else float(np.sum(single[joint])))
 
 
 def _log_joint(low: Array, high: Array, correlation: Array) -> float:
@@ -221,9 +223,7 @@ def _log_joint(low: Array, high: Array, correlation: Array) -> float:
     z, log_p = np.zeros((k, len(LATTICE))), np.zeros(len(LATTICE))
     for i in range(k):
         middle = root[i, :i] @ z[:i]
-        a, b = (low[i] - middle) / root[i, i], (high[i] - middle) / root[i, i]
-        flip = a > 0  # of two tails the nearer one is computed as a tail
-        a, b = np.where(flip, -b, a), np.where(flip, -a, b)
+        a, b, flip = _nearer_tail((low[i] - middle) / root[i, i], (high[i] - middle) / root[i, i])
         below, share = ndtr(a), ndtr(b) - ndtr(a)
         with np.errstate(divide="ignore"):
             log_p += np.log(share)
@@ -232,12 +232,15 @@ def _log_joint(low: Array, high: Array, correlation: Array) -> float:
     return float(logsumexp(log_p) - np.log(len(LATTICE)))
 
 
+def _nearer_tail(a: Array, b: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """(a, b, flipped): intervals above zero are mirrored, for P is exact only in the lower tail."""
+    flip = a > 0
+    return np.where(flip, -b, a), np.where(flip, -a, b), flip
+
+
 def _log_between(mean: Array, sd: Array, low: Array, high: Array) -> Array:
     """(k,) ln P(low <= u <= high) of each coordinate on its own."""
-    a, b = (low - mean) / sd, (high - mean) / sd
-    # Of two tails the nearer one is computed as a tail.
-    flip = a > 0
-    a, b = np.where(flip, -b, a), np.where(flip, -a, b)
+    a, b, _ = _nearer_tail((low - mean) / sd, (high - mean) / sd)
     upper, lower = log_ndtr(b), log_ndtr(a)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(upper + np.log1p(-np.exp(np.minimum(lower - upper, -1e-300))))

@@ -19,10 +19,7 @@ from bayesmembrane.diagnosis.thresholds import FORM, SEARCH, TINY
 from bayesmembrane.ground.parameters import Array, Normal, Parameter, frozen
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.form_error import (
-    ENERGY,
     LARGEST,
-    LAW,
-    LOCAL,
     FormFactors,
     form_columns,
     form_factors,
@@ -143,7 +140,7 @@ class Search:
         u = axes.to_u(candidate.x)
         return np.asarray(axes.slope(u) * axes.local(u))
 
-    def place(self, candidate: Candidate) -> Array:
+    def coefficients_at(self, candidate: Candidate) -> Array:
         """(k,) the coefficients of `linear` at the fit itself."""
         axes = standard(candidate.hypothesis, self.measurement)
         u = axes.to_u(candidate.x)
@@ -162,23 +159,20 @@ class Search:
 
     # ---- form error ----------------------------------------------------------------------------------------------
 
-    def _columns(self, candidate: Candidate) -> list[Array]:
-        """What the form error of its energy and of its laws could look like, in N."""
+    def _columns(self, candidate: Candidate) -> list[tuple[Parameter, Array]]:
+        """What its form error could look like, in N, each with the parameter of its relative size."""
         fitted = self.measurement.force - candidate.residual
         return form_columns(self.factors, fitted, candidate.hypothesis.effects, candidate.traces)
 
     def _forms(self, candidate: Candidate) -> list[Block]:
         """The same freed of noise, with the priors of their relative sizes."""
-        white = [self.noise.white(c) for c in self._columns(candidate)]
-        local = [] if self.factors.local is None else [LOCAL]
-        sizes = [ENERGY, *[LAW] * (len(white) - 1 - len(local)), *local]
-        return [_form(columns, size) for columns, size in zip(white, sizes, strict=True)]
+        return [_form(size, self.noise.white(columns)) for size, columns in self._columns(candidate)]
 
     def _freeing(self, parent: Candidate | None, capped: bool = True) -> Freeing:
         if parent is None:
-            usual = np.exp([_moments(size)[0] for size in (ENERGY, LOCAL)])
-            made = form_columns(self.factors, np.abs(self.measurement.force), (), np.empty((0, len(self.measurement))))
-            columns = np.column_stack([eta * self.noise.white(c) for eta, c in zip(usual, made, strict=False)])
+            force, nothing = np.abs(self.measurement.force), np.empty((0, len(self.measurement)))
+            made = form_columns(self.factors, force, (), nothing)
+            columns = np.column_stack([np.exp(_moments(size)[0]) * self.noise.white(c) for size, c in made])
         else:
             forms = self._forms(parent)
             # A poor parent's form error is large, and would take what the coordinates are to explain.
@@ -230,7 +224,7 @@ class Search:
         inside = log_inside(mean[:k], covariance[:k, :k], np.where(axes.one_sided, 0.0, low), high)
         own = mean[:k] * spread, np.diag(covariance)[:k] * spread**2
         replaced = axes.log_replaced(u, *own)
-        form = np.column_stack(self._columns(found)) @ mean[k:]
+        form = np.column_stack([c for _, c in self._columns(found)]) @ mean[k:]
         return replace(found, log_evidence=z.log_evidence + replaced + inside, theta=z.theta, form=form)
 
 
@@ -266,8 +260,8 @@ def starts_with(bases: Sequence[Array], effect: Effect, measurement: Measurement
     return out
 
 
-def _form(columns: Array, eta: Parameter) -> Block:
-    return Block(columns, _moments(eta), float(np.log(LARGEST[eta.name])))
+def _form(size: Parameter, columns: Array) -> Block:
+    return Block(columns, _moments(size), float(np.log(LARGEST[size.name])))
 
 
 def _moments(p: Parameter) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown
-from bayesmembrane.diagnosis.thresholds import FOREIGN
+from bayesmembrane.diagnosis.thresholds import FOREIGN, VERDICT
 from bayesmembrane.ground.parameters import Array
 
 Named = TypeVar("Named")
@@ -59,6 +59,16 @@ class Probabilities:
     def of_effect(self, name: str) -> float:
         """Of one effect, whatever else is at work."""
         return float(sum(p for key, p in self.effects.items() if name in key.split("+")))
+
+    def sure(self) -> list[str]:
+        """Effects that are in all that is probable, by name: what is known even where the whole set is not."""
+        names = {n for key in self.effects for n in key.split("+")} - {NOTHING}
+        return sorted(n for n in names if self.of_effect(n) >= VERDICT.sure)
+
+    @property
+    def anything_foreign(self) -> float:
+        """Of something foreign, of whatever kind."""
+        return 1.0 - self.foreign.get(NOTHING, 1.0)
 
 
 @dataclass(frozen=True, eq=False)

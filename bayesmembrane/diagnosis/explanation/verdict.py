@@ -55,12 +55,10 @@ def decided(case: OpenCase, total: Total) -> Verdict:
         best.setdefault(set_name(j.candidate, given), j)
     members = tuple(best[name] for name in _smallest(p.effects) if name in best)
     unknown = Verdict("unknown", (), total.ranking, p, strange)
-    sure = p.foreign.get(NOTHING, 1.0) < 0.5
-    certain = any(p.of_effect(n) >= VERDICT.sure for n in (members[0].candidate.names if members else ()))
-    if not members or (len(members) > VERDICT.most_members and not certain):
+    if not members or (len(members) > VERDICT.most_members and not p.sure()):
         return unknown
     first = members[0]
-    if sure and strange is not None and strange.share * first.unexplained > VERDICT.foreign_carries:
+    if strange is not None and p.anything_foreign > 0.5 and strange.share * first.unexplained > VERDICT.foreign_carries:
         return unknown
     if [set_name(m.candidate, given) for m in members] == [NOTHING]:
         return unknown if strange else _without_effects(case, total, members)
@@ -72,7 +70,7 @@ def decided(case: OpenCase, total: Total) -> Verdict:
 def _strange(total: Total, given: Sequence[str]) -> Foreign | None:
     """The most probable thing that is foreign, beside the most probable set; None if there is surely nothing."""
     p = total.probabilities
-    if p.foreign.get(NOTHING, 1.0) >= VERDICT.sure:
+    if p.anything_foreign <= 1 - VERDICT.sure:
         return None
     first, kind = next(key for key in total.joint if key[1] != NOTHING)
     same = [f for f in total.foreign if f.kind == kind]

@@ -121,10 +121,10 @@ def _predicted(part: Search, fit: Candidate, search: Search, mask: NDArray[np.bo
     force = np.nan_to_num(new.force[0])
     own = np.nan_to_num(new.sensitivity[0]) * part.steepness(fit)
     trace = traces(forward, fit.x[None, :], force[None, :])[0]
-    columns = [own, *form_columns(search.factors, force, fit.hypothesis.effects, trace)]
-    here = np.column_stack(columns)[mask]
+    forms = form_columns(search.factors, force, fit.hypothesis.effects, trace)
+    here = np.column_stack([own, *(columns for _, columns in forms)])[mask]
     mean, covariance = part.linear(fit).coefficients(fit.theta)
-    mean[: fit.x.size] -= part.place(
+    mean[: fit.x.size] -= part.coefficients_at(
         fit
     )  # the curve is that at the fit; the linear model knows the last bit of the way
     residual = (whole.force - force)[mask] - here @ mean

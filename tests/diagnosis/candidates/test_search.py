@@ -114,7 +114,7 @@ def _inverse(search: Search, found: Candidate) -> Array:
     eta = np.exp(found.theta)
     fitted = search.measurement.force - found.residual
     columns = form_columns(search.factors, fitted, found.hypothesis.effects, found.traces)
-    columns = [size * c for size, c in zip(eta[1:], columns, strict=True)]
+    columns = [size * c for size, (_, c) in zip(eta[1:], columns, strict=True)]
     white = search.noise.white(np.column_stack(columns))
     return np.linalg.inv(eta[0] ** 2 * np.eye(N) + white @ white.T)
 
@@ -143,5 +143,5 @@ def test_a_polished_fit_is_where_its_linear_model_has_its_mode(cyclic, name) -> 
     mean, covariance = search.linear(found).coefficients(found.theta)
     k = found.x.size
     inside = ~standard(found.hypothesis, search.measurement).one_sided  # at a bound the mode may lie beyond
-    off = (mean[:k] - search.place(found)) / np.sqrt(np.diag(covariance))[:k]
+    off = (mean[:k] - search.coefficients_at(found)) / np.sqrt(np.diag(covariance))[:k]
     assert np.max(np.abs(off[inside])) < 0.5
