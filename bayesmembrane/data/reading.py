@@ -46,6 +46,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     single = _stated(options, rig, specimen.thickness)
     sd, covariance, covariance_file = _noise(options, single, found.get("force_sd"), force.size)
     origin = [options.text("origin"), root.section("origin", required=False).all_text()]
+    root.section("import", required=False).all_text()  # how an export was understood, for people
     for section in (options, root):
         section.finish()
     provenance = Provenance(
