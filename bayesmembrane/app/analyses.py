@@ -24,6 +24,7 @@ from bayesmembrane.comparison.compare import Range, compare_ranges
 from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.phases import phases_of
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.diagnosis.diagnose import diagnose as run_diagnose
 from bayesmembrane.diagnosis.explanation.case import Question
@@ -33,6 +34,7 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.jobs import Tell, silent
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components, materials
+from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -87,7 +89,9 @@ def fit(
     found = run_fit(measurement, claim, loss=loss, seed=work.seed, starts=starts)
     settings = {"seed": work.seed, "loss": loss, "starts": [list(s) for s in starts]}
     what = asked("fit", run_fit, [measurement], [claim], settings)
-    return kept("fit", found, document(found), what, work.out)
+    answer = kept("fit", found, document(found), what, work.out)
+    _keep_phases(measurement, answer.folder)
+    return answer
 
 
 def sample(
@@ -115,7 +119,15 @@ def sample(
     rest = rest_of(measurement, whole)
     if run.path is not None:  # of an interrupted run, too: a report shows what there is, and solves nothing
         predictions_of(run, Wanted(rest=rest, breaks=tuple(breaks)) if breaks or rest is not None else None, solve)
+        _keep_phases(measurement, run.path)
     return Answer(run, {**document(run), "stored": None if run.path is None else str(run.path)})
+
+
+def _keep_phases(measurement: Measurement, folder: Path | None) -> None:
+    """What was done to the film, beside the answer about it, if it was more than one pull."""
+    found = None if folder is None else phases_of(measurement)
+    if folder is not None and found is not None:
+        store(folder, "phases", found, {"phases": len(found.parts), "cycles": int(found.cycle.max())})
 
 
 def compare(

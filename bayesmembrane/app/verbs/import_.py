@@ -22,14 +22,19 @@ place = 3
 class TableOptions(OptionGroup):
     """What is said of the file, where it does not say it itself."""
 
-    layout: Annotated[str, typer.Option("--format", help="Importer by name, instead of the one that knows the file.")] = ""
+    layout: Annotated[
+        str, typer.Option("--format", help="Importer by name, instead of the one that knows the file.")
+    ] = ""
     encoding: Annotated[str, typer.Option("--encoding", help="utf-8, cp1252, cp1250, gbk, ...")] = ""
-    delimiter: Annotated[str, typer.Option("--delimiter", help="tab, comma, semicolon, space, or the sign itself.")] = ""
+    delimiter: Annotated[str, typer.Option("--delimiter", help="tab, comma, semicolon, space, or the sign itself.")] = (
+        ""
+    )
     decimal: Annotated[str, typer.Option("--decimal", help="Decimal sign: point or comma.")] = ""
     columns: Annotated[
         str,
         typer.Option(
-            "--columns", help='In their order, time_s,travel_mm,-,force_N (- is left out), or some: "force=Load 2,travel=3".'
+            "--columns",
+            help='In their order, time_s,travel_mm,-,force_N (- is left out), or some: "force=Load 2,travel=3".',
         ),
     ] = ""
     units: Annotated[str, typer.Option("--units", help="Units that the file does not say: travel=mm,force=N.")] = ""
@@ -37,6 +42,9 @@ class TableOptions(OptionGroup):
     part: Annotated[str, typer.Option("--part", help="Which of several specimens, by number or name.")] = ""
     readings_per_s: Annotated[
         float | None, typer.Option("--readings-per-s", help="How often a file without times was read.")
+    ] = None
+    readings: Annotated[
+        int | None, typer.Option("--readings", help="Keep so many at most, with all turning points.")
     ] = None
 
 
@@ -58,7 +66,9 @@ class FilmAndRigOptions(OptionGroup):
     rig: Annotated[str, typer.Option("--rig", help="annulus, uniaxial, equibiaxial, planar or biaxial.")] = ""
     name: Annotated[str, typer.Option("--name", help="Name of the specimen.")] = ""
     thickness_um: Annotated[float | None, typer.Option("--thickness-um", help="Thickness at rest.")] = None
-    gauge_length_mm: Annotated[float | None, typer.Option("--gauge-length-mm", help="Length of a strip at rest.")] = None
+    gauge_length_mm: Annotated[float | None, typer.Option("--gauge-length-mm", help="Length of a strip at rest.")] = (
+        None
+    )
     width_mm: Annotated[float | None, typer.Option("--width-mm", help="Width of a strip at rest.")] = None
     inner_radius_mm: Annotated[float | None, typer.Option("--inner-radius-mm", help="Radius of the disc.")] = None
     outer_radius_mm: Annotated[float | None, typer.Option("--outer-radius-mm", help="Radius of the clamp.")] = None
@@ -98,34 +108,12 @@ def verb(
 
 
 def _hints(table: TableOptions, meaning: MeaningOptions, film: FilmAndRigOptions) -> Hints:
-    from bayesmembrane.data.exports.hints import Hints
-    from bayesmembrane.ground.units import to_si
+    from bayesmembrane.data.exports.hints import hints_of
 
-    def metres(value: float | None, scale: float) -> float | None:
-        return None if value is None else to_si(value, scale)
-
-    return Hints(
-        table.layout,
-        table.encoding,
-        table.delimiter,
-        table.decimal,
-        table.columns,
-        table.units,
-        table.sheet,
-        table.part,
-        meaning.zero,
-        meaning.sign,
-        meaning.strain,
-        meaning.stress,
-        table.readings_per_s,
-        film.rig,
-        metres(film.thickness_um, 1e-6),
-        metres(film.gauge_length_mm, 1e-3),
-        metres(film.width_mm, 1e-3),
-        metres(film.inner_radius_mm, 1e-3),
-        metres(film.outer_radius_mm, 1e-3),
-        film.name,
-    )
+    said = {**vars(table), **vars(meaning), **vars(film)}
+    del said["specimen"]
+    said["format"] = said.pop("layout")
+    return hints_of(said)
 
 
 def _sentence(written: Written) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -40,6 +41,11 @@ class Block:
     columns: tuple[Column, ...]
     header: int | None
     label: str = ""
+
+    @property
+    def width(self) -> int:
+        """How many columns the sheet has here, those of other specimens included."""
+        return max((len(self.sheet.cells(r)) for r in self.rows[:20]), default=0)
 
     @property
     def place(self) -> str:
@@ -98,7 +104,9 @@ def _runs(sheet: Sheet) -> Iterator[_Run]:
 
 
 def _numeric(sheet: Sheet, cell: Cell) -> bool:
-    return isinstance(cell, float) or sheet.marks.number(cell) is not None or like_number(cell) or clock(cell) is not None
+    return (
+        isinstance(cell, float) or sheet.marks.number(cell) is not None or like_number(cell) or clock(cell) is not None
+    )
 
 
 def _goes_on(before: _Run, run: _Run) -> bool:
@@ -121,11 +129,26 @@ def _above(sheet: Sheet, run: _Run, top: int) -> tuple[int | None, tuple[Column,
     if names is not None and units is None and names - 1 >= top and _is_units(sheet.cells(names - 1)):
         units = names - 1
     width = max(run.at) + 1
-    head = _padded(sheet.cells(names), width) if names is not None else [""] * width
+    head = _padded(_names(sheet, names, width), width) if names is not None else [""] * width
     beside = _padded(sheet.cells(units), width) if units is not None else [""] * width
     columns = tuple(_column(j, str(head[j]), str(beside[j])) for j in range(width) if head[j] != "" or j in run.at)
     label = _label(sheet, names, top)
     return (names if names is not None else units), columns, label
+
+
+def _names(sheet: Sheet, row: int, width: int) -> Sequence[Cell]:
+    """The names above ``width`` columns of numbers; raises `DataError` where it is open which name is whose."""
+    cells, raw = sheet.cells(row), sheet.raw[row]
+    if sheet.delimiter == " " and isinstance(raw, str) and len(cells) != width:
+        cells = [c.strip() for c in re.split(r"\t+|\s{2,}", raw.strip("# \t"))]
+    fewer = len(cells) < width
+    if fewer or (sheet.delimiter == " " and len(cells) != width):
+        commas = ", as decimal commas would cause" if sheet.delimiter == "," and width == 2 * len(cells) else ""
+        fault = f"{len(cells)} names stand above {width} columns of numbers{commas}"
+        raise DataError(
+            fault, sheet.place(row), "name them in their order, --columns time_s,travel_mm,force_N; or say --delimiter"
+        )
+    return cells
 
 
 def _column(index: int, header: str, beside: str) -> Column:

@@ -13,7 +13,9 @@ Cell = str | float
 
 LARGEST = 1e15
 _SPACES = "\u00a0\u202f\u2009"
-_LIKE_NUMBER = re.compile(r"[+-]?[\d][\d.,' \u00a0\u202f\u2009]*([eE][+-]?\d{1,4})?|[+-]?[.,]\d+([eE][+-]?\d{1,4})?", re.ASCII)
+_LIKE_NUMBER = re.compile(
+    r"[+-]?[\d][\d.,' \u00a0\u202f\u2009]*([eE][+-]?\d{1,4})?|[+-]?[.,]\d+([eE][+-]?\d{1,4})?", re.ASCII
+)
 _MINUS = str.maketrans({"\u2212": "-", "\u2013": "-", "\uff0c": ",", "\uff0e": "."})
 _CLOCK = re.compile(r"(?:(\d{1,3}):)?([0-5]?\d):([0-5]?\d)(?:[.,](\d+))?", re.ASCII)
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}([., '])\d{3}", re.ASCII)

@@ -52,7 +52,7 @@ class Candidate:
 
     @property
     def kind(self) -> str:
-        """"true", "engineering" or ""."""
+        """ "true", "engineering" or ""."""
         return self.reading.kind
 
 
@@ -120,7 +120,19 @@ def trimmed(block: Block, chosen: Iterable[Candidate]) -> Sequence[int]:
     rows, end = block.rows, len(block.rows)
     while end > 0 and not any(_at(block.sheet.cells(rows[end - 1]), j) for j in at):
         end -= 1
+    _check_width(block, rows[:end])
     return rows[:end]
+
+
+def _check_width(block: Block, rows: Sequence[int]) -> None:
+    """Raise `DataError` at a row with more cells than there are columns: two lines in one, or a sign too much."""
+    if isinstance(block.sheet.raw[rows[0]] if rows else "", str) and block.header is not None:
+        width = max(block.width, len(block.sheet.cells(block.header)))
+        for row in rows:
+            cells = block.sheet.cells(row)
+            if len(cells) > width and any(c != "" for c in cells[width:]):
+                fault = f"the line has {len(cells)} cells, and there are {width} columns"
+                raise DataError(fault, block.sheet.place(row), "correct or remove the line")
 
 
 def guess_of(role: str, chosen: Candidate, hints: Hints) -> list[Guess]:
@@ -149,7 +161,11 @@ def _candidate(column: Column, hints: Hints) -> Candidate | None:
     if not role:
         return None
     score = 10.0 + 3 * reading.standard - 3 * reading.absolute if by_name else 2.0
-    if role == TRAVEL and by_name and any(w in plain(column.name) for w in ("crosshead", "cross head", "traverse", "stroke")):
+    if (
+        role == TRAVEL
+        and by_name
+        and any(w in plain(column.name) for w in ("crosshead", "cross head", "traverse", "stroke"))
+    ):
         score -= 1
     return Candidate(column, role, unit, reading, score)
 
@@ -184,7 +200,9 @@ def _role(name: str) -> tuple[str, str]:
     reading = reading_of(low)
     role = low if low in ROLES else _ALIASES.get(low, reading.role)
     if not role:
-        raise SettingsError(f'"{name}" in --columns is no kind of column', remedy=f"known: {', '.join(ROLES)}, - for none")
+        raise SettingsError(
+            f'"{name}" in --columns is no kind of column', remedy=f"known: {', '.join(ROLES)}, - for none"
+        )
     return role, reading.kind
 
 

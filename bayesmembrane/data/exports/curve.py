@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -31,7 +32,8 @@ from bayesmembrane.data.exports.relations import (
 )
 from bayesmembrane.data.exports.sheets import Sheet
 from bayesmembrane.data.exports.words import COMPRESSION, CYCLE, STRAIN, STRETCH, TRAVEL, plain
-from bayesmembrane.data.motion import check_order
+from bayesmembrane.data.motion import check_order, holds, legs
+from bayesmembrane.data.thinning import kept_rows
 from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.units import FORCE, STRESS, TIME
@@ -39,6 +41,12 @@ from bayesmembrane.ground.units import FORCE, STRESS, TIME
 STRIPS = ("uniaxial", "equibiaxial", "planar")
 RESTS = 0.02
 """A force below this part of the largest counts as none: the film is at rest there."""
+_CYCLE = re.compile(r"(?P<number>\d{1,6})(?:[-_ ]+(?P<word>[A-Za-z]+))?")
+_WAYS = {
+    1: ("stretch", "load", "up", "belast"),
+    -1: ("recover", "unload", "down", "release", "entlast"),
+    0: ("hold", "rest"),
+}
 NEAR = 0.05
 """A travel that starts within this part of its range starts near zero."""
 
@@ -123,6 +131,7 @@ def curve_of(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: Sequence
         export.notes.append(f"ignored columns: {', '.join(ignored)}")
     rig = hints.rig or ("uniaxial" if strip else "")
     film = replace(film, length=film.length or export.length)
+    columns = _thinned(export, columns)
     return Curve(columns, film, rig, export.lines, export.guesses, export.contradictions, export.notes)
 
 
@@ -234,7 +243,9 @@ def _homogeneous(rig: str) -> bool:
     from bayesmembrane.ground.registry import component
 
     if rig == "biaxial":
-        raise SettingsError("a biaxial test has two forces", remedy="bring stretch_1, stretch_2 and both stresses as CSV")
+        raise SettingsError(
+            "a biaxial test has two forces", remedy="bring stretch_1, stretch_2 and both stresses as CSV"
+        )
     return bool(component("rigs", rig).homogeneous)
 
 
@@ -255,7 +266,9 @@ def _time(export: Export) -> Array | None:
         k = 1 + int(np.argmax(step < 0))
         fault = f"the time falls ({found.values[k]:g} s after {found.values[k - 1]:g} s)"
         where = export.block.sheet.place(export.rows[k])
-        raise DataError(fault, where, "keep one test only; or leave the times aside with --columns and --readings-per-s")
+        raise DataError(
+            fault, where, "keep one test only; or leave the times aside with --columns and --readings-per-s"
+        )
     same = np.append(False, step == 0)
     if np.mean(same) > 0.5:
         fault = f"{np.sum(same)} of {same.size} readings bear the time of the one before"
@@ -278,8 +291,12 @@ def _checked_order(export: Export, columns: Mapping[str, Array]) -> None:
     try:
         check_order(travel, [export.block.sheet.place(r) for r in export.rows])
     except DataError as error:
-        remedy = f"say how often it was read, --readings-per-s 10, if this is the order of the test; else {error.remedy}"
-        raise DataError(error.what.replace("mm", "") if "stretch" in columns else error.what, error.where, remedy) from None
+        remedy = (
+            f"say how often it was read, --readings-per-s 10, if this is the order of the test; else {error.remedy}"
+        )
+        raise DataError(
+            error.what.replace("mm", "") if "stretch" in columns else error.what, error.where, remedy
+        ) from None
 
 
 # ---- travel and force ------------------------------------------------------------------------------------------------
@@ -319,10 +336,54 @@ def _strip(export: Export, film: Film, time: Array | None) -> dict[str, Array]:
 
 
 def _with(export: Export, time: Array | None, columns: dict[str, Array]) -> dict[str, Array]:
-    cycle = export.column(CYCLE) if any(c.role == CYCLE for c in export.found) else None
-    if cycle is not None and np.all(cycle.values == np.round(cycle.values)) and np.all(np.diff(cycle.values) >= 0):
-        columns = {**columns, "cycle": 1.0 + cycle.values - cycle.values[0]}
+    columns = {**columns, **_said_phases(export)}
     return columns if time is None else {TIME: time, **columns}
+
+
+def _said_phases(export: Export) -> dict[str, Array]:
+    """``cycle`` and ``direction``, (N,), as a column of the machine says them: 1, 2 or 1-Stretch, 1-Recover."""
+    chosen = best(export.found, CYCLE, export.block)
+    if chosen is None:
+        return {}
+    cells = [export.block.sheet.cells(r)[chosen.column.index : chosen.column.index + 1] for r in export.rows]
+    said = [_CYCLE.fullmatch(f"{c[0]:g}" if isinstance(c[0], float) else c[0]) if c else None for c in cells]
+    number = np.array([float(s["number"]) if s else np.nan for s in said])
+    header = f'"{chosen.column.header}"'
+    if not np.all(np.diff(number) >= 0):
+        export.notes.append(f"{header} does not count cycles in their order and is not used")
+        return {}
+    export.used.add(chosen.column.index)
+    found = {"cycle": 1.0 + number - number[0]}
+    ways = [_way(s["word"] if s else "") for s in said]
+    if ways[0] and None not in ways:
+        found["direction"] = np.array([float(w) for w in _carried_on([w or 0 for w in ways])])
+    export.guess(" and ".join(found), f"as {header} says", "it counts them", "--columns")
+    return found
+
+
+def _way(word: str | None) -> int | None:
+    """1 for words of loading, -1 of unloading, 0 of standing, None for any other."""
+    low = (word or "").lower()
+    return next((way for way, words in _WAYS.items() if low.startswith(words)), None)
+
+
+def _carried_on(ways: Sequence[int]) -> list[int]:
+    """The direction of each reading; a hold belongs to the leg before it."""
+    out: list[int] = []
+    for way in ways:
+        out.append(way or out[-1])
+    return out
+
+
+def _thinned(export: Export, columns: dict[str, Array]) -> dict[str, Array]:
+    """As many readings as were asked for, with all turning points."""
+    most, travel = export.hints.readings, columns.get("deflection", columns.get("stretch"))
+    if most is None or travel is None or travel.size <= most:
+        return columns
+    rows = kept_rows(legs(travel), holds(travel), most)
+    why = "so many were asked for; they lie evenly along the test, with all turning points and ends of holds"
+    export.guess("readings", f"{rows.size} of {travel.size}", why, "--readings")
+    return {name: values[rows] for name, values in columns.items()}
 
 
 def _signs(export: Export, x: Array, f: Array, free: bool) -> tuple[Array, Array]:
@@ -338,7 +399,9 @@ def _signs(export: Export, x: Array, f: Array, free: bool) -> tuple[Array, Array
         return x, f
     if not free:
         if back != pushed:
-            which = "force is negative and the travel goes on" if pushed else "travel goes back and the force is positive"
+            which = (
+                "force is negative and the travel goes on" if pushed else "travel goes back and the force is positive"
+            )
             fault = f"where most is carried the {which}"
             raise DataError(fault, export.block.place, "say --sign flip-force or flip-travel (pulled), or flip or keep")
         export.guess("sign", "kept", "travel and force are negative, as in compression", "--sign")
@@ -378,7 +441,9 @@ def _zeroed(export: Export, travel: Read, x: Array, f: Array) -> Array:
         return x - start
     fault = f"the travel starts at {1e3 * start:.4g} mm under {100 * abs(f[0]) / np.max(np.abs(f)):.3g} % of the largest load"
     raise DataError(
-        fault, export.block.sheet.place(export.rows[0]), "say --zero none if it counts from rest, --zero travel if it starts there"
+        fault,
+        export.block.sheet.place(export.rows[0]),
+        "say --zero none if it counts from rest, --zero travel if it starts there",
     )
 
 
@@ -389,7 +454,9 @@ def _zeroed_force(export: Export, f: Array) -> Array:
         return f - start
     if abs(start) > 0.01 * float(np.max(np.abs(f))):
         share = f"{100 * abs(start) / float(np.max(np.abs(f))):.2g} % of the largest"
-        export.guess("zero of the force", "as the file has it", f"its start at {share} may be a preload", "--zero force")
+        export.guess(
+            "zero of the force", "as the file has it", f"its start at {share} may be a preload", "--zero force"
+        )
     return f
 
 
@@ -409,8 +476,12 @@ def _stretch(export: Export, film: Film, load: Read | None) -> tuple[Array, Arra
     stated = _stated_stretch(export, travel) if roles & {STRAIN, STRETCH} else None
     if by_length is not None and (stated is None or export.hints.gauge_length):
         if stated is not None:
-            export.contradict(apart("travel over gauge length and the file's own strain", by_length, stated, export.lines))
-        export.guess("stretch", "1 + travel / gauge length", f"the gauge length is {1e3 * (film.length or 0):g} mm", "--columns")
+            export.contradict(
+                apart("travel over gauge length and the file's own strain", by_length, stated, export.lines)
+            )
+        export.guess(
+            "stretch", "1 + travel / gauge length", f"the gauge length is {1e3 * (film.length or 0):g} mm", "--columns"
+        )
         return by_length, travel
     if stated is None:
         fault = "the travel cannot become a stretch: the gauge length is not known"
@@ -432,7 +503,9 @@ def _stated_stretch(export: Export, travel: Array | None) -> Array:
     stretch = export.column(STRETCH)
     if stretch is not None:
         if abs(stretch.values[0]) < 0.3 and np.min(np.abs(stretch.values)) < 0.1:
-            fault = f'"{stretch.column.header}" is called a stretch and starts at {stretch.values[0]:g}, as a strain does'
+            fault = (
+                f'"{stretch.column.header}" is called a stretch and starts at {stretch.values[0]:g}, as a strain does'
+            )
             raise DataError(fault, export.block.place, f'say what it is, --columns "strain={stretch.column.header}"')
         return stretch.values
     strain = _strain(export, travel)
@@ -475,7 +548,9 @@ def _against_length(export: Export, length: float) -> None:
     """A contradiction if the export states another length than the one that its strain is made with."""
     for fact in export.lengths:
         if abs(fact.value / length - 1) > 0.02:
-            export.contradict(f'the strain is the travel over {1e3 * length:.5g} mm, and "{fact.words}" ({fact.place}) is not')
+            export.contradict(
+                f'the strain is the travel over {1e3 * length:.5g} mm, and "{fact.words}" ({fact.place}) is not'
+            )
 
 
 def _strain(export: Export, travel: Array | None) -> Read:
@@ -505,10 +580,14 @@ def _nominal(export: Export, film: Film, loads: tuple[Read | None, Read | None, 
         true, stress = stress, None
     if true is not None and stress is not None:
         export.contradict(
-            apart("true stress and engineering stress times stretch", true.values, stress.values * stretch, export.lines)
+            apart(
+                "true stress and engineering stress times stretch", true.values, stress.values * stretch, export.lines
+            )
         )
     if stress is not None and by_force is not None:
-        export.contradict(apart("stress and force over width and thickness (Pa)", stress.values, by_force, export.lines))
+        export.contradict(
+            apart("stress and force over width and thickness (Pa)", stress.values, by_force, export.lines)
+        )
     if by_force is not None and (stress is None or (export.hints.width and export.hints.thickness)):
         size = f"{1e3 * (film.width or 0):g} mm times {1e3 * (film.thickness or 0):g} mm"
         export.guess("nominal stress", "force / (width x thickness)", f"the specimen is {size}", "--columns")
@@ -516,7 +595,12 @@ def _nominal(export: Export, film: Film, loads: tuple[Read | None, Read | None, 
     if stress is not None:
         return _as_nominal(export, stress, kind, force, stretch)
     if true is not None:
-        export.guess("nominal stress", f'"{true.column.header}" over the stretch', "it is true, of an incompressible film", "--stress")
+        export.guess(
+            "nominal stress",
+            f'"{true.column.header}" over the stretch',
+            "it is true, of an incompressible film",
+            "--stress",
+        )
         return true.values / stretch
     missing = [o for o, v in (("--width-mm", film.width), ("--thickness-um", film.thickness)) if not v]
     fault = "the force cannot become a nominal stress: width and thickness of the film are not known"
@@ -526,7 +610,9 @@ def _nominal(export: Export, film: Film, loads: tuple[Read | None, Read | None, 
 def _as_nominal(export: Export, stress: Read, kind: str, force: Read | None, stretch: Array) -> Array:
     name = f'"{stress.column.header}"'
     if kind:
-        export.guess("stress", f"{name} is engineering", "it was said" if export.hints.stress else "its name says so", "--stress")
+        export.guess(
+            "stress", f"{name} is engineering", "it was said" if export.hints.stress else "its name says so", "--stress"
+        )
         return stress.values
     why = "machines write force over area at rest, and the file does not say"
     if force is not None and np.ptp(stretch) > 0.05:
@@ -552,10 +638,19 @@ def _areas(force: Array, stress: Array) -> tuple[float, float]:
 
 def _refuse_nonsense(export: Export, columns: Mapping[str, Array]) -> None:
     """Raise `DataError` where nothing moves, nothing is carried, or what was pressed gets longer."""
-    for name, what in (("deflection", "travel"), ("stretch", "stretch"), ("force", "force"), ("nominal_stress", "stress")):
+    for name, what in (
+        ("deflection", "travel"),
+        ("stretch", "stretch"),
+        ("force", "force"),
+        ("nominal_stress", "stress"),
+    ):
         if name in columns and np.ptp(columns[name]) == 0:
-            raise DataError(f"the {what} is the same in all rows", export.block.place, "check which column is which, --columns")
-    text = plain(" ".join(str(c) for r in range(min(20, len(export.block.sheet))) for c in export.block.sheet.cells(r)[:3]))
+            raise DataError(
+                f"the {what} is the same in all rows", export.block.place, "check which column is which, --columns"
+            )
+    text = plain(
+        " ".join(str(c) for r in range(min(20, len(export.block.sheet))) for c in export.block.sheet.cells(r)[:3])
+    )
     pulls = columns.get("stretch")
     if pulls is not None and COMPRESSION.search(text) and float(np.max(pulls)) > 1.02 and not export.hints.sign:
         fault = "the file speaks of compression, and the film gets longer in it"

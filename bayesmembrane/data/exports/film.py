@@ -75,4 +75,9 @@ def _from_area(value: dict[str, float | None], fact: Fact | None, telling: Telli
     elif thickness or width:
         missing = "width" if thickness else "thickness"
         value[missing] = area / float(thickness or width or 1.0)
-        telling.guess(missing, f"{1e3 * float(value[missing] or 0):.6g} mm", f'"{fact.words}" over the other side', OPTIONS[missing])
+        telling.guess(
+            missing,
+            f"{1e3 * float(value[missing] or 0):.6g} mm",
+            f'"{fact.words}" over the other side',
+            OPTIONS[missing],
+        )

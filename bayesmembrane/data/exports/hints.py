@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.errors import SettingsError, unknown_name
+from bayesmembrane.ground.units import to_si
 
 
 class Guess(NamedTuple):
@@ -42,6 +44,7 @@ class Hints:
     zero, sign : see `_CHOICES`
     strain, stress : what a column of strain or stress holds, see `_CHOICES`
     readings_per_s : Hz, of a file without times
+    readings : so many are kept at most, with all turning points
     rig, thickness, gauge_length, width, inner_radius, outer_radius, name : the film and what holds it, m
 
     Raises `SettingsError` for a choice that there is not, and for a length that is not positive.
@@ -60,6 +63,7 @@ class Hints:
     strain: str = ""
     stress: str = ""
     readings_per_s: float | None = None
+    readings: int | None = None
     rig: str = ""
     thickness: float | None = None
     gauge_length: float | None = None
@@ -73,6 +77,8 @@ class Hints:
             value = getattr(self, name)
             if value and value not in choices:
                 raise SettingsError(f'--{name} cannot be "{value}"', remedy=f"choose {', '.join(choices)}")
+        if self.readings is not None and self.readings < 20:
+            raise SettingsError("--readings must be at least 20")
         for f in fields(self):
             value = getattr(self, f.name)
             if isinstance(value, float) and not 0 < value < float("inf"):
@@ -93,3 +99,24 @@ def pairs_of(text: str, option: str) -> dict[str, str]:
             raise SettingsError(f'"{part}" in {option} is no pair', remedy=f"write {option} name=value,name=value")
         found[name.strip().lower()] = value.strip()
     return found
+
+
+_LENGTHS = {"um": 1e-6, "mm": 1e-3}
+
+
+def hints_of(said: Mapping[str, Any]) -> Hints:
+    """Hints by the names of the options, with underscores and lengths in their units: ``thickness_um``, ``width_mm``.
+
+    Raises `SettingsError` for a name that there is not.
+    """
+    known = {f.name for f in fields(Hints)}
+    found: dict[str, Any] = {}
+    for option, value in said.items():
+        name, _, unit = option.rpartition("_")
+        if unit in _LENGTHS and name in known:
+            found[name] = None if value is None else to_si(float(value), _LENGTHS[unit])
+        elif option in known and option not in ("thickness", "gauge_length", "width", "inner_radius", "outer_radius"):
+            found[option] = value
+        else:
+            raise unknown_name("option of import", option, known)
+    return Hints(**found)

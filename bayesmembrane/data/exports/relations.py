@@ -81,4 +81,6 @@ def jumps(what: str, values: Array, lines: Sequence[int]) -> str:
     if bad.size == 0:
         return ""
     named = ", ".join(f"{lines[k]}" for k in bad[:5]) + (" and more" if bad.size > 5 else "")
-    return f"the {what} leaves its neighbours and comes back at once in line {named}: damaged, or an event of the machine"
+    return (
+        f"the {what} leaves its neighbours and comes back at once in line {named}: damaged, or an event of the machine"
+    )

@@ -180,7 +180,9 @@ def _decode_wide(data: bytes, file: str) -> tuple[str, Guess]:
     if name:
         return _decode(data, name, file), Guess("encoding", name, "every other byte is zero", "--encoding")
     raise DataError(
-        "this is not a text file", file, "export the readings as text or as a workbook (xlsx); machines' own formats stay closed"
+        "this is not a text file",
+        file,
+        "export the readings as text or as a workbook (xlsx); machines' own formats stay closed",
     )
 
 

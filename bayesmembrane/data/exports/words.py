@@ -46,7 +46,9 @@ _SYMBOLS = {
     "eps": STRAIN,
 }
 _TRUE = re.compile(r"true|cauchy|wahre?\w*|vraie?|rationnelle|verdader[ao]|real|rzeczywist\w+|真实|真应")
-_ENGINEERING = re.compile(r"engineering|eng|nominal\w*|nominell\w*|technische?\w*|conventionnelle?|ingenieril|pk1|piola|inzyniersk\w+|工程|名义")
+_ENGINEERING = re.compile(
+    r"engineering|eng|nominal\w*|nominell\w*|technische?\w*|conventionnelle?|ingenieril|pk1|piola|inzyniersk\w+|工程|名义"
+)
 _LOGARITHMIC = re.compile(r"log|logarithmic\w*|logarithmisch\w*|hencky|ln")
 # No reading of the test: what was wanted, what was made of it, and what is measured elsewhere.
 _ASIDE = re.compile(
@@ -66,13 +68,19 @@ FACTS = {
         r"gauge length|gage length|\w*messlange|\w*messlaenge|lo|l0|longueur (?:initiale|utile|de reference)"
         r"|longitud (?:calibrada|inicial|de referencia)|dlugosc pomiarowa|initial length|original length|标距|原始标距",
     ),
-    "grip_length": (LENGTH, r"grip separation|grip to grip\w*|\w*einspannlange|\w*einspannlaenge|clamping length|夹具间距"),
+    "grip_length": (
+        LENGTH,
+        r"grip separation|grip to grip\w*|\w*einspannlange|\w*einspannlaenge|clamping length|夹具间距",
+    ),
     "area": (
         "area",
         r"cross ?section\w*|(?:cross ?sectional )?area|\w*querschnitt\w*|section|superficie|przekroj|面积|截面积|s0",
     ),
     "diameter": (LENGTH, r"diameter|\w*durchmesser|diametre|diametro|srednica|直径"),
-    "speed": (SPEED, r"(?:test |crosshead |cross head )?speed|\w*prufgeschwindigkeit|vitesse\w*|velocidad\w*|predkosc|速度|v1"),
+    "speed": (
+        SPEED,
+        r"(?:test |crosshead |cross head )?speed|\w*prufgeschwindigkeit|vitesse\w*|velocidad\w*|predkosc|速度|v1",
+    ),
 }
 _FACT = {name: re.compile(rf"(?<![a-z])(?:{words})(?![a-z0-9])") for name, (_, words) in FACTS.items()}
 NAME = re.compile(

@@ -34,6 +34,8 @@ _WRITTEN = {
     "force_sd": ("force_sd_N", 1.0),
     "stretch": ("stretch", 1.0),
     "nominal_stress": ("nominal_stress_MPa", 1e-6),
+    "cycle": ("cycle", 1.0),
+    "direction": ("direction", 1.0),
     "stretch_1": ("stretch_1", 1.0),
     "stretch_2": ("stretch_2", 1.0),
     "nominal_stress_1": ("nominal_stress_1_MPa", 1e-6),
@@ -49,7 +51,13 @@ _TO_COMPLETE = """
 # inner_radius_mm = 10.0
 # outer_radius_mm = 35.0
 """
-_EXAMPLES = {"thickness_um": 50.0, "inner_radius_mm": 10.0, "outer_radius_mm": 35.0, "length_mm": 50.0, "width_mm": 10.0}
+_EXAMPLES = {
+    "thickness_um": 50.0,
+    "inner_radius_mm": 10.0,
+    "outer_radius_mm": 35.0,
+    "length_mm": 50.0,
+    "width_mm": 10.0,
+}
 
 
 @dataclass(frozen=True)
@@ -205,7 +213,11 @@ def read_export(export: str | Path, hints: Hints | None = None, specimen: str | 
         raise SettingsError(
             f"{export} does not say all of film and rig", remedy=f"give a specimen file, or {', '.join(missing)}"
         )
-    return _measured(made, str(export))
+    found = _measured(made, str(export))
+    guessed = tuple(str(g) for g in made.imported.guesses)
+    return replace(
+        found, provenance=replace(found.provenance, notes=(*found.provenance.notes, *made.imported.notes, *guessed))
+    )
 
 
 def _measured(made: _Files, file: str) -> Measurement:
@@ -290,9 +302,7 @@ def _completed(hints: Hints, template: TomlSection | None) -> Hints:
     return replace(hints, **{k: v for k, v in found.items() if v and not getattr(hints, k)})
 
 
-def _specimen_text(
-    imported: Imported, hints: Hints, importer: str, template: TomlSection | None
-) -> tuple[str, bool]:
+def _specimen_text(imported: Imported, hints: Hints, importer: str, template: TomlSection | None) -> tuple[str, bool]:
     """(TOML, whether it is complete): film and rig as far as they are known, and how the export was understood."""
     content: dict[str, Any] = {"measurement": {"origin": imported.origin}}
     if template is not None and isinstance(measured := template.table.get("measurement"), dict):

@@ -77,7 +77,9 @@ def _column(block: Block, name: str, hints: Hints) -> Array:
     column = next((c for c in block.columns if c.header.lower().replace(" ", "").startswith(name)), None)
     if column is None:
         shown = ", ".join(c.header for c in block.columns)
-        raise DataError(f"the column {name} is missing among {shown}", block.place, "export sizes, displacements and forces")
+        raise DataError(
+            f"the column {name} is missing among {shown}", block.place, "export sizes, displacements and forces"
+        )
     role = FORCE if name.endswith("force") else TRAVEL
     chosen = Candidate(column, role, unit_of(column.unit), Reading(role), 20.0)
     return read(block, chosen, block.rows, hints).values

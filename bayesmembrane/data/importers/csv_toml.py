@@ -6,8 +6,8 @@ import re
 from dataclasses import replace
 from typing import ClassVar
 
-from bayesmembrane.data.fixture import Fixture, check_lifted
 from bayesmembrane.data.exports.hints import Hints
+from bayesmembrane.data.fixture import Fixture, check_lifted
 from bayesmembrane.data.importers.base import Imported, Importer, TableImporter
 from bayesmembrane.data.reading import curve_columns
 from bayesmembrane.data.tables import TextTable, decode, number, parse_table

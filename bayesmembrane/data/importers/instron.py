@@ -7,7 +7,9 @@ from typing import ClassVar
 
 from bayesmembrane.data.importers.base import TableImporter, head
 
-_WORDS = re.compile(r"^\W*(?:results table|raw data|specimen raw data)\b|instron|bluehill", re.IGNORECASE | re.MULTILINE)
+_WORDS = re.compile(
+    r"^\W*(?:results table|raw data|specimen raw data)\b|instron|bluehill", re.IGNORECASE | re.MULTILINE
+)
 
 
 class Instron(TableImporter):

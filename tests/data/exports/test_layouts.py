@@ -53,7 +53,9 @@ def same_stretch(found: Imported) -> None:
     assert found.columns["nominal_stress"] == pytest.approx(STRESS, rel=1e-4, abs=20)
 
 
-@pytest.mark.parametrize(("sep", "decimal"), [(",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ","), ("  ", ".")])
+@pytest.mark.parametrize(
+    ("sep", "decimal"), [(",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ","), ("  ", ".")]
+)
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3)))[::2])
 def test_delimiters_decimals_line_ends_and_orders(sep: str, decimal: str, end: str, order: tuple[int, ...]) -> None:
@@ -107,7 +109,9 @@ def test_languages(encoding: str, header: str) -> None:
         ("kg", 1 / 9.80665),
     ],
 )
-@pytest.mark.parametrize(("length", "per_metre"), [("mm", 1e3), ("cm", 1e2), ("m", 1.0), ("in", 1 / 0.0254), ("µm", 1e6)])
+@pytest.mark.parametrize(
+    ("length", "per_metre"), [("mm", 1e3), ("cm", 1e2), ("m", 1.0), ("in", 1 / 0.0254), ("µm", 1e6)]
+)
 def test_units_in_a_second_row(unit: str, per_newton: float, length: str, per_metre: float) -> None:
     heads = ("Time,Displacement,Force", f"min,{length},{unit}")
     text = lines(heads, TIME / 60, per_metre * TRAVEL, per_newton * FORCE, form="%.12g")
@@ -133,7 +137,9 @@ def test_strain_and_stress(name: str, values: np.ndarray, unit: str, pascal: flo
     same_stretch(imported(text.encode()))
 
 
-@pytest.mark.parametrize("header", ["Wahre Spannung [MPa]", "True Stress (MPa)", "Contrainte vraie (MPa)", "真实应力(MPa)"])
+@pytest.mark.parametrize(
+    "header", ["Wahre Spannung [MPa]", "True Stress (MPa)", "Contrainte vraie (MPa)", "真实应力(MPa)"]
+)
 def test_true_stress_is_divided_by_the_stretch(header: str) -> None:
     text = lines(f"Strain (%);{header}", 100 * (STRETCH - 1), 1e-6 * STRESS * STRETCH, sep=";", form="%.12g")
     found = imported(text.encode())
@@ -142,7 +148,9 @@ def test_true_stress_is_divided_by_the_stretch(header: str) -> None:
 
 
 def test_true_strain_is_told_by_the_travel() -> None:
-    text = lines("Extension (mm),Strain (%),Stress (MPa)", 1e3 * TRAVEL, 100 * np.log(STRETCH), 1e-6 * STRESS, form="%.9g")
+    text = lines(
+        "Extension (mm),Strain (%),Stress (MPa)", 1e3 * TRAVEL, 100 * np.log(STRETCH), 1e-6 * STRESS, form="%.9g"
+    )
     found = imported(text.encode())
     same_stretch(found)
     assert any(g.what == "strain" and "is true" in g.value for g in found.guesses)
@@ -170,7 +178,7 @@ def test_thousands_with_points() -> None:
 
 
 PREAMBLES = {
-    "english": 'Specimen name:,film 3\nGauge length (mm),50\nWidth,10,mm\nThickness,0.5 mm\nTest speed,100,mm/min\n\n',
+    "english": "Specimen name:,film 3\nGauge length (mm),50\nWidth,10,mm\nThickness,0.5 mm\nTest speed,100,mm/min\n\n",
     "german": "Probenbezeichnung;film 3\nMesslänge;50;mm\nProbenbreite b0;10;mm\nProbendicke a0;0,5;mm\n",
     "french": "Éprouvette;film 3\nLongueur initiale;50;mm\nLargeur;10;mm\nÉpaisseur;0,5;mm\n",
     "spanish": "Muestra;film 3\nLongitud calibrada;50;mm\nAnchura;10;mm\nEspesor;0,5;mm\n",
@@ -218,7 +226,9 @@ def test_compression_and_zero() -> None:
 def test_blank_lines_comments_and_empty_columns() -> None:
     text = lines("# Time [s];;Weg [mm];Kraft [N];", TIME, TIME, 1e3 * TRAVEL, FORCE, sep=";")
     rows = text.split("\n")
-    spaced = "\n\n".join([rows[0], *(";".join([*r.split(";")[:1], "", *r.split(";")[2:], ""]) for r in rows[1:] if r), ""])
+    spaced = "\n\n".join(
+        [rows[0], *(";".join([*r.split(";")[:1], "", *r.split(";")[2:], ""]) for r in rows[1:] if r), ""]
+    )
     same_force(imported(spaced.encode()))
 
 

@@ -167,7 +167,14 @@ def test_a_reading_that_jumps_is_reported() -> None:
 def test_every_guess_is_said() -> None:
     found = imported(lines("Position (mm);Strain (%);Force (N)", MM - 40, 2 * MM, FORCE, sep=";").encode(), **STRIP)
     said = {g.what: g for g in found.guesses}
-    assert {"encoding", "delimiter", "decimal sign", "column of travel", "column of force", "zero of the travel"} <= set(said)
+    assert {
+        "encoding",
+        "delimiter",
+        "decimal sign",
+        "column of travel",
+        "column of force",
+        "zero of the travel",
+    } <= set(said)
     assert all(g.why and g.value for g in found.guesses)
     assert {g.option.split()[0] for g in found.guesses} <= {
         "--encoding",

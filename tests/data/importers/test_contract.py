@@ -35,7 +35,7 @@ def test_it_reads_its_example(importer: type[Importer]) -> None:
     need = next(c for c in curves if c <= set(found.columns))
     n = len(found.columns[min(need)])
     assert n >= 2
-    assert set(found.columns) - need <= {"time", "force_sd"}
+    assert set(found.columns) - need <= {"time", "force_sd", "cycle", "direction"}
     assert all(np.shape(v) == (n,) and np.all(np.isfinite(v)) for v in found.columns.values())
     assert "export" in found.origin
     assert all(g.what and g.value and g.why for g in found.guesses)
