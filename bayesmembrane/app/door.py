@@ -18,7 +18,7 @@ from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.exports.hints import hints_of
 from bayesmembrane.data.importers.base import read_export
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.reading import read_measurement
+from bayesmembrane.data.reading import read_measurement as read_files
 from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
@@ -36,7 +36,7 @@ Folder = str | Path
 
 def read(curve: Folder, specimen: Folder) -> Measurement:
     """The measured curve (CSV) of a specimen (TOML), in SI; raises `DataError` that says what is wrong where."""
-    return read_measurement(Path(curve), Path(specimen))
+    return read_files(Path(curve), Path(specimen))
 
 
 def read_measurement(export: Folder, specimen: Folder | None = None, **said: Any) -> Measurement:

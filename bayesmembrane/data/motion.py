@@ -140,7 +140,7 @@ def first_loading(deflection: Array, leg: NDArray[np.int8]) -> NDArray[np.bool_]
 
 
 def reached(deflection: Array) -> Array:
-    """(N,) m: the largest deflection so far. In a long record no single reading sets it that neither neighbour bears out."""
+    """(N,) m: the largest deflection so far. In a long record no single reading sets it alone."""
     if deflection.size < LONG:
         return np.maximum.accumulate(deflection)
     before, here, after = deflection[:-2], deflection[1:-1], deflection[2:]
@@ -149,7 +149,7 @@ def reached(deflection: Array) -> Array:
 
 
 def _leaves(deflection: Array, start: int, tolerance: float) -> int:
-    """The first reading after ``start`` that is farther from it than the tolerance, or their number; looks no further."""
+    """The first reading after ``start`` that is farther from it than the tolerance, or their number."""
     low, step = start, 4 * HELD
     while low < deflection.size:
         away = np.flatnonzero(np.abs(deflection[low : low + step] - deflection[start]) > tolerance)
@@ -226,7 +226,7 @@ def check_order(deflection: Array, places: list[str]) -> None:
 
 
 def jitter(deflection: Array) -> float:
-    """m, of deflections (N,) m: less is no movement. In a long record it is no less than its noise can make of nothing."""
+    """m, of deflections (N,) m: less is no movement; in a long record, what noise alone can make."""
     reach = float(np.max(deflection) - np.min(deflection))
     if deflection.size < LONG:
         return REVERSAL * reach

@@ -115,7 +115,7 @@ def curve_columns(
     noise: Mapping[str, str] = Fixture.noise,
     phases: Mapping[str, str] = MappingProxyType({}),
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """The columns of a curve in SI, (N,) each, by name: ``required`` ones, time, ``noise`` and ``phases``; a note on the others.
+    """The columns of a curve in SI, (N,) each, by name: ``required``, time, ``noise``, ``phases``; a note on the rest.
 
     They map names to quantities. Raises `DataError` if one is missing or holds what is no number, and for
     fewer than two points.

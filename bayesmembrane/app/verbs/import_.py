@@ -120,4 +120,5 @@ def _sentence(written: Written) -> str:
     done = f"{written.n_points} points read as {written.importer}, written to {written.curve}"
     if not written.complete:
         return f"{done}; complete {written.specimen} with the film and the rig before using them."
-    return f"{done}, film and rig to {written.specimen}; next: bayesmembrane fit {written.curve} --specimen {written.specimen} --material yeoh"
+    following = f"bayesmembrane fit {written.curve} --specimen {written.specimen} --material yeoh"
+    return f"{done}, film and rig to {written.specimen}; next: {following}"

@@ -20,7 +20,7 @@ ABOVE = 4
 class Column(NamedTuple):
     """A column: where it stands, its header as it is, its name and its unit ("" if the file names none)."""
 
-    index: int
+    at: int
     header: str
     name: str
     unit: str
@@ -34,6 +34,7 @@ class Block:
     columns : what stands above them
     header : row of the names, None if there are none
     label : what the file calls these readings, "" if nothing
+    numbers : in which columns of the sheet its rows have numbers
     """
 
     sheet: Sheet
@@ -41,6 +42,7 @@ class Block:
     columns: tuple[Column, ...]
     header: int | None
     label: str = ""
+    numbers: frozenset[int] = frozenset()
 
     @property
     def width(self) -> int:
@@ -76,7 +78,7 @@ def blocks_of(sheet: Sheet) -> list[Block]:
     for k, run in enumerate(runs):
         above = runs[k - 1].stop if k else 0
         header, columns, label = _above(sheet, run, above)
-        block = Block(sheet, range(run.start, run.stop), columns, header, label)
+        block = Block(sheet, range(run.start, run.stop), columns, header, label, run.at)
         before = found[-1] if found else None
         if before is not None and k and header is None and _goes_on(runs[k - 1], run):
             _refuse_text(sheet, runs[k - 1].stop)
@@ -124,7 +126,7 @@ def _above(sheet: Sheet, run: _Run, top: int) -> tuple[int | None, tuple[Column,
     if row >= top and _is_units(sheet.cells(row)):
         units, row = row, row - 1
     names = next((r for r in range(row, max(top, row - ABOVE) - 1, -1) if _knows(sheet.cells(r))), None)
-    if names is None and row >= top and sum(1 for c in sheet.cells(row) if c != "") >= 2:
+    if names is None and row >= top and _could_name(sheet.cells(row)):
         names = row
     if names is not None and units is None and names - 1 >= top and _is_units(sheet.cells(names - 1)):
         units = names - 1
@@ -177,6 +179,12 @@ def _knows(cells: Sequence[Cell]) -> bool:
     return known >= 2
 
 
+def _could_name(cells: Sequence[Cell]) -> bool:
+    """True for two words or more and no number."""
+    full = [c for c in cells if c != ""]
+    return len(full) >= 2 and not any(isinstance(c, float) or like_number(c) for c in full)
+
+
 def _label(sheet: Sheet, names: int | None, top: int) -> str:
     """What stands above the names, if it is one word for all columns."""
     if names is None or names - 1 < top:
@@ -200,7 +208,7 @@ def _joined(blocks: list[Block]) -> list[Block]:
 def _pages(first: Block, second: Block) -> bool:
     """Whether the time goes on from the one to the other."""
     sheet = first.sheet
-    at = next((c.index for c in first.columns if reading_of(c.name).role == "time"), None)
+    at = next((c.at for c in first.columns if reading_of(c.name).role == "time"), None)
     if at is None:
         return False
     before, after = (_padded(sheet.cells(r), at + 1)[at] for r in (first.rows[-1], second.rows[0]))
@@ -223,12 +231,12 @@ def _side_by_side(block: Block) -> list[Block]:
 
 def _group_labels(block: Block, groups: list[tuple[Column, ...]]) -> list[str]:
     if block.header is None or block.header == 0:
-        return [f"columns {g[0].index + 1} to {g[-1].index + 1}" for g in groups]
-    above = _padded(block.sheet.cells(block.header - 1), groups[-1][-1].index + 1)
-    labels = [next((str(above[c.index]) for c in g if above[c.index] != ""), "") for g in groups]
+        return [f"columns {g[0].at + 1} to {g[-1].at + 1}" for g in groups]
+    above = _padded(block.sheet.cells(block.header - 1), groups[-1][-1].at + 1)
+    labels = [next((str(above[c.at]) for c in g if above[c.at] != ""), "") for g in groups]
     if len(set(labels)) == len(labels) and all(labels):
         return labels
-    return [f"columns {g[0].index + 1} to {g[-1].index + 1}" for g in groups]
+    return [f"columns {g[0].at + 1} to {g[-1].at + 1}" for g in groups]
 
 
 # ---- what the rest says ----------------------------------------------------------------------------------------------
@@ -283,7 +291,7 @@ def _of_line(sheet: Sheet, row: int) -> Iterator[Fact | str]:
 
 
 def _of_table(sheet: Sheet, row: int, label: str) -> Iterator[Fact]:
-    """Facts of a table of results: names in this row, units in it or below, one line of values, or that of ``label``."""
+    """Facts of a table of results: names in this row, units in it or below, one line of values or ``label``'s."""
     cells = sheet.cells(row)
     wanted = {j: fact_of(c) for j, c in enumerate(cells) if isinstance(c, str) and c and fact_of(c)}
     if not wanted or row + 1 >= len(sheet) or sum(isinstance(c, str) and c != "" for c in cells) < 2:

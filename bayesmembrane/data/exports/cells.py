@@ -53,6 +53,10 @@ class Marks:
         return value if abs(value) <= LARGEST else None
 
 
+POINT = Marks()
+"""Numbers with a decimal point."""
+
+
 def like_number(cell: Cell) -> bool:
     """True for a cell that is a number under some decimal sign."""
     return isinstance(cell, float) or bool(_LIKE_NUMBER.fullmatch(cell.translate(_MINUS)))

@@ -1,4 +1,4 @@
-"""Which column is the time, which the travel, which the force, and in which unit: said, named by the file, or refused."""
+"""Which column is the time, the travel, the force, and in which unit: said, named by the file, or refused."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Candidate:
 
     @property
     def kind(self) -> str:
-        """ "true", "engineering" or ""."""
+        """`TRUE`, `ENGINEERING` or "" if the name does not say."""
         return self.reading.kind
 
 
@@ -91,12 +91,12 @@ def best(found: Sequence[Candidate], role: str, block: Block, kind: str | None =
     top = max(c.score for c in of_role)
     equal = [c for c in of_role if c.score == top]
     if len(equal) > 1 and not _alike(equal, block):
-        names = " and ".join(f'"{c.column.header or c.column.index + 1}"' for c in equal[:4])
+        names = " and ".join(f'"{c.column.header or c.column.at + 1}"' for c in equal[:4])
         first = equal[0].column
         raise DataError(
             f"the columns {names} may each be the {role}",
             block.place,
-            f'say which, --columns "{role}={first.header or first.index + 1}"',
+            f'say which, --columns "{role}={first.header or first.at + 1}"',
         )
     return equal[0]
 
@@ -116,7 +116,7 @@ def read(block: Block, chosen: Candidate, rows: Sequence[int], hints: Hints) -> 
 
 def trimmed(block: Block, chosen: Iterable[Candidate]) -> Sequence[int]:
     """The rows of a block without those at its end in which no chosen column has anything: others go on there."""
-    at = [c.column.index for c in chosen]
+    at = [c.column.at for c in chosen]
     rows, end = block.rows, len(block.rows)
     while end > 0 and not any(_at(block.sheet.cells(rows[end - 1]), j) for j in at):
         end -= 1
@@ -137,7 +137,7 @@ def _check_width(block: Block, rows: Sequence[int]) -> None:
 
 def guess_of(role: str, chosen: Candidate, hints: Hints) -> list[Guess]:
     """What was taken for a role, in which unit, and why."""
-    header = chosen.column.header or f"column {chosen.column.index + 1}"
+    header = chosen.column.header or f"column {chosen.column.at + 1}"
     said = bool(hints.columns)
     why = "--columns says so" if said else "its name says so" if chosen.score > 3 else "it alone has such a unit"
     return [Guess(f"column of {role}", f'"{header}" in {chosen.unit or "1"}', why, f"--columns {role}=...")]
@@ -210,9 +210,9 @@ def _pointed(text: str, block: Block) -> Column:
     """The column that a header or a number from 1 names."""
     exact = [c for c in block.columns if text.lower() in (c.header.lower(), c.name.lower())]
     if not exact and text.isdecimal():
-        exact = [c for c in block.columns if c.index == int(text) - 1]
+        exact = [c for c in block.columns if c.at == int(text) - 1]
     if len(exact) != 1:
-        shown = ", ".join(c.header or str(c.index + 1) for c in block.columns[:12])
+        shown = ", ".join(c.header or str(c.at + 1) for c in block.columns[:12])
         fault = "stands there more than once" if exact else "is none of its columns"
         raise SettingsError(f'"{text}" in --columns {fault}', remedy=f"name one of {shown}, or say its number from 1")
     return exact[0]
@@ -220,8 +220,8 @@ def _pointed(text: str, block: Block) -> Column:
 
 def _replaced(found: list[Candidate], said: dict[str, Column], hints: Hints) -> list[Candidate]:
     roles = {_role(name): column for name, column in said.items()}
-    taken = {column.index for column in roles.values()}
-    rest = [c for c in found if c.column.index not in taken and c.role not in {r for r, _ in roles}]
+    taken = {column.at for column in roles.values()}
+    rest = [c for c in found if c.column.at not in taken and c.role not in {r for r, _ in roles}]
     out = []
     for (role, kind), column in roles.items():
         unit = _unit(column, role, hints)
@@ -233,12 +233,12 @@ def _replaced(found: list[Candidate], said: dict[str, Column], hints: Hints) -> 
 
 def _alike(equal: Sequence[Candidate], block: Block) -> bool:
     """Whether columns hold the same numbers, so that it does not matter which is taken."""
-    columns = [[_at(block.sheet.cells(r), c.column.index) for r in block.rows] for c in equal]
+    columns = [[_at(block.sheet.cells(r), c.column.at) for r in block.rows] for c in equal]
     return all(c == columns[0] for c in columns[1:]) and len({c.unit for c in equal}) == 1
 
 
 def _refuse_unit(chosen: Candidate, block: Block) -> None:
-    header = chosen.column.header or f"column {chosen.column.index + 1}"
+    header = chosen.column.header or f"column {chosen.column.at + 1}"
     example = {TIME: "s", TRAVEL: "mm", FORCE: "N", STRESS: "MPa", STRAIN: "percent"}.get(chosen.role, "1")
     named_unit = f', and "{chosen.column.unit}" is none of it' if chosen.column.unit else ""
     fault = f'the column "{header}" names no unit of {QUANTITY[chosen.role]}{named_unit}'
@@ -257,13 +257,13 @@ def _numbers(block: Block, column: Column, rows: Sequence[int]) -> tuple[Array, 
     sheet, marks = block.sheet, block.sheet.marks
     out = np.empty(len(rows))
     plain_large = grouped = -1
-    first = _at(sheet.cells(rows[0]), column.index) if rows else ""
+    first = _at(sheet.cells(rows[0]), column.at) if rows else ""
     is_clock = clock(first) is not None
     for k, row in enumerate(rows):
-        cell = _at(sheet.cells(row), column.index)
+        cell = _at(sheet.cells(row), column.at)
         value = clock(cell) if is_clock else marks.number(cell)
         if value is None:
-            raise _no_number(cell, f"{sheet.place(row)}, column {column.header or column.index + 1}", marks.decimal)
+            raise _no_number(cell, f"{sheet.place(row)}, column {column.header or column.at + 1}", marks.decimal)
         out[k] = value
         if isinstance(cell, str) and abs(value) >= 1000 and not is_clock:
             if any(c in cell for c in ("." if marks.decimal == "," else ",", " ", "'", "\u00a0", "\u202f")):
@@ -271,7 +271,7 @@ def _numbers(block: Block, column: Column, rows: Sequence[int]) -> tuple[Array, 
             elif "e" not in cell.lower():
                 plain_large = row
     if grouped >= 0 and plain_large >= 0:
-        cell = _at(sheet.cells(grouped), column.index)
+        cell = _at(sheet.cells(grouped), column.at)
         fault = f'"{cell}" has a sign between thousands, and other numbers of its column have none'
         raise DataError(fault, f"{sheet.place(grouped)}, column {column.header}", "correct it, or say --decimal")
     return out, is_clock

@@ -21,6 +21,10 @@ class Film:
     speed: float | None = None
 
 
+UNKNOWN = Film()
+"""Nothing is known of the specimen."""
+
+
 class Telling(Protocol):
     """Who keeps what is said on the way."""
 
@@ -70,7 +74,8 @@ def _from_area(value: dict[str, float | None], fact: Fact | None, telling: Telli
     if thickness and width:
         if abs(thickness * width / area - 1) > 0.01:
             telling.contradict(
-                f'width times thickness is {1e6 * thickness * width:.5g} mm2, and "{fact.words}" ({fact.place}) is another area'
+                f'width times thickness is {1e6 * thickness * width:.5g} mm2, and "{fact.words}" ({fact.place}) '
+                "is another area"
             )
     elif thickness or width:
         missing = "width" if thickness else "thickness"

@@ -11,7 +11,7 @@ from bayesmembrane.ground.units import to_si
 
 
 class Guess(NamedTuple):
-    """Something that the file does not say outright: ``what`` was taken as ``value``, ``why``, and what overrides it."""
+    """Something that the file does not say outright: ``what`` is taken as ``value``, ``why``, and an override."""
 
     what: str
     value: str

@@ -12,8 +12,10 @@ from bayesmembrane.ground.parameters import Array
 APART = 0.02
 """Two columns contradict each other where they differ by more than this part of the larger one's range."""
 SPEED_APART = 0.10
-JUMP = 0.3
-"""A single reading this part of the range away from both its neighbours, which agree, is no reading of a film."""
+JUMP, STEPS = 0.02, 5.0
+"""A reading that leaves its neighbours by this part of the range, and so many times the usual step, and comes back."""
+REGULAR, SKIPS = 0.01, 5
+"""Times whose steps differ by no more than this part are regular, and so few steps of twice the size are gaps."""
 
 
 def apart(what: str, said: Array, other: Array, lines: Sequence[int], tolerance: float = APART) -> str:
@@ -74,13 +76,29 @@ def jumps(what: str, values: Array, lines: Sequence[int]) -> str:
     """A sentence on readings that leave their neighbours and come back at once; "" if there are none."""
     if values.size < 20:
         return ""
-    before, here, after = values[:-2], values[1:-1], values[2:]
-    reach = np.ptp(np.delete(values, np.argmax(np.abs(values - np.median(values)))))
-    away = np.minimum(np.abs(here - before), np.abs(here - after))
-    bad = 1 + np.flatnonzero((away > JUMP * reach) & (np.abs(after - before) < 0.25 * away))
+    step = np.abs(np.diff(values))
+    reach = float(np.ptp(np.sort(values)[1:-1]))
+    least = max(STEPS * float(np.quantile(step, 0.9)), JUMP * reach)
+    inner = (np.minimum(step[:-1], step[1:]) > least) & (
+        np.abs(values[2:] - values[:-2]) < 0.5 * np.minimum(step[:-1], step[1:])
+    )
+    bad = np.flatnonzero(np.concatenate([[step[0] > least], inner, [step[-1] > least]]))
     if bad.size == 0:
         return ""
     named = ", ".join(f"{lines[k]}" for k in bad[:5]) + (" and more" if bad.size > 5 else "")
     return (
         f"the {what} leaves its neighbours and comes back at once in line {named}: damaged, or an event of the machine"
     )
+
+
+def gaps(time: Array, lines: Sequence[int]) -> str:
+    """A sentence on times that go on in equal steps and skip one here and there; "" if they do not."""
+    step = np.diff(time)
+    if step.size < 20:
+        return ""
+    low, usual, high = np.quantile(step, (0.1, 0.5, 0.9)).tolist()
+    wide = np.flatnonzero(step > 1.9 * usual)
+    if high - low > REGULAR * usual or not 0 < wide.size <= SKIPS:
+        return ""
+    named = ", ".join(f"{lines[k]}" for k in wide)
+    return f"the times go on in steps of {usual:.4g} s and skip more after line {named}: lines may be missing"

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from bayesmembrane.data.exports.cells import Cell, Marks, evidence, like_number
+from bayesmembrane.data.exports.cells import POINT, Cell, Marks, evidence, like_number
 from bayesmembrane.data.exports.hints import Guess, Hints
 from bayesmembrane.data.exports.words import fact_of, named, reading_of
 from bayesmembrane.ground.errors import DataError, SettingsError
@@ -42,7 +42,7 @@ class Sheet:
     lines: Sequence[int]
     raw: Sequence[str | Sequence[Cell]]
     delimiter: str = ","
-    marks: Marks = Marks()
+    marks: Marks = POINT
 
     def __len__(self) -> int:
         """The number of rows."""
@@ -114,7 +114,7 @@ def workbook_sheets(data: bytes, file: str) -> list[Sheet]:
     return [_sheet_of(file, name, rows) for name, rows in found]
 
 
-def _sheet_of(file: str, name: str, rows: list[list[object]]) -> Sheet:
+def _sheet_of(file: str, name: str, rows: Sequence[Sequence[object]]) -> Sheet:
     kept = [(k, [_cell(c) for c in row]) for k, row in enumerate(rows, 1) if any(c != "" for c in row)]
     return Sheet(file, name, [k for k, _ in kept], [r for _, r in kept])
 

@@ -84,8 +84,8 @@ FACTS = {
 }
 _FACT = {name: re.compile(rf"(?<![a-z])(?:{words})(?![a-z0-9])") for name, (_, words) in FACTS.items()}
 NAME = re.compile(
-    r"(?:specimen|sample)(?: (?:name|id|label|designation|identifier))?|probenbezeichnung|probe|probenname|aktuelle probe"
-    r"|eprouvette|nom de l eprouvette|probeta|muestra|probka|试样|试样名称|样品"
+    r"(?:specimen|sample)(?: (?:name|id|label|designation|identifier))?|probenbezeichnung|probe|probenname"
+    r"|aktuelle probe|eprouvette|nom de l eprouvette|probeta|muestra|probka|试样|试样名称|样品"
 )
 COMPRESSION = re.compile(r"compress\w*|druckversuch|druckl?versuch|stauch\w*|compresion|sciskanie|压缩")
 

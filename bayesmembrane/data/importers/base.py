@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import tomli_w
 
 from bayesmembrane.data.exports.curve import curve_of
-from bayesmembrane.data.exports.film import Film
+from bayesmembrane.data.exports.film import UNKNOWN, Film
 from bayesmembrane.data.exports.hints import Guess, Hints
 from bayesmembrane.data.exports.sheets import Sheet, is_workbook, text_sheet, workbook_sheets
 from bayesmembrane.data.measurement import Measurement
@@ -79,7 +79,7 @@ class Imported:
     notes: tuple[str, ...] = field(default=())
     guesses: tuple[Guess, ...] = ()
     contradictions: tuple[str, ...] = ()
-    film: Film = Film()
+    film: Film = UNKNOWN
     rig: str = ""
 
 
@@ -115,7 +115,7 @@ class Importer(ABC):
 
 
 class TableImporter(Importer):
-    """Reads tables of numbers below their names. A subclass says how it knows its layout, and may prepare the sheets."""
+    """Reads tables of numbers below their names. A subclass says how it knows its layout."""
 
     @staticmethod
     def read(data: bytes, file: str) -> Imported:

@@ -1,4 +1,4 @@
-"""CellScale UniVert (one axis) and BioTester (two axes): ``Time_S,XSize_um,YSize_um,XDisplacement_um,...,XForce_mN``."""
+"""CellScale UniVert (one axis) and BioTester (two axes): ``Time_S,XSize_um,XDisplacement_um,...,XForce_mN``."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _TWO = re.compile(r"XForce_\w+.*YForce_\w+|YForce_\w+.*XForce_\w+", re.IGNORECAS
 
 
 class CellScale(TableImporter):
-    """Of two axes: stretch = 1 + displacement / size at the first reading, stress = force / (size across x thickness)."""
+    """Of two axes: stretch = 1 + displacement / size at first, stress = force / (size across x thickness)."""
 
     name: ClassVar[str] = "cellscale"
     title: ClassVar[str] = "CellScale UniVert and BioTester text"

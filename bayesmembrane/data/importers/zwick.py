@@ -8,7 +8,8 @@ from typing import ClassVar
 from bayesmembrane.data.importers.base import TableImporter, head
 
 _WORDS = re.compile(
-    r"testxpert|\"Standard ?(?:weg|kraft|travel|force|course)|\"(?:Course|Force|Allongement|Recorrido|Fuerza) (?:standard|est)",
+    r"testxpert|\"Standard ?(?:weg|kraft|travel|force|course)"
+    r"|\"(?:Course|Force|Allongement|Recorrido|Fuerza) (?:standard|est)",
     re.IGNORECASE,
 )
 

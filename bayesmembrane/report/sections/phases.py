@@ -1,4 +1,4 @@
-"""What was done to the film: loading, unloading and standing, cycle by cycle, and which of it was read off the curve."""
+"""What was done to the film: loading, unloading and standing, cycle by cycle, and what of it was read off."""
 
 from __future__ import annotations
 

@@ -81,8 +81,8 @@ def damages(draw: st.DrawFn, name: str) -> tuple[str, bytes]:
 class Verdict:
     """What became of a damaged file.
 
-    outcome : "refused", "same", "fewer rows", "damaged rows only", "another scale or column", or a fault: "traceback", "hang",
-        "not finite", "refused without the file"
+    outcome : "refused", "same", "fewer rows", "damaged rows only", "sizes lost" (it is no strip any more), "another
+        scale or column", or one of `FAULTS`
     said : the import reported a contradiction or left something aside
     seconds : that it took
     detail : for people
@@ -130,7 +130,7 @@ def compared(found: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray]) -
     """How the columns of a damaged file differ from those of the whole one."""
     names = [n for n in truth if n != "time"] if "time" not in found else list(truth)
     if any(n not in found for n in names if n not in ("cycle", "direction")):
-        return "another scale or column"
+        return "sizes lost"
     names = [n for n in names if n in found]
     a, b = (np.stack([c[n] / np.max(np.abs(truth[n])) for n in names], axis=1) for c in (found, truth))
     if a.shape == b.shape and np.allclose(a, b, rtol=1e-9, atol=1e-12):

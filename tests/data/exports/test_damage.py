@@ -1,4 +1,4 @@
-"""A damaged export is refused in a sentence, or read; it never ends in a traceback, hangs, or gives what is no number."""
+"""A damaged export is refused in a sentence, or read: no traceback, no hang, nothing that is no number."""
 
 import pytest
 from hypothesis import given, settings

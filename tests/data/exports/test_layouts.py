@@ -1,7 +1,6 @@
 """One film, written as many machines would: every spelling gives the same curve in SI."""
 
 import itertools
-from pathlib import Path
 
 import numpy as np
 import pytest

@@ -1,3 +1,4 @@
+# ruff: noqa: E501 - a line for each file
 """What an export leaves open is refused with its place and the option that settles it, or said; nothing is invented."""
 
 import numpy as np
