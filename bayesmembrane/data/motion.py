@@ -14,7 +14,7 @@ from bayesmembrane.ground.parameters import Array
 
 REVERSAL = 0.005
 """A reversal of the deflection counts as a new leg beyond this part of the whole range; less is jitter."""
-LONG, SWINGS, MOST_JITTER = 200, 10.0, 0.05
+LONG, SWINGS, MOST_JITTER = 200, 12.0, 0.05
 """From so many readings on the noise of the deflections is asked for: legs turn where they leave an extreme by so many
 standard deviations (two extremes of 200 000 readings lie nine apart), but by no more than this part of the range."""
 HELD, STILL = 12, 0.1

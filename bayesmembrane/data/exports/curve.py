@@ -149,7 +149,7 @@ def _time(export: Export) -> Array | None:
             f"(lines {lines[0]} to {lines[-1]})"
         )
     export.rows = [r for r, again in zip(export.rows, same, strict=True) if not again]
-    return found.values[~same]
+    return np.asarray(found.values[~same])
 
 
 def _checked_order(export: Export, columns: Mapping[str, Array]) -> None:

@@ -100,5 +100,5 @@ def gaps(time: Array, lines: Sequence[int]) -> str:
     wide = np.flatnonzero(step > 1.9 * usual)
     if high - low > REGULAR * usual or not 0 < wide.size <= SKIPS:
         return ""
-    named = ", ".join(f"{lines[k]}" for k in wide)
+    named = ", ".join(f"{lines[k]}" for k in wide.tolist())
     return f"the times go on in steps of {usual:.4g} s and skip more after line {named}: lines may be missing"

@@ -58,7 +58,7 @@ def _two_axes(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: list[Gu
         raise DataError("there are no lines of numbers", file, "export the readings again")
     size = {axis: float(_column(block, f"{axis}size", hints)[0]) for axis in "xy"}
     columns: dict[str, Array] = {}
-    for k, (axis, across) in enumerate(("xy", "yx"), 1):
+    for k, (axis, across) in enumerate((("x", "y"), ("y", "x")), 1):
         if size[across] <= 0:
             raise DataError(f"the size {across.upper()} is not positive", block.place, "check the file")
         columns[f"stretch_{k}"] = 1.0 + _column(block, f"{axis}displacement", hints) / size[axis]
