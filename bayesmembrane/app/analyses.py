@@ -89,9 +89,9 @@ def fit(
     found = run_fit(measurement, claim, loss=loss, seed=work.seed, starts=starts)
     settings = {"seed": work.seed, "loss": loss, "starts": [list(s) for s in starts]}
     what = asked("fit", run_fit, [measurement], [claim], settings)
-    answer = kept("fit", found, document(found), what, work.out)
-    _keep_phases(measurement, answer.folder)
-    return answer
+    if work.out is not None:
+        _keep_phases(measurement, work.out / what.name)
+    return kept("fit", found, document(found), what, work.out)
 
 
 def sample(
@@ -123,10 +123,10 @@ def sample(
     return Answer(run, {**document(run), "stored": None if run.path is None else str(run.path)})
 
 
-def _keep_phases(measurement: Measurement, folder: Path | None) -> None:
+def _keep_phases(measurement: Measurement, folder: Path) -> None:
     """What was done to the film, beside the answer about it, if it was more than one pull."""
-    found = None if folder is None else phases_of(measurement)
-    if folder is not None and found is not None:
+    found = phases_of(measurement)
+    if found is not None:
         store(folder, "phases", found, {"phases": len(found.parts), "cycles": int(found.cycle.max())})
 
 
