@@ -156,10 +156,12 @@ class FormThresholds:
     """Standard deviations of the prior to either side within which the most probable size is looked for."""
     iterations: int = 60
     """Of that search."""
-    tolerance: float = 1e-9
-    """Relative change of ln p at which it ends."""
-    step: float = 1e-2
-    """In ln of a size: of the differences that make the curvature."""
+    tolerance: float = 1e-5
+    """In ln p: it ends where a step promises less."""
+    largest_step: float = 2.0
+    """In ln of a size: of that search."""
+    halvings: int = 20
+    """Of a step that gains nothing, at most."""
     least_curvature: float = 0.25
     """Of that of the prior: a flatter place is one where Laplace's approximation does not hold."""
     far_bound: float = 6.0

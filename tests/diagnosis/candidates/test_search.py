@@ -88,7 +88,7 @@ def test_evidence_equals_importance_sampling(cyclic, name) -> None:
     own = covariance[:k, :k]
     inside = log_inside(mean[:k], own, low / spread, high / spread)
     replaced = axes.log_replaced(u, mean[:k] * spread, np.diag(own) * spread**2)
-    linear = model.log_density(found.theta)[0] + replaced + inside
+    linear = model.log_density(found.theta).value + replaced + inside
     prior_of_sizes = norm.logpdf(found.theta, model.priors[:, 0], model.priors[:, 1]).sum()
 
     law = multivariate_t(mean[:k] * spread, 1.5 * own * np.outer(spread, spread), df=4, seed=8, allow_singular=True)
