@@ -110,6 +110,10 @@ class SearchThresholds:
 
     iterations: int = 40
     """Steps of a search, at most."""
+    draws: int = 512
+    """Of the material's prior, that the first searches' starts are chosen from."""
+    readings: int = 24
+    """By which they are chosen: a film without effects needs no more."""
     material_starts: int = 3
     """Draws of the material's prior that searches start from, besides the model's own fit."""
     small_share: float = 0.1
@@ -122,7 +126,7 @@ class SearchThresholds:
     """Of the sum of squares: searches whose steps gain less are near enough, for the linear model knows the rest."""
     least_form: float = 1e-2
     """Of the noise: what the form error does below it is nothing."""
-    given_up: float = 4.0
+    given_up: float = 1.03
     """Times the least sum of squares: a search as far behind is not waited for."""
     at_bound: float = 1e-3
     """Of the width of the bounds: an estimate as near lies at its bound."""

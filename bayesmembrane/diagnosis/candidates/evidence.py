@@ -65,8 +65,8 @@ class Linear:
     ln_scale_sd: float
 
     def __post_init__(self) -> None:
-        if not np.all(np.isfinite(self._products[0])):
-            raise np.linalg.LinAlgError("the columns of a linear model are not all numbers")
+        if not all(np.all(np.isfinite(p)) for p in self._products):
+            raise np.linalg.LinAlgError("the data or the columns of a linear model are not all numbers")
 
     @cached_property
     def _columns(self) -> Array:

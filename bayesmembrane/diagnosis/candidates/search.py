@@ -72,14 +72,21 @@ class Search:
         """The solver without its last resort: films that only shooting resolves cost a hundred times as much."""
         return api.unaided(asked, self.solve)
 
+    @cached_property
+    def _few(self) -> Measurement:
+        """Readings spread over the measured deflections."""
+        order = np.argsort(self.measurement.deflection, kind="stable")
+        rows = np.linspace(0, order.size - 1, min(order.size, SEARCH.readings)).round().astype(int)
+        return self.measurement.select(np.sort(order[rows]))
+
     def material_starts(self, hypothesis: Hypothesis) -> list[Array]:
         """Starts (k,) from draws of the material's prior brought to their best modulus, without any effect.
 
         The plain model bends the material until it imitates what is missing: searches must not only start there.
         """
         plain = replace(hypothesis, effects=())
-        objective = Objective(plain, self.measurement, "euclidean", self.quick)
-        pool, _ = objective.pool(np.random.default_rng(self.seed))
+        objective = Objective(plain, self._few, "euclidean", self.quick)
+        pool, _ = objective.pool(np.random.default_rng(self.seed), SEARCH.draws)
         nothing = np.concatenate([np.empty(0), *(e.null for e in hypothesis.effects)])
         return [np.concatenate([x, nothing]) for x in separated(pool, objective.spread, SEARCH.material_starts)]
 
@@ -179,9 +186,11 @@ class Search:
             usual = np.array([b.ln_eta[0] for b in forms if b.ln_eta is not None])
             eta = np.exp(np.minimum(parent.theta[1:], usual) if capped else parent.theta[1:])
             columns = np.column_stack([e * b.columns for e, b in zip(eta, forms, strict=True)])
-        q, s, _ = np.linalg.svd(columns, full_matrices=False)
-        keep = s > SEARCH.least_form
-        return Freeing(self.noise, q[:, keep], 1 - 1 / np.sqrt(1 + s[keep] ** 2))
+        # From the products: LAPACK's decomposition of the columns themselves fails where some are next to nothing.
+        square, v = np.linalg.eigh(columns.T @ columns)
+        keep = square > SEARCH.least_form**2
+        q = columns @ (v[:, keep] / np.sqrt(square[keep]))
+        return Freeing(self.noise, q, 1 - 1 / np.sqrt(1 + square[keep]))
 
     # ---- one fit -------------------------------------------------------------------------------------------------
 
