@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import repeat
 
 import numpy as np
 
@@ -166,8 +167,8 @@ class Search:
 
     # ---- form error ----------------------------------------------------------------------------------------------
 
-    def _columns(self, candidate: Candidate) -> list[tuple[Parameter, Array]]:
-        """What its form error could look like, in N, each with the parameter of its relative size."""
+    def _columns(self, candidate: Candidate) -> list[tuple[Parameter | None, Array]]:
+        """What its form error could look like, in N, each with the parameter of its relative size, if that is open."""
         fitted = self.measurement.force - candidate.residual
         return form_columns(self.factors, fitted, candidate.hypothesis.effects, candidate.traces)
 
@@ -178,14 +179,12 @@ class Search:
     def _freeing(self, parent: Candidate | None, capped: bool = True) -> Freeing:
         if parent is None:
             force, nothing = np.abs(self.measurement.force), np.empty((0, len(self.measurement)))
-            made = form_columns(self.factors, force, (), nothing)
-            columns = np.column_stack([np.exp(_moments(size)[0]) * self.noise.white(c) for size, c in made])
+            forms = [_form(size, self.noise.white(c)) for size, c in form_columns(self.factors, force, (), nothing)]
         else:
             forms = self._forms(parent)
-            # A poor parent's form error is large, and would take what the coordinates are to explain.
-            usual = np.array([b.ln_eta[0] for b in forms if b.ln_eta is not None])
-            eta = np.exp(np.minimum(parent.theta[1:], usual) if capped else parent.theta[1:])
-            columns = np.column_stack([e * b.columns for e, b in zip(eta, forms, strict=True)])
+        found: Iterator[float] = repeat(np.inf) if parent is None else iter(parent.theta[1:].tolist())
+        etas = [1.0 if b.ln_eta is None else _eta(b.ln_eta[0], next(found), capped) for b in forms]
+        columns = np.column_stack([eta * b.columns for eta, b in zip(etas, forms, strict=True)])
         # From the products: LAPACK's decomposition of the columns themselves fails where some are next to nothing.
         square, v = np.linalg.eigh(columns.T @ columns)
         keep = square > SEARCH.least_form**2
@@ -269,7 +268,14 @@ def starts_with(bases: Sequence[Array], effect: Effect, measurement: Measurement
     return out
 
 
-def _form(size: Parameter, columns: Array) -> Block:
+def _eta(usual: float, found: float, capped: bool) -> float:
+    """Of two ln eta; capped, for a poor parent's is large, and would take what the coordinates are to explain."""
+    return float(np.exp(min(usual, found) if capped else found))
+
+
+def _form(size: Parameter | None, columns: Array) -> Block:
+    if size is None:
+        return Block(columns)
     return Block(columns, _moments(size), float(np.log(LARGEST[size.name])))
 
 

@@ -114,7 +114,8 @@ def _inverse(search: Search, found: Candidate) -> Array:
     eta = np.exp(found.theta)
     fitted = search.measurement.force - found.residual
     columns = form_columns(search.factors, fitted, found.hypothesis.effects, found.traces)
-    columns = [size * c for size, (_, c) in zip(eta[1:], columns, strict=True)]
+    sizes = iter(eta[1:])
+    columns = [c if size is None else next(sizes) * c for size, c in columns]
     white = search.noise.white(np.column_stack(columns))
     return np.linalg.inv(eta[0] ** 2 * np.eye(N) + white @ white.T)
 
