@@ -11,6 +11,8 @@ from bayesmembrane.ground.parameters import Array
 
 RESTS = 0.02
 """A force below this part of the largest counts as none: the film is at rest there."""
+AWAY = 0.02, 0.2
+"""By these parts of its range, back or ahead, a first travel may lie off the second; more is no start of a test."""
 NEAR = 0.05
 """A travel that starts within this part of its range starts near zero."""
 
@@ -58,7 +60,8 @@ def zeroed(export: Export, travel: Read, x: Array, f: Array) -> Array:
         return x
     absolute = any(c.reading.absolute for c in export.found if c.column.at == travel.column.at)
     rests = abs(float(f[0])) <= RESTS * float(np.max(np.abs(f)))
-    if x.size >= 10 and abs(x[1] - x[0]) > 0.2 * reach:
+    ahead = float(np.sign(x[int(np.argmax(np.abs(f)))] - x[1]) * (x[1] - x[0]))
+    if x.size >= 10 and not -AWAY[0] * reach <= ahead <= AWAY[1] * reach:
         fault = f"the travel starts at {1e3 * start:.4g} mm and goes on at {1e3 * x[1]:.4g} mm"
         raise DataError(fault, export.block.sheet.place(export.rows[0]), "correct the first line, or say --zero none")
     if absolute or rests or abs(start) > reach:

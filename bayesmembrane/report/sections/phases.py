@@ -44,7 +44,7 @@ class PhasesSection(Section):
             )
             alt = f"The {how.travel} along the test in {int(phases.cycle.max())} cycles"
             out += [Text(told(phases, how)), Figure(picture(phases, how), alt, caption), table(phases, how)]
-        return out
+        return tuple(out)
 
 
 def told(phases: Phases, how: Seen) -> str:
