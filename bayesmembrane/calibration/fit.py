@@ -14,7 +14,7 @@ from bayesmembrane.calibration.descent import descend
 from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.calibration.posterior import enough_points
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.thinning import thinned
+from bayesmembrane.data.thinning import shortened
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.convexity import FREE, REACHED, RESTRICTING
@@ -126,8 +126,8 @@ def fit(
     part but for the convexity constraint. Ogden films are sought among those with c_i a_i > 0 only, which its
     coordinates cover.
 
-    Of more than `MANY` readings the valleys are looked for with that many of them (`data.thinning`), and the optimum is
-    then that of all readings; the one under the convexity prior is that of the part, with the loss of all.
+    Of more than `MANY` readings the valleys are looked for with that many of them (`data.thinning.shortened`), and the
+    optimum is then that of all; the one under the convexity prior is that of the part, with the loss of all.
 
     Standard errors are s^2 (J^T J)^-1 with s^2 = |r|^2 / (N - k): the misfit counts as noise.
 
@@ -135,7 +135,7 @@ def fit(
     whose films cannot reach the data.
     """
     enough_points(hypothesis, measurement)
-    few = thinned(measurement, MANY)
+    few = shortened(measurement, MANY)
     objective = Objective(hypothesis, few, loss, solve)
     rng = np.random.default_rng(seed)
     pool, size = objective.pool(rng)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.motion import HELD
+from bayesmembrane.data.motion import HELD, Motion
 
 MOST = 1500
 """Readings that a diagnosis takes, at most: its time and memory grow with them."""
@@ -29,6 +30,17 @@ def thinned(measurement: Measurement, most: int = MOST) -> Measurement:
     if measurement.across is not None:  # states, and no path
         return measurement.select(_with_even(np.array([0, n - 1]), n, most))
     return measurement.select(kept_rows(measurement.leg, measurement.holds, most))
+
+
+def shortened(measurement: Measurement, most: int) -> Measurement:
+    """`thinned`, and the film remembers no more than the readings that are left: for a first search."""
+    few = thinned(measurement, most)
+    if few is measurement:
+        return measurement
+    leg, cycle = (few.leg, few.cycle) if few.path.said else (None, None)
+    said = (None if v is None else v.astype(float) for v in (leg, cycle))
+    path = Motion(few.deflection, few.time, few.full_range, few.across, *said)
+    return replace(few, motion=path, places=np.arange(len(few)))
 
 
 def kept_rows(leg: NDArray[np.int8], holds: Sequence[NDArray[np.intp]], most: int) -> NDArray[np.intp]:
