@@ -161,6 +161,8 @@ def _candidate(column: Column, hints: Hints) -> Candidate | None:
     if not role:
         return None
     score = 10.0 + 3 * reading.standard - 3 * reading.absolute if by_name else 2.0
+    if role == TIME and by_name and any(w in plain(column.name) for w in ("cycle", "segment", "step")):
+        score -= 1
     if (
         role == TRAVEL
         and by_name

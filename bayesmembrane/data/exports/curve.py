@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesmembrane.data.exports.blocks import Block
-from bayesmembrane.data.exports.columns import best, trimmed
+from bayesmembrane.data.exports.columns import trimmed
 from bayesmembrane.data.exports.export import Export
 from bayesmembrane.data.exports.film import Film, film_of
 from bayesmembrane.data.exports.hints import Guess, Hints
@@ -97,7 +97,7 @@ def _is_strip(export: Export, film: Film) -> bool:
     rig, roles = export.hints.rig, {c.role for c in export.found}
     if rig:
         return _homogeneous(rig)
-    if {TRAVEL, FORCE} <= roles:
+    if {TRAVEL, FORCE} <= roles and not (STRESS in roles and roles & {STRAIN, STRETCH}):
         sizes = {"--width-mm": film.width, "--thickness-um": film.thickness}
         if not roles & {STRAIN, STRETCH}:
             sizes["--gauge-length-mm"] = film.length
@@ -201,11 +201,13 @@ def _with(export: Export, time: Array | None, columns: dict[str, Array]) -> dict
 
 def _said_phases(export: Export) -> dict[str, Array]:
     """``cycle`` and ``direction``, (N,), as a column of the machine says them: 1, 2 or 1-Stretch, 1-Recover."""
-    chosen = best(export.found, CYCLE, export.block)
+    chosen = next((c for c in export.found if c.role == CYCLE), None)
     if chosen is None:
         return {}
     cells = [export.block.sheet.cells(r)[chosen.column.at : chosen.column.at + 1] for r in export.rows]
-    said = [_CYCLE.fullmatch(f"{c[0]:g}" if isinstance(c[0], float) else c[0]) if c else None for c in cells]
+    numbers = [export.block.sheet.marks.number(c[0]) if c else None for c in cells]
+    texts = [f"{v:g}" if v is not None else str(c[0]) if c else "" for v, c in zip(numbers, cells, strict=True)]
+    said = [_CYCLE.fullmatch(text) for text in texts]
     number = np.array([float(s["number"]) if s else np.nan for s in said])
     header = f'"{chosen.column.header}"'
     if not np.all(np.diff(number) >= 0):

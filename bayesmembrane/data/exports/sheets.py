@@ -21,6 +21,8 @@ DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "bar": "|", "space": 
 DECIMALS = {"point": ".", "comma": ","}
 WORKBOOK = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 MOST_BYTES = 500_000_000
+QUOTED = 12
+"""Lines that a quoted name may take, at most, with its neighbours."""
 HEAD, SAMPLE = 400, 400
 """Lines from the beginning, and lines evenly from the rest, on which delimiter and decimal sign are decided."""
 
@@ -85,7 +87,7 @@ def _wide(data: bytes) -> str:
 def text_sheet(data: bytes, file: str, hints: Hints) -> tuple[Sheet, list[Guess]]:
     """The one sheet of a text file, and what was guessed; raises `DataError` where it cannot be told."""
     text, encoding = decoded(data, file, hints)
-    numbered = list(_lines(text))
+    numbered = [(k, line) for k, line in _all_lines(text) if line.strip(' \t,;"')]
     if not numbered:
         raise DataError("the file is empty", file, "export the measurement again")
     lines, raw = [k for k, _ in numbered], [t for _, t in numbered]
@@ -239,24 +241,22 @@ def _odd(a: str, b: str) -> bool:
     return inside or 0x80 <= ord(a) < 0xA0
 
 
-def _lines(text: str) -> Iterator[tuple[int, str]]:
-    """(line number, line) of all that is not blank; a quoted cell may hold line ends, as headers of workbooks do."""
-    waiting, since = "", 0
+def _all_lines(text: str) -> Iterator[tuple[int, str]]:
+    """(line number, line); a quoted cell may hold line ends, as headers of workbooks do."""
+    open_: list[tuple[int, str]] = []
     for k, line in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1):
-        if waiting:
-            both = f"{waiting} {line}"
-            if both.count('"') % 2 == 0:
-                yield since, both
-                waiting = ""
-                continue
-            yield since, waiting  # one line at most: a quote that nothing ends is a sign like any other
-            waiting = ""
-        if line.count('"') % 2 and not any(like_number(c) for c in re.split(r"[;\t, ]", line)):
-            waiting, since = line, k
-        elif line.strip(' \t,;"'):
+        odd = line.count('"') % 2 == 1
+        if not open_ and not (odd and not any(like_number(c) for c in re.split(r"[;\t, ]", line))):
             yield k, line
-    if waiting.strip(' \t,;"'):
-        yield since, waiting
+            continue
+        open_.append((k, line))
+        if len(open_) > 1 and odd:
+            yield open_[0][0], " ".join(part for _, part in open_)
+            open_ = []
+        elif len(open_) > QUOTED:  # a quote that nothing ends is a sign like any other
+            yield from open_
+            open_ = []
+    yield from open_
 
 
 # ---- delimiter and decimal sign --------------------------------------------------------------------------------------

@@ -87,3 +87,28 @@ def test_a_specimen_file_says_film_and_rig(tmp_path: Path) -> None:
     assert (m.rig.name, m.specimen.name) == ("planar", "A")
     assert m.force == pytest.approx(FORCE, abs=1e-6)
     assert m.force_sd == pytest.approx(0.01)
+
+
+def test_names_over_several_lines() -> None:
+    text = lines('"Time\n(s)","Extension\n(mm)","Load\n(N)"', TIME, MM, FORCE)
+    assert imported(text.encode()).columns["deflection"] == pytest.approx(TRAVEL, abs=1e-9)
+
+
+def test_strain_and_stress_need_no_sizes() -> None:
+    header = "Tiempo (s);Alargamiento (mm);Carga (daN);Deformación (%);Esfuerzo (kgf/cm2)"
+    stretch, stress = 1 + TRAVEL / 0.05, FORCE / 5e-6
+    text = lines(header, TIME, MM, FORCE / 10, 100 * (stretch - 1), stress / 98066.5, sep=";", decimal=",", form="%.9f")
+    found = imported(text.encode())
+    assert found.columns["stretch"] == pytest.approx(stretch)
+    assert found.columns["nominal_stress"] == pytest.approx(stress, rel=1e-6, abs=1e-2)
+    assert found.film.length == pytest.approx(0.05, rel=1e-4)
+
+
+def test_the_time_of_the_test_and_not_of_its_cycle() -> None:
+    cycles = '"Total Time (s)","Cycle Elapsed Time (s)","Total Cycles","Elapsed Cycles"'
+    header = cycles + ',"Position(8800 (0,1):Position) (mm)","Load (kN)"'
+    text = lines(header, TIME, TIME % 3, TIME // 3, 0 * TIME, MM, FORCE / 1e3, form="%.9f")
+    found = imported(text.encode())
+    assert found.columns["time"] == pytest.approx(TIME)
+    assert found.columns["cycle"] == pytest.approx(1 + TIME // 3)
+    assert found.columns["force"] == pytest.approx(FORCE, abs=1e-5)
