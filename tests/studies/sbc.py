@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.run import RunSettings, sample
+from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import BayesmembraneError
 from bayesmembrane.ground.registry import materials
@@ -37,7 +38,8 @@ Array = NDArray[np.float64]
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "reports" / "study-sbc.jsonl"
 SEED = 500_000
-ESS = 250.0  # of the slowest coordinate: `RANKED` draws far enough apart to be independent
+WALK = Settings(ess=250.0, chunk=100)
+"""Of the slowest coordinate, so that `RANKED` draws are far enough apart to be independent."""
 POINTS, FARTHEST = 14, 0.012  # m: short and mild, so that films of the whole prior get there
 GIVEN = 4e-3  # noise that a measurement states, of a force of 1 N
 BASELINES, VARIATIONS = 300, 100
@@ -105,7 +107,7 @@ def replicate(design: Design, number: int) -> dict[str, Any]:
     noise = asked.noise_at(x, force).draw(h.noise_coordinates(x), rng)
     measured = replace(blank, force=(force + noise)[0])
     begun = time.process_time()
-    run = sample(measured, h, RunSettings(seed=number, ess=ESS, predictions=False))
+    run = sample(measured, h, RunSettings(seed=number, settings=WALK, predictions=False))
     draws = run.draws()
     posterior = Posterior(h, measured)
     chosen = draws[np.linspace(0, len(draws) - 1, RANKED).round().astype(int)]
@@ -116,7 +118,7 @@ def replicate(design: Design, number: int) -> dict[str, Any]:
     return {
         "ranks": {n: int(np.sum(values < value)) for n, (value, values) in told.items()},
         "ess": run.status["ess_bulk"],
-        "reached": bool(run.status["ess_bulk"] >= ESS),
+        "reached": bool(run.status["ess_bulk"] >= WALK.ess),
         "evaluations": run.status["evaluations"],
         "seconds": time.process_time() - begun,
     }
