@@ -1,13 +1,12 @@
-"""Spectral Ritz solver: forces of many films at once from the minimum of the stored energy."""
+"""Ritz solver: forces of many films at once from the minimum of the stored energy over elements."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from bayesmembrane.ground.parameters import Array
@@ -16,11 +15,12 @@ from bayesmembrane.physics.mechanics.compiled import bind
 from bayesmembrane.physics.mechanics.locking import locking_deflection
 from bayesmembrane.physics.mechanics.request import Request, Spared, extensibility
 from bayesmembrane.physics.mechanics.ritz import kernels
+from bayesmembrane.physics.mechanics.ritz.elements import basis, evaluate, graded, replaced, unknowns
 from bayesmembrane.physics.mechanics.ritz.simd import LANES
 from bayesmembrane.physics.mechanics.solution import Curves, Note, Status
 
-# Elements x bubbles per element: every basis contains those before it.
-LEVELS = ((1, 6), (2, 6), (4, 7), (8, 8), (24, 8))
+# Elements x bubbles per element.
+LEVELS = ((1, 6), (2, 6), (4, 7), (8, 8), (8, 8), (12, 8))
 # A force is exact to 1e-6 while the next bubbles would release less than this part of F delta (measured: the error is
 # at most a hundred times the gain, over draws from the priors of all materials), and the first integral is even.
 GAIN_LIMIT = 2e-10
@@ -45,56 +45,21 @@ RULED_OUT_ON_THE_WAY = 1e-3
 
 
 @dataclass(frozen=True)
-class Basis:
-    """Shape functions on t in [0, T], sampled at G Gauss points and, last, at the two edges."""
+class Shapes:
+    """Solutions at K states: unknowns (K, 2n) on elements with ends (K, E+1), and what each gains from more (K, E)."""
 
-    tables: tuple[Any, ...]
-    functions: int
+    unknowns: Array
+    ends: Array
+    gains: Array
+    bubbles: int
 
+    def of(self, rows: Any) -> Self:
+        return replace(self, unknowns=self.unknowns[rows], ends=self.ends[rows], gains=self.gains[rows])
 
-@cache
-def basis(ratio: float, elements: int, bubbles: int) -> Basis:
-    """Hats and integrated Legendre bubbles over elements in t = ln(R/R1) in [0, T], for R2/R1 = ``ratio``.
-
-    Sampled at bubbles + 3 Gauss points per element and then at the two edges.
-    """
-    span, lengths = np.log(ratio), np.diff(_ends(ratio, elements))
-    nodes, weights = legendre.leggauss(bubbles + 3)
-    size, per, n = nodes.size, bubbles + 1, elements * (bubbles + 1) - 1
-    points = np.append(_gauss_points(ratio, elements, bubbles), [0.0, span])
-    phi, slope = _shape_functions(ratio, elements, bubbles, points)
-    home = np.append(np.repeat(np.arange(elements), size), [0, elements - 1])
-    first = np.maximum(home * per - 1, 0)
-    last = np.minimum((home + 1) * per, n)
-    gauss = elements * size
-    growth = np.exp(points)
-    weight = (weights * lengths[:, None] / 2).ravel() * growth[:gauss] ** 2
-    low = np.arange(2 * n)
-    for a, b in zip(first, last, strict=True):
-        low[2 * a : 2 * b] = np.minimum(low[2 * a : 2 * b], 2 * a)
-    active = (first[None, :gauss] <= np.arange(n)[:, None]) & (np.arange(n)[:, None] < last[None, :gauss])
-    start, stop = active.argmax(1), gauss - active[:, ::-1].argmax(1)
-    width = int(np.max(np.arange(2 * n) - low)) + 1
-    floats = (np.ascontiguousarray(v) for v in (phi, phi + slope, slope / growth, 1 / (span * growth), growth, weight))
-    return Basis((*floats, first, last, start, stop, low, width, _next_bubbles(lengths, nodes, bubbles, growth)), n)
-
-
-def _next_bubbles(lengths: Array, nodes: Array, bubbles: int, growth: Array) -> Array:
-    """The two bubbles after the last of every element at its Gauss points: (phi + phi', phi, exp(-t) phi')."""
-    value, rate = (v[bubbles:] for v in _bubbles(nodes, bubbles + 2))
-    extra = np.empty((3, 2, nodes.size, lengths.size))
-    for e, length in enumerate(lengths):
-        steep = rate * 2 / length
-        extra[..., e] = value + steep, value, steep / growth[e * nodes.size : (e + 1) * nodes.size]
-    return extra
-
-
-@cache
-def _prolongation(ratio: float, level: int) -> Array:
-    """(n', n) : the functions of one level, n, as sums of those of the next, n'."""
-    points = _gauss_points(ratio, *LEVELS[level + 1])
-    new, old = (_shape_functions(ratio, *LEVELS[k], points)[0] for k in (level + 1, level))
-    return np.asarray(np.linalg.lstsq(new.T, old.T)[0])
+    def and_(self, other: Shapes) -> Shapes:
+        """Both, one after the other; they have as many elements and bubbles."""
+        pairs = ((getattr(self, name), getattr(other, name)) for name in ("unknowns", "ends", "gains"))
+        return Shapes(*(np.concatenate(pair) for pair in pairs), self.bubbles)
 
 
 def shape(request: Request, t: Array) -> tuple[Array, Array, Array, Array]:
@@ -104,57 +69,17 @@ def shape(request: Request, t: Array) -> tuple[Array, Array, Array, Array]:
     """
     one = replace(request, parameters=request.parameters[:1], prestretch=request.prestretch[:1])
     d = np.where(request.deflection[:1, :1] == 0, SMALLEST, request.scaled[:1, :1])
-    for level, (elements, bubbles) in enumerate(LEVELS):
-        result, unknowns = follow(one, d, level, wishes=(False, True, False))
-        if result[0, kernels.STATUS, 0] == Status.OK:
-            span, l0 = np.log(request.ratio), request.prestretch[0]
-            phi, slope = _shape_functions(request.ratio, elements, bubbles, t)
-            a, b = unknowns[0, 0::2, 0], unknowns[0, 1::2, 0]
-            l2 = l0 + a @ phi
-            return l2, l2 + a @ slope, np.exp(-t) * (d[0, 0] / span + b @ slope), d[0, 0] * t / span + b @ phi
-    gap = np.full(t.shape, np.nan)
-    return gap, gap, gap, gap
-
-
-def _shape_functions(ratio: float, elements: int, bubbles: int, t: Array) -> tuple[Array, Array]:
-    """phi and d phi/dt, each (n, M), at t (M,) in [0, ln ratio]."""
-    ends = _ends(ratio, elements)
-    n = elements * (bubbles + 1) - 1
-    phi, slope = np.zeros((n, t.size)), np.zeros((n, t.size))
-    home = np.clip(np.searchsorted(ends, t, side="right") - 1, 0, elements - 1)
-    for e in range(elements):
-        at = np.flatnonzero(home == e)
-        length, start = ends[e + 1] - ends[e], e * (bubbles + 1)
-        x = 2 * (t[at] - ends[e]) / length - 1
-        value, rate = _bubbles(x, bubbles)
-        phi[start : start + bubbles, at], slope[start : start + bubbles, at] = value, rate * 2 / length
-        if e > 0:
-            phi[start - 1, at], slope[start - 1, at] = 0.5 * (1 - x), -1 / length
-        if e < elements - 1:
-            phi[start + bubbles, at], slope[start + bubbles, at] = 0.5 * (1 + x), 1 / length
-    return phi, slope
-
-
-def _ends(ratio: float, elements: int) -> Array:
-    """Element ends in t: shorter elements towards the edges, where soft films form boundary layers."""
-    return np.asarray(np.log(ratio) * (1 - np.cos(np.pi * np.arange(elements + 1) / elements)) / 2)
-
-
-def _gauss_points(ratio: float, elements: int, bubbles: int) -> Array:
-    """bubbles + 3 points of every element."""
-    ends, nodes = _ends(ratio, elements), legendre.leggauss(bubbles + 3)[0]
-    return np.asarray((ends[:-1, None] + 0.5 * (1 + nodes) * np.diff(ends)[:, None]).ravel())
-
-
-def _bubbles(x: Array, count: int) -> tuple[Array, Array]:
-    """Integrated Legendre polynomials N_i = int_-1^x P_i, i = 1..count, scaled to unit slope norm, and slopes."""
-    value, rate = np.empty((count, x.size)), np.empty((count, x.size))
-    for i in range(1, count + 1):
-        c = np.zeros(i + 1)
-        c[i] = np.sqrt((2 * i + 1) / 2)
-        rate[i - 1] = legendre.legval(x, c)
-        value[i - 1] = legendre.legval(x, legendre.legint(c, lbnd=-1))
-    return value, rate
+    search = _Search(one, d, np.ones((1, 1), np.bool_))
+    for level in range(1, len(LEVELS)):
+        if not search.improve(level):
+            break
+    if search.status[0, 0] != Status.OK:
+        gap = np.full(t.shape, np.nan)
+        return gap, gap, gap, gap
+    found, span, l0 = search.found, np.log(request.ratio), request.prestretch[0]
+    (a, b), (a_slope, b_slope) = evaluate(found.unknowns[0], found.ends[0], found.bubbles, t)
+    l2 = l0 + a
+    return l2, l2 + a_slope, np.exp(-t) * (d[0, 0] / span + b_slope), d[0, 0] * t / span + b
 
 
 @cache
@@ -186,25 +111,28 @@ def _path(d: Array, stride: float) -> tuple[Array, NDArray[np.bool_]]:
     return grid, keep
 
 
-def follow(
-    request: Request, d: Array, level: int, wishes: tuple[bool, bool, bool] = (False, False, False)
-) -> tuple[Array, Array]:
-    """Continue B films from the flat film through ascending scaled deflections d (B, N).
+def follow(request: Request, d: Array, level: int, sensitivities: bool = False) -> tuple[Array, Array]:
+    """Continue B films from the flat film through ascending scaled deflections d (B, N), on `graded` elements.
 
-    wishes : sensitivities, unknowns everywhere, unknowns of unresolved states
-    Returns results (B, rows, N) and unknowns (B, 2 functions, N), or (B, 2 functions, 0) if not wished for, see
-    `ritz_kernels.follow`.
+    Returns results (B, rows, N) and traces (B, 2n + E, N), see `kernels.follow`.
     """
+    elements, bubbles = LEVELS[level]
     grid, keep = _path(d, STRIDE / 2**level)
-    start = np.zeros((d.shape[0], 2 * basis(request.ratio, *LEVELS[level]).functions))
-    return _run(request, grid, keep, start, level, wishes)
+    ends = np.broadcast_to(graded(request.ratio, elements), (len(d), elements + 1))
+    return _run(request, grid, keep, np.zeros((len(d), unknowns(elements, bubbles))), ends, level, sensitivities)
 
 
 def _run(
-    request: Request, grid: Array, keep: NDArray[np.bool_], start: Array, level: int, wishes: tuple[bool, bool, bool]
+    request: Request,
+    grid: Array,
+    keep: NDArray[np.bool_],
+    start: Array,
+    ends: Array,
+    level: int,
+    sensitivities: bool,
 ) -> tuple[Array, Array]:
-    """`kernels.follow` over deflections grid (M, B) from unknowns start (B, 2n)."""
-    shape, count, fields = basis(request.ratio, *LEVELS[level]), grid.shape[1], request.parameters.shape[1]
+    """`kernels.follow` over deflections grid (M, B) from unknowns start (B, 2n) on elements with ends (B, E+1)."""
+    count, fields = grid.shape[1], request.parameters.shape[1]
     blocks, n = -(-count // LANES), int(np.count_nonzero(keep))
     pad = np.minimum(np.arange(blocks * LANES), count - 1)
 
@@ -213,15 +141,19 @@ def _run(
         return np.ascontiguousarray(rows[:, pad].reshape(len(rows), blocks, LANES).transpose(1, 0, 2))
 
     gd = np.broadcast_to(_shear_modulus(request), (1, count))
-    result = np.empty((blocks, LANES, kernels.RESULTS + (fields if wishes[0] else 0), n))
-    unknowns = np.empty((blocks, LANES, 2 * shape.functions, n if any(wishes[1:]) else 0))
-    rows = (blocked(v) for v in (request.parameters.T, gd, request.prestretch[None], grid, start.T))
-    compiled(request.material).follow(*rows, shape.tables, LIMITS, keep, wishes, result, unknowns)
+    result = np.empty((blocks, LANES, kernels.RESULTS + (fields if sensitivities else 0), n))
+    trace = np.empty((blocks, LANES, start.shape[1] + ends.shape[1] - 1, n))
+    rows = (blocked(v) for v in (request.parameters.T, gd, request.prestretch[None], grid, start.T, ends.T))
+    tables = basis(*LEVELS[level])
+    compiled(request.material).follow(*rows, tables, LIMITS, keep, sensitivities, result, trace)
     padded = blocks * LANES
-    return (
-        result.reshape(padded, *result.shape[2:])[:count],
-        unknowns.reshape(padded, *unknowns.shape[2:])[:count],
-    )
+    return result.reshape(padded, *result.shape[2:])[:count], trace.reshape(padded, *trace.shape[2:])[:count]
+
+
+def _shapes(trace: Array, ends: Array, level: int) -> Shapes:
+    """The solutions in a trace (K, 2n + E)."""
+    size = unknowns(*LEVELS[level])
+    return Shapes(trace[:, :size], ends, trace[:, size:], LEVELS[level][1])
 
 
 def _shear_modulus(request: Request) -> Array:
@@ -278,9 +210,6 @@ def _ruled_out(result: Array, status: NDArray[np.int8], spare: Spared) -> NDArra
     return np.asarray(np.any((status == Status.OK) & (margin < -RULED_OUT), axis=1))
 
 
-_Rough = tuple[NDArray[np.intp], NDArray[np.intp], Array]
-
-
 class _Search:
     """What is known of B films at N ascending scaled deflections d (B, N), and how to know more.
 
@@ -288,7 +217,7 @@ class _Search:
     ----------
     wanted : (B, N) True where an answer is wanted
     result, status : (B, rows, N) and (B, N) `Status` codes
-    rough : (film, column, unknowns) of the states to be refined: (K,), (K,), and (K, 2 functions) of the last basis
+    film, column, shapes : (K,), (K,) and `Shapes` of the states that are to be refined
     ends : (B,) scaled deflection at which the path was lost with the last basis, nan if it was not
     """
 
@@ -300,21 +229,21 @@ class _Search:
         loose: NDArray[np.bool_] | None = None,
     ) -> None:
         self.request, self.d = request, d
-        self.wishes = request.sensitivities, False, True
-        self.result, unknowns = follow(request, d, 0, self.wishes)
+        self.result, trace = follow(request, d, 0, request.sensitivities)
         self.status = self.result[:, kernels.STATUS].astype(np.int8)
-        if loose is not None:
-            self.status[loose & (self.status == Status.UNRESOLVED) & _nearly_resolved(self.result, d)] = Status.OK
+        self.loose = np.zeros(d.shape, np.bool_) if loose is None else loose
+        enough = self.loose & (self.status == Status.UNRESOLVED) & _nearly_resolved(self.result, d)
+        self.status[enough] = Status.OK
         self.wanted = wanted & ~_ruled_out(self.result, self.status, request.spare)[:, None]
         self.ends = np.full(len(d), np.nan)
-        self.rough: _Rough = self._nothing(0)
+        self.film = self.column = np.empty(0, np.intp)
         if np.any(self.status):
             films = np.flatnonzero(np.any(self.wanted, axis=1))
             verdict = self.status[films]
             self._explain(films, verdict, 0)
             self.status[films] = verdict
-            film, column = np.nonzero((self.status == Status.UNRESOLVED) & self.wanted)
-            self.rough = film, column, unknowns[film, :, column]
+            self.film, self.column = np.nonzero((self.status == Status.UNRESOLVED) & self.wanted)
+        self.shapes = self._from_trace(trace, self.film, self.column, 0)
 
     def improve(self, level: int) -> bool:
         """One level up: refine the rough states, and follow again the films whose path was lost. False if none is."""
@@ -322,47 +251,45 @@ class _Search:
             # The loss of stability is believed when a finer basis confirms it.
             lost = (self.status == Status.NOT_ELLIPTIC) | (self.status == Status.INDEFINITE)
             self.status[lost & self.wanted] = Status.ITERATION_LIMIT
-        rough = self._refine(level)
-        doubtful = (self.status == Status.ITERATION_LIMIT) & self.wanted
-        films = np.flatnonzero(np.any(doubtful, axis=1))
-        if not films.size and not rough[0].size:
-            return False
-        parts = zip(rough, self._follow(level, films, doubtful[films]), strict=True)
-        film, column, unknowns = (np.concatenate(v) for v in parts)
-        self.rough = film, column, unknowns
-        return True
+        if self.film.size:
+            self._refine(level)
+        films = np.flatnonzero(np.any((self.status == Status.ITERATION_LIMIT) & self.wanted, axis=1))
+        if films.size:
+            self._follow(level, films)
+        return bool(self.film.size or films.size)
 
-    def _refine(self, level: int) -> _Rough:
-        """Each rough state from its own solution, all side by side; returns those that are still rough."""
-        film, column, unknowns = self.rough
-        if not film.size:
-            return self._nothing(level)
-        ratio, d = self.request.ratio, self.d[film, column]
-        start = (_prolongation(ratio, level - 1) @ unknowns.reshape(film.size, -1, 2)).reshape(film.size, -1)
-        result, unknowns = _run(_films(self.request, film), d[None], np.ones(1, np.bool_), start, level, self.wishes)
+    def _refine(self, level: int) -> None:
+        """Each rough state from its own solution, all side by side, on new elements; those still rough remain."""
+        film, column, old = self.film, self.column, self.shapes
+        d = self.d[film, column]
+        ends, start = replaced(old.unknowns, old.ends, old.gains, d, old.bubbles, LEVELS[level])
+        one, films = np.ones(1, np.bool_), _films(self.request, film)
+        result, trace = _run(films, d[None], one, start, ends, level, self.request.sensitivities)
         verdict = result[:, kernels.STATUS, 0].astype(np.int8)
         still = verdict == Status.UNRESOLVED
         # A rough state that leads to no stable one lay astray: its film is followed again.
         verdict[(verdict != Status.OK) & ~still] = Status.ITERATION_LIMIT
         self.result[film, :, column], self.status[film, column] = result[..., 0], verdict
-        return film[still], column[still], unknowns[still, :, 0]
+        self.film, self.column, self.shapes = film[still], column[still], _shapes(trace[still, :, 0], ends[still], level)
 
-    def _follow(self, level: int, films: NDArray[np.intp], doubtful: NDArray[np.bool_]) -> _Rough:
-        """Whole films from the start, for the sake of their doubtful columns; returns those that are rough now."""
-        if not films.size:
-            return self._nothing(level)
-        result, unknowns = follow(_films(self.request, films), self.d[films], level, self.wishes)
+    def _follow(self, level: int, films: NDArray[np.intp]) -> None:
+        """Whole films from the start, for the sake of their doubtful columns; those rough now join the others."""
+        doubtful = (self.status[films] == Status.ITERATION_LIMIT) & self.wanted[films]
+        result, trace = follow(_films(self.request, films), self.d[films], level, self.request.sensitivities)
         verdict = result[:, kernels.STATUS].astype(np.int8)
         self._explain(films, verdict, level)
         at, column = np.nonzero(doubtful)
         self.result[films[at], :, column] = result[at, :, column]
         self.status[films[at], column] = verdict[at, column]
         at, column = np.nonzero(doubtful & (verdict == Status.UNRESOLVED))
-        return films[at], column, unknowns[at, :, column]
+        more = self._from_trace(trace, at, column, level)
+        self.shapes = self.shapes.and_(more) if self.film.size else more
+        self.film, self.column = np.append(self.film, films[at]), np.append(self.column, column)
 
-    def _nothing(self, level: int) -> _Rough:
-        none = np.empty(0, np.intp)
-        return none, none, np.empty((0, 2 * basis(self.request.ratio, *LEVELS[level]).functions))
+    def _from_trace(self, trace: Array, film: NDArray[np.intp], column: NDArray[np.intp], level: int) -> Shapes:
+        elements = LEVELS[level][0]
+        ends = np.broadcast_to(graded(self.request.ratio, elements), (film.size, elements + 1))
+        return _shapes(trace[film, :, column], ends, level)
 
     def _explain(self, films: NDArray[np.intp], verdict: NDArray[np.int8], level: int) -> None:
         """Name the reason, in ``verdict`` (K, N) of K films, of paths that end where they did with the basis before."""
@@ -450,7 +377,7 @@ def _curves(request: Request, search: _Search, back: NDArray[np.intp] | None) ->
             return np.where(ok if isinstance(index, int) else ok[:, None], result[:, index] * scale, np.nan)
 
     sensitivity = None
-    if search.wishes[0]:
+    if request.sensitivities:
         rows = row(slice(k.RESULTS, None), (factor * sign)[:, None])
         sensitivity = np.ascontiguousarray(np.moveaxis(rows, 1, 2))
     return Curves(
