@@ -15,7 +15,7 @@ from bayesmembrane.ground.parameters import Array
 POINTS = 3  # Gauss points of an element beyond the number of its bubbles
 SAMPLES = 8  # pieces of an element between which it is told how much the film bends
 # Elements share what they gain to this power, and never less than this part of the mean in width.
-SHARE, WIDEST = 1.0 / 8.0, 0.15
+SHARE, WIDEST = 1.0 / 8.0, 0.08
 
 
 @cache
@@ -119,7 +119,7 @@ def _place(q, ends, gain, d, bubbles, new, share, widest, value, rate, line):  #
                 bend[k - 1] = np.hypot(along - u, up - w)
                 total += bend[k - 1]
             u, w = along, up
-        weight = (max(gain[e], 1e-30 * most) / most) ** share
+        weight = (max(gain[e], 1e-30 * most) / most) ** share if most > 0.0 else 1.0
         for k in range(SAMPLES):
             part = bend[k] / total if total > 0.0 else 1.0 / SAMPLES
             level[e * SAMPLES + k + 1] = weight * (0.5 / SAMPLES + 0.5 * part)

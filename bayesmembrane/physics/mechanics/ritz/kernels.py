@@ -480,9 +480,8 @@ def follow_block(p_rows, gd, l0, grid, q, ends, tables, limits, keep, wanted, re
         d, before = load(grid, j), load(grid, max(j - 1, 0))
         if j > 0:
             predict(q, dq, old, dold, d, before, load(grid, max(j - 2, 0)), trial)
-        begin(q, dq, old, dold, lane, out)
-        count = 0
-        while count < most:
+        count, awake = 0, begin(q, dq, old, dold, lane, out)
+        while awake > 0 and count < most:
             states(trial, d, l0, p, inner, span, value, rate, half, growth, x)
             assemble(x, c, row, sums, span, value, rate, half, growth, weight, width, grad, mixed, band)
             store(pivot, 0, factorise(band, low, width, y, z))
@@ -493,7 +492,11 @@ def follow_block(p_rows, gd, l0, grid, q, ends, tables, limits, keep, wanted, re
             if over == LANES:
                 break
         end(lane)
-        if keep[j]:
+        if keep[j] and awake == 0:
+            # Nobody is on the way any more: there is nothing to look at.
+            spread(out, result, 0, kept)
+            kept += 1
+        elif keep[j]:
             states(q, d, l0, p, points, span, value, rate, half, growth, x)
             examine(x, points, inner, growth, gd, out)
             energy_gain(x, half, growth, weight, extra, gains, out)
@@ -508,13 +511,17 @@ def follow_block(p_rows, gd, l0, grid, q, ends, tables, limits, keep, wanted, re
 
 
 def begin(q, dq, old, dold, lane, out):
-    """Make the last state the one before, and wake the lanes that are not lost."""
+    """Make the last state the one before, and wake the lanes that are not lost; returns how many these are."""
     for i in range(q.shape[0]):
         store(old, i, load(q, i))
         store(dold, i, load(dq, i))
+    awake = 0
     for k in range(LANES):
-        lane[MODE, k] = LOST if lane[MODE, k] == LOST else FRESH
+        if lane[MODE, k] != LOST:
+            lane[MODE, k] = FRESH
+            awake += 1
         out[STATUS, k] = ITERATION_LIMIT
+    return awake
 
 
 def end(lane):
