@@ -54,9 +54,9 @@ def solve(request: Request) -> Curves:
     physically, and is given its reason; what is left is flagged.
 
     Of a film that is spared (a prior rules it out whatever its other forces are) what is not resolved at first stays
-    flagged. Beyond the deflection ``exact_up_to`` states only show whether the film stays stable and convex.
+    flagged. States whose forces are not ``read`` only show whether the film stays stable and convex.
     """
-    d, back = _ascending(np.where(request.deflection == 0, SMALLEST, request.scaled))
+    d, order, back = _ascending(np.where(request.deflection == 0, SMALLEST, request.scaled))
     bound = extensibility(request)
     locked = np.zeros(d.shape, np.bool_)
     if np.any(bound < np.inf):
@@ -64,8 +64,7 @@ def solve(request: Request) -> Curves:
         # A locked deflection is replaced by the last one that can be reached; its answer is not used.
         reach = np.max(np.where(locked, 0.0, d), axis=1, keepdims=True)
         d = np.where(locked, np.where(reach > 0, reach, 1e-3), d)
-    loose = d > request.exact_up_to * (1 + 1e-9) * request.prestretch[:, None] / request.inner_radius
-    search = _Search(request, d, ~locked, loose)
+    search = _Search(request, d, ~locked, order >= d.shape[1] if request.read is None else order >= request.read)
     if np.any(search.status) or np.any(locked):
         for level in range(1, len(LEVELS)):
             if not search.improve(level):
@@ -75,15 +74,12 @@ def solve(request: Request) -> Curves:
     return _curves(request, search, back)
 
 
-def _ruled_out(
-    result: Array, status: NDArray[np.int8], near: NDArray[np.bool_], spare: Spared
-) -> NDArray[np.bool_]:
-    """(B,) True for films with a state that shows them to be such as are spared: a resolved one, or clearly a near one."""
+def _shown(result: Array, status: NDArray[np.int8], near: NDArray[np.bool_], spare: Spared) -> NDArray[np.bool_]:
+    """(B, N) True for states that show a film to be such as are spared: resolved ones, or clearly if nearly resolved."""
     if spare is Spared.NONE:
-        return np.zeros(len(result), np.bool_)
+        return np.zeros(near.shape, np.bool_)
     margin = result[:, kernels.CONVEX if spare is Spared.NOT_CONVEX else kernels.ELLIPTIC]
-    shown = ((status == Status.OK) & (margin < -RULED_OUT)) | (near & (margin < -RULED_OUT_ON_THE_WAY))
-    return np.asarray(np.any(shown, axis=1))
+    return np.asarray(((status == Status.OK) & (margin < -RULED_OUT)) | (near & (margin < -RULED_OUT_ON_THE_WAY)))
 
 
 class _Search:
@@ -93,6 +89,7 @@ class _Search:
     ----------
     wanted, loose : (B, N) True where an answer is wanted, and where nobody reads the force
     result, status : (B, rows, N) and (B, N) `Status` codes
+    shown : (B, N) True where a state shows that the film is spared, whatever its status: its margins can be read
     film, column, shapes : (K,), (K,) and `Shapes` of the states that are to be refined
     walks : where the lost paths stand, and the shapes of all films to begin them from
     """
@@ -105,7 +102,8 @@ class _Search:
         self.status = self.result[:, kernels.STATUS].astype(np.int8)
         self.loose = np.zeros(d.shape, np.bool_) if loose is None else loose
         near = (self.status == Status.UNRESOLVED) & nearly_resolved(self.result, d)
-        self.wanted = wanted & ~_ruled_out(self.result, self.status, near, request.spare)[:, None]
+        self.shown = _shown(self.result, self.status, near, request.spare)
+        self.wanted = wanted & ~np.any(self.shown, axis=1)[:, None]
         self.status[near & self.loose] = Status.OK
         self.film, self.column = np.nonzero((self.status == Status.UNRESOLVED) & self.wanted)
         one = Shapes.flat(request.ratio, self.film.size, 0)
@@ -177,29 +175,29 @@ def _pass_on(status: NDArray[np.int8]) -> None:
     status[rows] = np.where(passed, first[:, None], status[rows])
 
 
-def _ascending(d: Array) -> tuple[Array, NDArray[np.intp] | None]:
-    """d (B, N) sorted film by film, and the place (B, N) of each original value; None if they were sorted."""
+def _ascending(d: Array) -> tuple[Array, NDArray[np.intp], NDArray[np.intp] | None]:
+    """d (B, N) sorted film by film, where each value came from (B, N), and where each went; None if none moved."""
     if np.all(d[:, 1:] >= d[:, :-1]):
-        return d, None
+        return d, np.broadcast_to(np.arange(d.shape[1]), d.shape), None
     order = np.argsort(d, axis=1, kind="stable")
-    return np.take_along_axis(d, order, axis=1), np.argsort(order, axis=1)
+    return np.take_along_axis(d, order, axis=1), order, np.argsort(order, axis=1)
 
 
 def _curves(request: Request, search: _Search, back: NDArray[np.intp] | None) -> Curves:
     """Undo the scaling and the sorting."""
-    k, result, status = kernels, search.result, search.status
+    k, result, status, shown = kernels, search.result, search.status, search.shown
     if back is not None:
         result = np.take_along_axis(result, back[:, None], axis=2)
-        status = np.take_along_axis(status, back, axis=1)
+        status, shown = (np.take_along_axis(v, back, axis=1) for v in (status, shown))
     ok, sign = status == Status.OK, np.sign(request.deflection)
     length = request.inner_radius / request.prestretch[:, None]
     note = np.where(result[:, k.LEAST_P2] < 0, Note.WRINKLED, 0) | np.where(result[:, k.SLACK] <= 0, Note.SLACK, 0)
     factor = 2 * np.pi * length
 
-    def row(index: int | slice, scale: Any = 1.0) -> Array:
+    def row(index: int | slice, scale: Any = 1.0, there: NDArray[np.bool_] = ok) -> Array:
         # Where it is not ok anything may stand, infinity too.
         with np.errstate(invalid="ignore", over="ignore"):
-            return np.where(ok if isinstance(index, int) else ok[:, None], result[:, index] * scale, np.nan)
+            return np.where(there if isinstance(index, int) else there[:, None], result[:, index] * scale, np.nan)
 
     sensitivity = None
     if request.sensitivities:
@@ -214,7 +212,7 @@ def _curves(request: Request, search: _Search, back: NDArray[np.intp] | None) ->
         sensitivity=sensitivity,
         variation=row(k.VARIATION),
         max_stretch=row(k.STRETCH),
-        ellipticity=row(k.ELLIPTIC),
-        convexity=row(k.CONVEX),
+        ellipticity=row(k.ELLIPTIC, there=ok | shown),
+        convexity=row(k.CONVEX, there=ok | shown),
         energy=row(k.STORED, factor * length),
     )

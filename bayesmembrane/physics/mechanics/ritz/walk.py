@@ -116,13 +116,14 @@ class Walks:
         # A nearly resolved state would be found by any basis; another one has to find the same end.
         same = now.near | (np.abs(now.at - ends[now.rows]) < SAME_END * now.at)
         # Chains that lock end the path by stiffening: that is no loss of stability.
-        believed = now.short & same & np.isinf(extensibility(films(self.request, now.rows)))
+        endless = np.isinf(extensibility(films(self.request, now.rows)))
+        believed = now.short & same & endless
         # P11 goes to zero like the root of the distance: it falls by more than half, or is small already.
         passed, bent = self._passed(), (now.last < NEARLY_BENT * gd) | (now.last < 0.5 * now.stiff)
         if self.request.spare is not Spared.NONE:
             # What lies beyond is reached, if at all, through states that rule the film out; and one that several bases
             # lose is worth no more effort where a prior is about to judge it.
-            believed |= passed | (level > 1)
+            believed |= passed | ((level > 1) & endless)
         reason = np.where(passed | bent, Status.NOT_ELLIPTIC, Status.INDEFINITE).astype(np.int8)
         return now.rows[believed], reason[believed]
 
