@@ -19,7 +19,7 @@ from bayesmembrane.physics.mechanics.ritz.elements import basis, graded, replace
 from bayesmembrane.physics.mechanics.ritz.simd import LANES
 
 # Elements x bubbles per element.
-LEVELS = ((1, 6), (2, 6), (4, 7), (8, 8), (12, 8), (16, 8))
+LEVELS = ((1, 6), (2, 6), (4, 7), (8, 8), (12, 8), (16, 8), (16, 8))
 # A force is exact to 1e-6 while the next bubbles would release less than this part of F delta (measured: the error is
 # at most a hundred times the gain, over draws from the priors of all materials), and the first integral is even.
 GAIN_LIMIT = 2e-10

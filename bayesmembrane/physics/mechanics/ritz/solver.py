@@ -91,6 +91,7 @@ class _Search:
     result, status : (B, rows, N) and (B, N) `Status` codes
     shown : (B, N) True where a state shows that the film is spared, whatever its status: its margins can be read
     film, column, shapes : (K,), (K,) and `Shapes` of the states that are to be refined
+    last : what was solved last
     walks : where the lost paths stand, and the shapes of all films to begin them from
     """
 
@@ -106,8 +107,9 @@ class _Search:
         self.wanted = wanted & ~np.any(self.shown, axis=1)[:, None]
         self.status[near & self.loose] = Status.OK
         self.film, self.column = np.nonzero((self.status == Status.UNRESOLVED) & self.wanted)
-        one = Shapes.flat(request.ratio, self.film.size, 0)
-        self.shapes = self.last = Shapes.from_trace(trace[self.film, :, self.column], one.ends, 0)
+        ends = Shapes.flat(request.ratio, len(d), 0).ends
+        self.last = Shapes.from_trace(trace[..., -1], ends, 0)
+        self.shapes = Shapes.from_trace(trace[self.film, :, self.column], ends[self.film], 0)
         self.walks = Walks(request, d, trace)
 
     def improve(self, level: int) -> bool:
@@ -130,9 +132,10 @@ class _Search:
         start, once = self.shapes.placed(d, level), np.ones(1, np.bool_)
         result, trace = run(films(self.request, film), d[None], once, start, level, self.request.sensitivities)
         found, trace = result[..., 0], trace[..., 0]
-        verdict = self._verdict(found, film, column)
-        # A rough state that leads to no stable one lay astray: the film is walked there again.
-        verdict[(verdict != Status.OK) & (verdict != Status.UNRESOLVED)] = Status.ITERATION_LIMIT
+        verdict, before = self._verdict(found, film, column), self.result[film, :, column]
+        # A rough state that leads to no stable one lay astray, unless it was nearly resolved: the film is walked there.
+        astray = _named(verdict) & ~nearly_resolved(before[..., None], d[:, None])[:, 0]
+        verdict[astray] = Status.ITERATION_LIMIT
         self.result[film, :, column], self.status[film, column] = found, verdict
         still = verdict == Status.UNRESOLVED
         self.film, self.column = film[still], column[still]

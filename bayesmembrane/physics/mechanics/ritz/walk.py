@@ -150,14 +150,28 @@ class Walks:
             row, column = rows[fresh], first[fresh] - 1
             at[fresh] = self.d[row, column]
             one = Shapes.from_trace(self.trace[row, :, column], Shapes.flat(ratio, row.size, 0).ends, 0)
-            shapes.put(fresh, one.placed(at[fresh], level))
+            shapes.put(fresh, self._settled(one.placed(at[fresh], level), row, at[fresh], level))
         return Stand.new(rows, at, shapes)
+
+    def _settled(self, shapes: Shapes, rows: Rows, at: Array, level: int) -> Shapes:
+        """Elements that one polynomial asks for, mended by what they themselves would gain; many need it."""
+        if level == 1:
+            return shapes
+        keep = np.ones(1, np.bool_)
+        result, trace = run(films(self.request, rows), at[None], keep, shapes, level, most=MOST_ITERATIONS)
+        good = result[:, kernels.STATUS, 0] != Status.ITERATION_LIMIT
+        found = Shapes.from_trace(trace[..., 0], shapes.ends, level).of(good)
+        shapes.put(good, found.placed(at[good], level))
+        return shapes
 
     def _round(self, some: Rows, left: Mask, level: int) -> Met:
         """One run of some walks, all after a loss or none; ``left`` (L, N) loses the columns that are met."""
         now = self.now
         grid, column = self._plan(some, left[some], level)
         request, start = films(self.request, now.rows[some]), now.shapes.of(some)
+        if np.isfinite(now.lost[some[0]]):
+            start = start.placed(now.at[some], level)
+            now.shapes.put(some, start)
         keep = np.ones(len(grid), np.bool_)
         result, trace = run(request, grid, keep, start, level, self.request.sensitivities, MOST_ITERATIONS)
         there = np.logical_and.accumulate(result[:, kernels.STATUS] != Status.ITERATION_LIMIT, axis=1)
