@@ -15,7 +15,7 @@ from bayesmembrane.ground.parameters import Array
 POINTS = 3  # Gauss points of an element beyond the number of its bubbles
 SAMPLES = 8  # pieces of an element between which it is told how much the film bends
 # Elements share what they gain to this power, and never less than this part of the mean in width.
-SHARE, WIDEST = 1.0 / 8.0, 0.08
+SHARE, WIDEST = 1.0 / 10.0, 0.08
 
 
 @cache

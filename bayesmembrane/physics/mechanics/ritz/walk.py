@@ -110,16 +110,21 @@ class Walks:
 
     def reasons(self, level: int) -> tuple[Rows, NDArray[np.int8]]:
         """Films whose path ended in the last walk, as far as that can be believed, and why (`Status`)."""
-        now, gd = self.now, shear_modulus(films(self.request, self.now.rows))
+        now, some = self.now, films(self.request, self.now.rows)
+        gd = shear_modulus(some)
         ends = np.full(len(self.d), np.nan)
         ends[self.before.rows] = np.where(self.before.short, self.before.at, np.nan)
         # A nearly resolved state would be found by any basis; another one has to find the same end.
         same = now.near | (np.abs(now.at - ends[now.rows]) < SAME_END * now.at)
         # Chains that lock end the path by stiffening: that is no loss of stability.
-        endless = np.isinf(extensibility(films(self.request, now.rows)))
+        endless = np.isinf(extensibility(some))
         believed = now.short & same & endless
         # P11 goes to zero like the root of the distance: it falls by more than half, or is small already.
         passed, bent = self._passed(), (now.last < NEARLY_BENT * gd) | (now.last < 0.5 * now.stiff)
+        # Already the flat film has no stiffness: that needs no path.
+        flat = some.material.derivatives(some.parameters.T, some.prestretch, some.prestretch)[3]
+        unstable = np.isnan(now.lost) & ~(flat > 0)
+        believed, bent = believed | unstable, bent | unstable
         if self.request.spare is not Spared.NONE:
             # What lies beyond is reached, if at all, through states that rule the film out; and one that several bases
             # lose is worth no more effort where a prior is about to judge it.
