@@ -17,6 +17,10 @@ SAMPLES = 8  # pieces of an element between which it is told how much the film b
 # Elements share what they gain to this power, and never less than this part of the mean in width.
 SHARE, WIDEST = 1.0 / 10.0, 0.08
 
+# Legendre's recurrence P_(i+1) = UP x P_i - DOWN P_(i-1), and the factor that makes a slope of unit norm.
+_I = np.arange(1, 32)
+UP, DOWN, NORM = (np.append(0.0, v) for v in ((2 * _I + 1) / (_I + 1), _I / (_I + 1), np.sqrt((2 * _I + 1) / 2)))
+
 
 @cache
 def basis(elements: int, bubbles: int) -> tuple[Any, ...]:
@@ -70,68 +74,88 @@ def evaluate(q: Array, ends: Array, bubbles: int, t: Array) -> tuple[Array, Arra
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _legendre(x, bubbles, value, rate):  # type: ignore[no-untyped-def]
-    """`functions` at one x, into value and rate (bubbles + 2,)."""
-    value[0], rate[0], value[bubbles + 1], rate[bubbles + 1] = 0.5 * (1 - x), -0.5, 0.5 * (1 + x), 0.5
-    before, now = 1.0, x
-    for i in range(1, bubbles + 1):
-        after = ((2 * i + 1) * x * now - i * before) / (i + 1)
-        norm = np.sqrt((2 * i + 1) / 2)
-        rate[i] = norm * now
-        value[i] = norm * (after - before) / (2 * i + 1)
-        before, now = now, after
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _at(t, q, ends, bubbles, value, rate, out):  # type: ignore[no-untyped-def]
-    """out (4,) : sums of a and b and their slopes at t, from the unknowns q (2n,) on elements with these ends."""
-    elements, per = ends.size - 1, bubbles + 1
+def _home(t, ends):  # type: ignore[no-untyped-def]
+    """The element in which t lies."""
     e = 0
-    while e < elements - 1 and t >= ends[e + 1]:
+    while e < ends.size - 2 and t >= ends[e + 1]:
         e += 1
-    half = 0.5 * (ends[e + 1] - ends[e])
-    _legendre((t - ends[e]) / half - 1.0, bubbles, value, rate)
-    out[:] = 0.0
-    for i in range(1 if e == 0 else 0, per if e == elements - 1 else per + 1):
-        a, b = q[2 * (e * per - 1 + i)], q[2 * (e * per - 1 + i) + 1]
-        out[0] += a * value[i]
-        out[1] += b * value[i]
-        out[2] += a * rate[i] / half
-        out[3] += b * rate[i] / half
+    return e
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _place(q, ends, gain, d, bubbles, new, share, widest, value, rate, line):  # type: ignore[no-untyped-def]
-    """New ends for one film: as much of its bending, weighed by what its old elements would gain, in each."""
-    elements, span, count = gain.size, ends[-1], gain.size * SAMPLES
-    level, most = np.zeros(count + 1), np.max(gain)
-    bend = np.zeros(SAMPLES)
+def _end(q, k, per, elements):  # type: ignore[no-untyped-def]
+    """The two sums at end k of the elements: zero at the edges."""
+    if k == 0 or k == elements:
+        return 0.0, 0.0
+    return q[2 * (k * per - 1)], q[2 * (k * per - 1) + 1]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _slopes(t, e, q, ends, bubbles):  # type: ignore[no-untyped-def]
+    """Slopes of the two sums at t in element e, from the unknowns q (2n,)."""
+    per, elements = bubbles + 1, ends.size - 1
+    half = 0.5 * (ends[e + 1] - ends[e])
+    left, right = _end(q, e, per, elements), _end(q, e + 1, per, elements)
+    a, b = 0.5 * (right[0] - left[0]), 0.5 * (right[1] - left[1])
+    x = (t - ends[e]) / half - 1.0
+    before, now, o = 1.0, x, 2 * e * per
+    for i in range(1, per):
+        a += NORM[i] * now * q[o]
+        b += NORM[i] * now * q[o + 1]
+        before, now, o = now, UP[i] * x * now - DOWN[i] * before, o + 2
+    return a / half, b / half
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _values(t, e, q, ends, bubbles):  # type: ignore[no-untyped-def]
+    """The two sums at t in element e."""
+    per, elements = bubbles + 1, ends.size - 1
+    left, right = _end(q, e, per, elements), _end(q, e + 1, per, elements)
+    x = 2.0 * (t - ends[e]) / (ends[e + 1] - ends[e]) - 1.0
+    a = 0.5 * ((1.0 - x) * left[0] + (1.0 + x) * right[0])
+    b = 0.5 * ((1.0 - x) * left[1] + (1.0 + x) * right[1])
+    before, now, o = 1.0, x, 2 * e * per
+    for i in range(1, per):
+        after = UP[i] * x * now - DOWN[i] * before
+        part = NORM[i] * (after - before) / (2 * i + 1)
+        a, b = a + part * q[o], b + part * q[o + 1]
+        before, now, o = now, after, o + 2
+    return a, b
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _density(q, ends, gain, d, bubbles, share, widest):  # type: ignore[no-untyped-def]
+    """How much of the new elements belongs in each of `SAMPLES` pieces of every old one, summed up from 0."""
+    elements, span, most = gain.size, ends[-1], np.max(gain)
+    level, bend = np.zeros(elements * SAMPLES + 1), np.empty(SAMPLES)
     for e in range(elements):
         width = (ends[e + 1] - ends[e]) / SAMPLES
         total, u, w = 0.0, 0.0, 0.0
         for k in range(SAMPLES + 1):
             t = ends[e] + k * width
-            if k == SAMPLES:
-                t -= 1e-9 * width
-            _at(t, q, ends, bubbles, value, rate, line)
-            along, up = line[2] + line[0], np.exp(-t) * (d / span + line[3])
+            a, b = _slopes(t, e, q, ends, bubbles)
+            b = np.exp(-t) * (d / span + b)
             if k > 0:
-                bend[k - 1] = np.hypot(along - u, up - w)
+                bend[k - 1] = np.hypot(a - u, b - w)
                 total += bend[k - 1]
-            u, w = along, up
+            u, w = a, b
         weight = (max(gain[e], 1e-30 * most) / most) ** share if most > 0.0 else 1.0
         for k in range(SAMPLES):
             part = bend[k] / total if total > 0.0 else 1.0 / SAMPLES
             level[e * SAMPLES + k + 1] = weight * (0.5 / SAMPLES + 0.5 * part)
     whole = np.sum(level)
     for e in range(elements):
-        for k in range(SAMPLES):
-            level[e * SAMPLES + k + 1] += widest * whole * (ends[e + 1] - ends[e]) / (SAMPLES * span)
-    level = np.cumsum(level)
+        level[e * SAMPLES + 1 : (e + 1) * SAMPLES + 1] += widest * whole * (ends[e + 1] - ends[e]) / (SAMPLES * span)
+    return np.cumsum(level)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _place(ends, level, new):  # type: ignore[no-untyped-def]
+    """New ends between which the ``level`` rises by the same amount."""
     wanted, i = new.size - 1, 0
-    new[0], new[wanted] = 0.0, span
+    new[0], new[wanted] = 0.0, ends[-1]
     for k in range(1, wanted):
-        goal = level[count] * k / wanted
+        goal = level[-1] * k / wanted
         while level[i + 1] < goal:
             i += 1
         e = i // SAMPLES
@@ -140,30 +164,29 @@ def _place(q, ends, gain, d, bubbles, new, share, widest, value, rate, line):  #
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _move(q, ends, bubbles, new, other, nodes, weights, values, rates, value, rate, line, out):  # type: ignore[no-untyped-def]
+def _move(q, ends, bubbles, new, other, nodes, weights, rates, out):  # type: ignore[no-untyped-def]
     """The nearest in slope, element by element, of the solution q on ``new`` elements with ``other`` bubbles."""
-    elements, per = new.size - 1, other + 1
-    for e in range(elements):
-        half, start = 0.5 * (new[e + 1] - new[e]), e * per
+    per = other + 1
+    out[:] = 0.0
+    for e in range(new.size - 1):
+        half, start = 0.5 * (new[e + 1] - new[e]), 2 * e * per
         if e > 0:
-            _at(new[e], q, ends, bubbles, value, rate, line)
-            out[2 * (start - 1)], out[2 * (start - 1) + 1] = line[0], line[1]
-        out[2 * start : 2 * (start + other)] = 0.0
+            out[start - 2], out[start - 1] = _values(new[e], _home(new[e], ends), q, ends, bubbles)
         for g in range(nodes.size):
-            _at(new[e] + half * (1.0 + nodes[g]), q, ends, bubbles, value, rate, line)
+            t = new[e] + half * (1.0 + nodes[g])
+            a, b = _slopes(t, _home(t, ends), q, ends, bubbles)
             for i in range(other):
                 w = weights[g] * half * rates[i + 1, g]
-                out[2 * (start + i)] += w * line[2]
-                out[2 * (start + i) + 1] += w * line[3]
+                out[start + 2 * i] += w * a
+                out[start + 2 * i + 1] += w * b
 
 
 @numba.njit(cache=True, error_model="numpy")
 def _replace(q, ends, gains, d, bubbles, new, other, tables, share, widest, out):  # type: ignore[no-untyped-def]
-    nodes, weights, values, rates = tables
-    value, rate, line = np.empty(bubbles + 2), np.empty(bubbles + 2), np.empty(4)
+    nodes, weights, _, rates = tables
     for k in range(q.shape[0]):
-        _place(q[k], ends[k], gains[k], d[k], bubbles, new[k], share, widest, value, rate, line)
-        _move(q[k], ends[k], bubbles, new[k], other, nodes, weights, values, rates, value, rate, line, out[k])
+        _place(ends[k], _density(q[k], ends[k], gains[k], d[k], bubbles, share, widest), new[k])
+        _move(q[k], ends[k], bubbles, new[k], other, nodes, weights, rates, out[k])
 
 
 def replaced(q: Array, ends: Array, gains: Array, d: Array, bubbles: int, level: tuple[int, int]) -> tuple[Array, Array]:
