@@ -1,4 +1,4 @@
-"""Many films side by side: each followed through its own deflections on its own elements, in the lanes of one kernel."""
+"""Many films side by side, each through its own deflections on its own elements, in the lanes of one kernel."""
 
 from __future__ import annotations
 
@@ -69,9 +69,8 @@ class Shapes:
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """All of them, one after the other; they have as many elements and bubbles."""
-        first = parts[0]
-        names = ("unknowns", "ends", "gains")
-        return cls(*(np.concatenate([getattr(p, n) for p in parts]) for n in names), first.bubbles)
+        names, bubbles = ("unknowns", "ends", "gains"), parts[0].bubbles
+        return cls(**{n: np.concatenate([getattr(p, n) for p in parts]) for n in names}, bubbles=bubbles)
 
 
 @cache

@@ -189,7 +189,9 @@ def _replace(q, ends, gains, d, bubbles, new, other, tables, share, widest, out)
         _move(q[k], ends[k], bubbles, new[k], other, nodes, weights, rates, out[k])
 
 
-def replaced(q: Array, ends: Array, gains: Array, d: Array, bubbles: int, level: tuple[int, int]) -> tuple[Array, Array]:
+def replaced(
+    q: Array, ends: Array, gains: Array, d: Array, bubbles: int, level: tuple[int, int]
+) -> tuple[Array, Array]:
     """Ends (K, E'+1) of elements that suit K solutions, and the solutions on them (K, 2n').
 
     q (K, 2n) on elements with ``ends`` (K, E+1) and ``bubbles`` each, at scaled deflections d (K,)
