@@ -117,7 +117,8 @@ def table(rows: list[Row]) -> str:
     head = f"{'material':14} {'bare us':>9} {'sample us':>10} {'ratio':>6} {'draws':>7} {'CPU s':>7}"
     lines = [f"{head} {'diagnose us':>12} {'ratio':>6} {'films':>7} {'CPU s':>7}"]
     for r in rows:
-        line = f"{r.material:14} {r.bare:9.1f} {r.sample:10.1f} {r.ratios[0]:6.1f} {r.evaluations:7d} {r.sample_seconds:7.1f}"
+        line = f"{r.material:14} {r.bare:9.1f} {r.sample:10.1f} {r.ratios[0]:6.1f} {r.evaluations:7d}"
+        line += f" {r.sample_seconds:7.1f}"
         if r.diagnose is not None:
             line += f" {r.diagnose:12.1f} {r.ratios[1]:6.1f} {r.curves:7d} {r.diagnose_seconds:7.1f}"
         lines.append(line)

@@ -260,8 +260,8 @@ R P1 sin(theta) changes by less than {STEADY:g} over the film, or, where that fi
 
 {DRAWS} draws per material from the same priors, none left out: R2/R1 = {", ".join(f"{r:g}" for r in RATIOS)} in equal
 parts; half of the films with a pre-stretch of 1 plus an exponential of mean {STRETCHED:g}; 15 even deflections up to
-an end between {REACH[0]:g} and {REACH[1]:g} R2. A film is left to shooting if one of its forces is `unresolved` or at the
-`iteration limit`. Errors as above, against shooting at a relative tolerance of {RTOL:g}.
+an end between {REACH[0]:g} and {REACH[1]:g} R2. A film is left to shooting if one of its forces is `unresolved` or at
+the `iteration limit`. Errors as above, against shooting at a relative tolerance of {RTOL:g}.
 
 {_wide_table(rows)}
 

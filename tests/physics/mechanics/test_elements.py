@@ -13,7 +13,7 @@ RATIO, SPAN = 3.5, np.log(3.5)
 
 def some(level, count, seed):
     """(unknowns, ends, gains) of smooth solutions of a level."""
-    rng, (number, bubbles) = np.random.default_rng(seed), level
+    rng, number = np.random.default_rng(seed), level[0]
     ends = np.sort(np.append(rng.uniform(0, SPAN, (count, number - 1)), np.tile([0, SPAN], (count, 1)), axis=1), axis=1)
     return rng.normal(size=(count, elements.unknowns(*level))), ends, rng.uniform(size=(count, number))
 
@@ -31,7 +31,7 @@ def test_functions_vanish_at_the_edges_and_slopes_are_differences(level):
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_tables_are_the_functions_at_the_gauss_points_and_edges(level):
-    nodes, weights, value, rate, extra, low, width = elements.basis(*level)
+    _, weights, value, rate, extra, low, width = elements.basis(*level)
     assert weights.sum() == pytest.approx(2)
     np.testing.assert_allclose(value[:, -2:], np.eye(level[1] + 2)[[0, -1]].T, atol=1e-13)
     # Bubbles and the next two are of unit slope norm, and their slopes are orthogonal.

@@ -8,7 +8,6 @@ from typing import Any
 import numba
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from bayesmembrane.ground.parameters import Array
 

@@ -465,22 +465,13 @@ def follow_block(p_rows, gd, l0, grid, q, ends, tables, limits, keep, wanted, re
     """`follow` for one block; q (2n, LANES) is overwritten."""
     nodes, weights, value, rate, extra, low, width = tables
     most, tolerance, gain_limit, variation_limit = limits
-    elements, m, p, kept, span = (
-        ends.shape[0] - 1,
-        q.shape[0],
-        load_all(p_rows, FIELDS),
-        0,
-        load(ends, ends.shape[0] - 1),
-    )
-    inner = elements * nodes.shape[0]
+    elements, size, m = ends.shape[0] - 1, nodes.shape[0], q.shape[0]
+    p, kept, span = load_all(p_rows, FIELDS), 0, load(ends, elements)
+    inner = elements * size
     points = inner + 2
     half, growth, weight = np.empty((elements, LANES)), np.empty((points, LANES)), np.empty((inner, LANES))
     measure(ends, nodes, weights, half, growth, weight)
-    x, c, row = (
-        np.empty((ROWS * points, LANES)),
-        np.empty((9 * nodes.shape[0], LANES)),
-        np.empty((6 * nodes.shape[0], LANES)),
-    )
+    x, c, row = np.empty((ROWS * points, LANES)), np.empty((9 * size, LANES)), np.empty((6 * size, LANES))
     band, y, z = np.zeros((m * width, LANES)), np.empty((m, LANES)), np.empty((m, LANES))
     grad, mixed, trial, base = np.empty((m, LANES)), np.empty((m, LANES)), q.copy(), q.copy()
     step, old, dq, dold = np.zeros((m, LANES)), q.copy(), np.zeros((m, LANES)), np.zeros((m, LANES))

@@ -75,7 +75,7 @@ def solve(request: Request) -> Curves:
 
 
 def _shown(result: Array, status: NDArray[np.int8], near: NDArray[np.bool_], spare: Spared) -> NDArray[np.bool_]:
-    """(B, N) True for states that show a film to be such as are spared: resolved ones, or clearly if nearly resolved."""
+    """(B, N) True for states for which their films are spared: resolved ones, or clearly so if nearly resolved."""
     if spare is Spared.NONE:
         return np.zeros(near.shape, np.bool_)
     margin = result[:, kernels.CONVEX if spare is Spared.NOT_CONVEX else kernels.ELLIPTIC]
@@ -191,7 +191,8 @@ def _curves(request: Request, search: _Search, back: NDArray[np.intp] | None) ->
     k, result, status, shown = kernels, search.result, search.status, search.shown
     if back is not None:
         result = np.take_along_axis(result, back[:, None], axis=2)
-        status, shown = (np.take_along_axis(v, back, axis=1) for v in (status, shown))
+        status = np.take_along_axis(status, back, axis=1)
+        shown = np.take_along_axis(shown, back, axis=1)
     ok, sign = status == Status.OK, np.sign(request.deflection)
     length = request.inner_radius / request.prestretch[:, None]
     note = np.where(result[:, k.LEAST_P2] < 0, Note.WRINKLED, 0) | np.where(result[:, k.SLACK] <= 0, Note.SLACK, 0)

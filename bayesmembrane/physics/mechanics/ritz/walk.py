@@ -1,4 +1,4 @@
-"""On from the last state of a path that was lost: does it go on with better elements and shorter steps, or end there?"""
+"""On from the last state of a path that was lost: does it go on with better elements and shorter steps, or end?"""
 
 from __future__ import annotations
 
