@@ -125,8 +125,11 @@ def _values(t, e, q, ends, bubbles):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, error_model="numpy")
 def _density(q, ends, gain, d, bubbles, share, widest):  # type: ignore[no-untyped-def]
     """How much of the new elements belongs in each of `SAMPLES` pieces of every old one, summed up from 0."""
-    elements, span, most = gain.size, ends[-1], np.max(gain)
-    level, bend = np.zeros(elements * SAMPLES + 1), np.empty(SAMPLES)
+    # Loops, here and below: numba takes seconds to compile what is said of whole arrays.
+    elements, span, most, whole = gain.size, ends[-1], 0.0, 0.0
+    level, bend = np.empty(elements * SAMPLES + 1), np.empty(SAMPLES)
+    for e in range(elements):
+        most = max(most, gain[e])
     for e in range(elements):
         width = (ends[e + 1] - ends[e]) / SAMPLES
         total, u, w = 0.0, 0.0, 0.0
@@ -142,10 +145,12 @@ def _density(q, ends, gain, d, bubbles, share, widest):  # type: ignore[no-untyp
         for k in range(SAMPLES):
             part = bend[k] / total if total > 0.0 else 1.0 / SAMPLES
             level[e * SAMPLES + k + 1] = weight * (0.5 / SAMPLES + 0.5 * part)
-    whole = np.sum(level)
-    for e in range(elements):
-        level[e * SAMPLES + 1 : (e + 1) * SAMPLES + 1] += widest * whole * (ends[e + 1] - ends[e]) / (SAMPLES * span)
-    return np.cumsum(level)
+        whole += weight
+    level[0] = 0.0
+    for i in range(elements * SAMPLES):
+        e = i // SAMPLES
+        level[i + 1] += level[i] + widest * whole * (ends[e + 1] - ends[e]) / (SAMPLES * span)
+    return level
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -166,11 +171,12 @@ def _place(ends, level, new):  # type: ignore[no-untyped-def]
 def _move(q, ends, bubbles, new, other, nodes, weights, rates, out):  # type: ignore[no-untyped-def]
     """The nearest in slope, element by element, of the solution q on ``new`` elements with ``other`` bubbles."""
     per = other + 1
-    out[:] = 0.0
     for e in range(new.size - 1):
         half, start = 0.5 * (new[e + 1] - new[e]), 2 * e * per
         if e > 0:
             out[start - 2], out[start - 1] = _values(new[e], _home(new[e], ends), q, ends, bubbles)
+        for i in range(2 * other):
+            out[start + i] = 0.0
         for g in range(nodes.size):
             t = new[e] + half * (1.0 + nodes[g])
             a, b = _slopes(t, _home(t, ends), q, ends, bubbles)

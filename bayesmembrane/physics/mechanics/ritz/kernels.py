@@ -96,16 +96,19 @@ def states(q, d, l0, p, points, span, value, rate, half, growth, x):
         state(q, steep, l0, p, e, elements, column, value, rate, load(half, e), load(growth, g), ROWS * g, x)
 
 
-def put(band, i, j, width, add, aa, ab, ba, bb):
-    """The four entries of K that couple functions i and j <= i: added to what is there if ``add``."""
+def add(rows, row, value):
+    """Add a vector to a row."""
+    store(rows, row, load(rows, row) + value)
+
+
+def put(band, i, j, width, aa, ab, ba, bb):
+    """Add to the four entries of K that couple functions i and j <= i."""
     o = 2 * i * width + 2 * (i - j)
-    if add:
-        aa, bb, ba = aa + load(band, o), bb + load(band, o + width), ba + load(band, o + width + 1)
-    store(band, o, aa)
-    store(band, o + width, bb)
-    store(band, o + width + 1, ba)
+    add(band, o, aa)
+    add(band, o + width, bb)
+    add(band, o + width + 1, ba)
     if j < i:
-        store(band, o - 1, ab)
+        add(band, o - 1, ab)
 
 
 def coefficients(x, first, size, steep, half, growth, weight, c, sums):
@@ -148,13 +151,17 @@ def assemble(x, c, row, sums, span, value, rate, half, growth, weight, width, gr
     for i in range(3):
         store(sums, i, zero)
     store(sums, 3, splat(np.inf))
+    for i in range(grad.shape[0]):
+        store(grad, i, zero)
+        store(mixed, i, zero)
+    for i in range(band.shape[0]):
+        store(band, i, zero)
     for e in range(elements):
         steep, start = load(half, e) / span, e * per - 1
         coefficients(x, e * size, size, steep, load(half, e), growth, weight, c, sums)
         lowest = 1 if e == 0 else 0
         for i in range(lowest, per if e == elements - 1 else per + 1):
-            # The hat that begins an element has been met as the one that ends the element before.
-            met, o = i == 0, 2 * (start + i)
+            o = 2 * (start + i)
             ga, gb, ka, kb = zero, zero, zero, zero
             for g in range(size):
                 v, t, b, r = value[i, g], rate[i, g], 9 * g, 6 * g
@@ -169,14 +176,10 @@ def assemble(x, c, row, sums, span, value, rate, half, growth, weight, width, gr
                 gb = gb + load(c, b + 2) * t
                 ka = ka + to_b
                 kb = kb + of_b
-            ka, kb = ka * steep, kb * steep
-            if met:
-                ga, gb = ga + load(grad, o), gb + load(grad, o + 1)
-                ka, kb = ka + load(mixed, o), kb + load(mixed, o + 1)
-            store(grad, o, ga)
-            store(grad, o + 1, gb)
-            store(mixed, o, ka)
-            store(mixed, o + 1, kb)
+            add(grad, o, ga)
+            add(grad, o + 1, gb)
+            add(mixed, o, ka * steep)
+            add(mixed, o + 1, kb * steep)
             for j in range(lowest, i + 1, 2):
                 # Two functions at once: the rows are loaded once for both.
                 k = min(j + 1, i)
@@ -194,9 +197,9 @@ def assemble(x, c, row, sums, span, value, rate, half, growth, weight, width, gr
                     cd = cd + on_b * tk
                     bb = bb + of_b * tj
                     dd = dd + of_b * tk
-                put(band, start + i, start + j, width, met, aa, ab, ba, bb)
+                put(band, start + i, start + j, width, aa, ab, ba, bb)
                 if k > j:
-                    put(band, start + i, start + k, width, met, cc, cd, dc, dd)
+                    put(band, start + i, start + k, width, cc, cd, dc, dd)
 
 
 def factorise(band, low, width, scaled, pivots):
@@ -568,6 +571,7 @@ KERNELS = (
     measure,
     state,
     states,
+    add,
     put,
     coefficients,
     assemble,
