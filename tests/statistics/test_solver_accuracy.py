@@ -28,9 +28,9 @@ FINEST = len(ritz.LEVELS) - 1
 MOST_FINEST = 100  # films of a material that are followed with the finest basis: it takes a second for each
 # Wide draws: rigs, and for half of the films a pre-stretch of 1 plus an exponential of this mean; deflections in R2.
 RATIOS, STRETCHED, REACH = (1.1, 1.5, 3.5, 10.0), 0.05, (0.2, 2.5)
-# Energies that differ by this are those of two states: of a film that can buckle shooting finds branches with more
-# energy, or with less that no path leads to. So few of the forces may be such.
-OTHER, MOST_OTHER = 1e-3, 0.01
+# Energies or slopes that differ by this are those of two states: of a film that can buckle shooting finds branches with
+# more energy, or with less that no path leads to. So few of the forces may be such.
+OTHER, OTHER_SLOPE, MOST_OTHER = 1e-3, 0.1, 0.01
 MOST_SHOT = 1e-3  # share of the films that Ritz may leave to shooting
 NO_STATE = (Status.NOT_ELLIPTIC, Status.INDEFINITE)
 FLAGGED = (Status.UNRESOLVED, Status.ITERATION_LIMIT)
@@ -155,6 +155,7 @@ def wide(material: type[Material]) -> Wide:
             tally[label] = tally.get(label, 0) + count
         both = curves.ok & tight.ok & (tight.variation < STEADY)
         same = both & (np.abs(curves.energy / tight.energy - 1) < OTHER)
+        same &= np.abs(curves.slope - tight.slope) < OTHER_SLOPE * np.abs(tight.slope)
         other += int(np.sum(both & ~same))
         errors.append(np.abs(curves.force / tight.force - 1)[same])
     error = np.concatenate(errors)
@@ -262,7 +263,8 @@ R P1 sin(theta) changes by less than {STEADY:g} over the film, or, where that fi
 parts; half of the films with a pre-stretch of 1 plus an exponential of mean {STRETCHED:g}; 15 even deflections up to
 an end between {REACH[0]:g} and {REACH[1]:g} R2. A film is left to shooting if one of its forces is `unresolved` or at
 the `iteration limit`. Errors as above, against shooting at a relative tolerance of {RTOL:g}; where the energies of
-the two solvers differ by more than {OTHER:g} they have found different states, which are counted.
+the two solvers differ by more than {OTHER:g}, or the slopes by more than {OTHER_SLOPE:g}, they have found different
+states, which are counted.
 
 {_wide_table(rows)}
 
