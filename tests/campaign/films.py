@@ -44,12 +44,13 @@ def write_campaign(folder: Path, body: str = "", films: Sequence[str] = ("a", "b
 
 
 def planned(folder: Path, count: int = 0, **sections: str) -> tuple[Path, Plan]:
-    """(folder of the campaign, plan) of such a campaign, stored; with ``count`` of its first task instead, reseeded."""
+    """(folder of the campaign, plan) of such a campaign, stored; with ``count`` tasks like its first instead."""
     file = write_campaign(folder, **sections)
     made = plan(read_campaign(file), file)
     if count:
         one = made.tasks[0]
-        tasks = [Task.from_plain({**one.plain(), "seed": i + 1, "key": ""}).keyed() for i in range(count)]
+        own = ({"film": f"film{i}", "seed": i, "key": ""} for i in range(1, count + 1))
+        tasks = [Task.from_plain({**one.plain(), **values}).keyed() for values in own]
         made = Plan(made.name, made.source, tuple(tasks), made.deadline)
     campaign = folder / "night"
     write_plan(campaign, made)
