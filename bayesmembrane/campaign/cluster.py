@@ -14,6 +14,7 @@ from bayesmembrane.ground.errors import SettingsError
 Result = TypeVar("Result")
 
 PATIENCE = 30.0  # s for the scheduler to answer
+AHEAD = 2000  # tasks at the scheduler: enough for a cluster that grows with what waits there
 
 
 class DaskCluster:
@@ -21,6 +22,8 @@ class DaskCluster:
 
     Raises `SettingsError` if dask.distributed is not installed, or nobody answers there.
     """
+
+    ahead = AHEAD
 
     def __init__(self, address: str) -> None:
         try:

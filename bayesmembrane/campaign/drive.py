@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import heapq
 import signal
 import time
 import uuid
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
@@ -24,7 +25,6 @@ from bayesmembrane.campaign.record import ENDED, FAILED, PREEMPTED, Record, read
 from bayesmembrane.campaign.work import ELSEWHERE, STOPPED, Execute, Order, Perform, execute, write_session
 from bayesmembrane.ground.errors import BayesmembraneError, StorageError
 
-AHEAD = 2000  # tasks handed out at most: what is out costs memory, and what waits does not
 COMMIT = 1.0  # s between two notes in the index
 GRACE = 20.0  # s for tasks to store what they have; then they are ended, and lose what came after their last checkpoint
 TRIES = 3  # of a task that was preempted though nobody stopped the campaign
@@ -148,7 +148,8 @@ class _Driver:
         for key, needs in self.open.items():
             for need in needs:
                 self.needed.setdefault(need, []).append(key)
-        self.ready = deque(key for key, needs in self.open.items() if not needs)
+        self.place = {task.key: place for place, task in enumerate(self.plan.tasks)}
+        self.ready = [(self.place[key], key) for key, needs in self.open.items() if not needs]  # in order: a heap
 
     def run(self) -> str:
         """Until all is done, or it is time; returns how it ended."""
@@ -175,8 +176,8 @@ class _Driver:
         return DEADLINE if self.order.ends is not None and time.time() >= self.order.ends else ""
 
     def _hand_out(self) -> None:
-        while self.ready and len(self.out) < AHEAD:
-            key = self.ready.popleft()
+        while self.ready and len(self.out) < self.executor.ahead:
+            _, key = heapq.heappop(self.ready)
             self.tries[key] += 1
             future = self.executor.submit(self.session.execute, self.order, self.tasks[key], 1)
             self.out[key] = future
@@ -199,7 +200,7 @@ class _Driver:
         self.noted.append(record)
         again = record.state == PREEMPTED and self.tries[key] < TRIES and not self._stop()
         if again:
-            self.ready.append(key)
+            heapq.heappush(self.ready, (len(self.tasks) + self.tries[key], key))  # after all others
         elif record.state in ENDED:
             self._release(key)
 
@@ -208,7 +209,7 @@ class _Driver:
         for other in self.needed.pop(key, ()):
             self.open[other].discard(key)
             if not self.open[other]:
-                self.ready.append(other)
+                heapq.heappush(self.ready, (self.place[other], other))
 
     def _record(self, key: str, future: Future[Record]) -> Record:
         """What became of a task, also where its worker could not say so."""

@@ -29,7 +29,12 @@ class WorkerDiedError(BayesmembraneError):
 
 
 class Executor(Protocol):
-    """Where tasks run. A worker that dies costs its task another attempt, and nothing else."""
+    """Where tasks run. A worker that dies costs its task another attempt, and nothing else.
+
+    ahead : tasks that it is given at most: what is out costs memory, and what comes later cannot overtake it
+    """
+
+    ahead: int
 
     def submit(self, work: Callable[..., Result], *given: Any) -> Future[Result]:
         """Start ``work(*given)`` somewhere and soon; both must be picklable.
@@ -54,11 +59,13 @@ class LocalPool:
     """An `Executor` of ``count`` processes (None: one for each core)."""
 
     def __init__(self, count: int | None = None) -> None:
+        count = count or cores()
+        self.ahead = 2 * count
         self._jobs: SimpleQueue[Job | None] = SimpleQueue()
         self._context = multiprocessing.get_context("spawn")
         self._guard, self._over = Lock(), False
         self._processes: dict[int, Any] = {}
-        self._threads = [Thread(target=self._keep, args=(i,), daemon=True) for i in range(count or cores())]
+        self._threads = [Thread(target=self._keep, args=(i,), daemon=True) for i in range(count)]
         for thread in self._threads:
             thread.start()
 
