@@ -109,9 +109,12 @@ def table_rows(entries: Iterable[Entry]) -> list[Row]:
                 row.sampled = entry.found
             if entry.analysis == "compare" and entry.found:
                 row.evidence = entry.found["rows"][place]
+    beside: dict[tuple[str, str], list[Row]] = {}
+    for row in rows.values():
+        beside.setdefault((row.film, row.reach), []).append(row)
     for entry in asked:
-        _answer(rows, entry)
-    return list(rows.values())
+        _answer(beside, entry)
+    return [row for group in beside.values() for row in group]
 
 
 def _row(entry: Entry, claim: Mapping[str, Any]) -> Row:
@@ -119,13 +122,12 @@ def _row(entry: Entry, claim: Mapping[str, Any]) -> Row:
     return Row(entry.film, entry.reach, label, claim["noise"], claim["convexity"])
 
 
-def _answer(rows: dict[tuple[str, str, str], Row], entry: Entry) -> None:
+def _answer(beside: dict[tuple[str, str], list[Row]], entry: Entry) -> None:
     """Lay the verdict on a measurement beside all of its hypotheses; alone in a row where there is none."""
-    here = [r for (film, reach, _), r in rows.items() if (film, reach) == (entry.film, entry.reach)]
-    if not here:
-        here = [Row(entry.film, entry.reach, "any", entry.noise, entry.convexity)]
-        rows[entry.film, entry.reach, f"asked {entry.convexity}"] = here[0]
-    for row in here:
+    group = beside.setdefault((entry.film, entry.reach), [])
+    if not any(row.convexity == entry.convexity for row in group):
+        group.append(Row(entry.film, entry.reach, "any", entry.noise, entry.convexity))
+    for row in group:
         if row.convexity == entry.convexity:
             row.take(entry)
             if entry.found:
@@ -185,7 +187,7 @@ _HEADS = {
     "state": "state",
     "ess": "ESS",
     "r_hat": "R-hat",
-    "parameters": "parameters, mean [94 % interval], N/m or -",
+    "parameters": "parameters (SI), mean [94 % interval]",
     "log_evidence": "ln Z",
     "probability": "probability",
     "verdict": "verdict",
@@ -237,9 +239,9 @@ def _cells(row: Row, base: str) -> dict[str, Any]:
     texts["ess"] = _number(values["ess"], ".0f")
     texts["r_hat"] = _number(values["r_hat"], ".3f")
     texts["parameters"] = "; ".join(_parameter(n, v) for n, v in values["parameters"].items())
-    texts["log_evidence"] = _number(values["log_evidence"], ".1f")
+    texts["log_evidence"] = _number(values["log_evidence"], ".2f")
     if values["log_evidence_sd"] is not None:
-        texts["log_evidence"] += f" ± {_number(values['log_evidence_sd'], '.1f')}"
+        texts["log_evidence"] += f" ± {_number(values['log_evidence_sd'], '.2f')}"
     texts["probability"] = _number(values["probability"], ".3f")
     numbers = ("ess", "r_hat", "log_evidence", "probability")
     return {

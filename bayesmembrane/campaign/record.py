@@ -71,7 +71,9 @@ def read_record(path: Path) -> Record | None:
 
 def read_records(campaign: Path) -> dict[str, Record]:
     """Every record of a campaign by the key of its task."""
-    found = (read_record(path) for path in sorted((campaign / RECORDS).glob("*.json")))
+    folder = campaign / RECORDS
+    names = os.listdir(folder) if folder.is_dir() else []
+    found = (read_record(folder / name) for name in names if name.endswith(".json") and name[0] != ".")
     return {record.key: record for record in found if record is not None}
 
 

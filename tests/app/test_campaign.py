@@ -116,19 +116,52 @@ def test_a_wrong_setting_is_one_sentence_and_exit_1(run: Run, arguments: list[st
         assert word in err
 
 
+PROGRAM = """
+import signal
+from bayesmembrane.app.cli import main
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where a script began it in the background
+    main()
+"""
+
+
+def begun(folder: Path, *arguments: object) -> subprocess.Popen[str]:
+    """The command line as a process."""
+    (folder / "program.py").write_text(PROGRAM)
+    command = [sys.executable, "program.py", "campaign", *map(str, arguments)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(command, cwd=folder, env=environment, stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(what: Callable[[], bool]) -> None:
+    latest = time.monotonic() + 300
+    while not what():
+        assert time.monotonic() < latest, "it never came"
+        time.sleep(0.05)
+
+
+def sampling(campaign: Path) -> bool:
+    return any(now.get("ess") for now in read_now(campaign).values())
+
+
+def test_a_campaign_that_is_killed_and_resumed_has_the_draws_of_one_that_was_not(run: Run, tmp_path: Path) -> None:
+    file = write_campaign(tmp_path)
+    client = begun(tmp_path, "run", file, "--out", "killed", "--workers", 2)
+    wait_for(lambda: sampling(tmp_path / "killed"))
+    client.kill()
+    client.communicate(timeout=60)
+    assert json.loads(run("status", "killed", "--json")[1])["tasks"]["done"] < 4
+    assert json.loads(run("resume", "killed", "--json", "--workers", 1)[1])["tasks"]["done"] == 4
+    assert json.loads(run("run", file, "--json", "--workers", 1, "--out", "calm")[1])["tasks"]["done"] == 4
+    assert draws(tmp_path / "killed") == draws(tmp_path / "calm")
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_with_130_and_the_command_that_goes_on(run: Run, tmp_path: Path, number: int) -> None:
     file = write_campaign(tmp_path, sampling="ess = 1e6\nmost_steps = 200000", films=("a",))
-    program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    program += "from bayesmembrane.app.cli import main\nif __name__ == '__main__': main()\n"
-    (tmp_path / "program.py").write_text(program)
-    command = [sys.executable, "program.py", "campaign", "run", str(file), "--out", "night", "--workers", "1"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    client = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True)
-    latest = time.monotonic() + 300
-    while not any(now.get("ess") for now in read_now(tmp_path / "night").values()):
-        assert time.monotonic() < latest, "sampling never began"
-        time.sleep(0.1)
+    client = begun(tmp_path, "run", file, "--out", "night", "--workers", 1)
+    wait_for(lambda: sampling(tmp_path / "night"))
     client.send_signal(number)
     _, err = client.communicate(timeout=120)
     assert client.returncode == 130
