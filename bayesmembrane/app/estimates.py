@@ -112,6 +112,8 @@ def _rehearsed(left: Sequence[Task], tell: Callable[[str], None]) -> dict[Kind, 
             break
         tell(f"Timing {'+'.join(kind)}")
         try:
+            if not found:
+                _rehearse(task)  # loads what all of them need, which is no part of their time
             found[kind] = _rehearse(task)
         except BayesmembraneError:
             continue  # the campaign will refuse it, and say why
@@ -119,18 +121,16 @@ def _rehearsed(left: Sequence[Task], tell: Callable[[str], None]) -> dict[Kind, 
 
 
 def _rehearse(task: Task) -> float:
-    """s of one run, of which a part is walked; the second time, for the first one loads what is compiled."""
+    """s of one run, of which a part is walked."""
     options = {"sampling": {"ess": 1000.0}, "page": False, **(task.options or {})}
     walk = {**options["sampling"]}
     walk["most_steps"] = max(min(walk.get("most_steps", STEPS), STEPS), walk.get("chunk", 300))
     short = replace(task, analysis="sample", options={**options, "sampling": walk})
     told: list[Progress] = []
-    for _ in range(2):
-        told.clear()
-        with tempfile.TemporaryDirectory(prefix="rehearsal-") as name:
-            began = time.perf_counter()
-            perform(short, Path(name).resolve(), lambda _, now: told.append(now) if isinstance(now, Progress) else None)
-            seconds = time.perf_counter() - began
+    began = time.perf_counter()
+    with tempfile.TemporaryDirectory(prefix="rehearsal-") as name:
+        perform(short, Path(name).resolve(), lambda _, now: told.append(now) if isinstance(now, Progress) else None)
+    seconds = time.perf_counter() - began
     lacking = told[-1].seconds_left if told else 0.0
     return seconds + (lacking if lacking > 0 else 0.0)
 

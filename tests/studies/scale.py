@@ -136,12 +136,13 @@ WORDS = """# Scale: ten thousand tiny runs
 Made by `make study-scale`. A run here draws a hundred numbers and says what a posterior would; everything else is the
 campaign itself: handing a run out, locking it, writing its record whole and synced, taking it back, noting it in the
 index. Two workers, {machine}; `status` and `report` are processes of their own, the
-quickest of three. In parentheses the time of a processor alone, which does not hang on what else the machine does.
+quickest of three; in parentheses the time of a processor alone, which does not hang on what else the machine does.
 
 {table}
 
 "A run, on each worker" is how long a worker is busy or waiting for each run, its start and end among it; a real run
-takes seconds to minutes. The page has a row for each of them. Memory before the first run is that of the program with its plan.
+takes seconds to minutes. The page has a row for each of them. Memory before the first run is that of the
+program with its plan.
 """
 
 
