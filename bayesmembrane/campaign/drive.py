@@ -195,6 +195,8 @@ class _Driver:
 
     def _take(self, key: str, future: Future[Record]) -> None:
         self.out.pop(key, None)
+        if future.cancelled() and self._stop():
+            return  # it had not begun, and is what it was
         record = self._record(key, future)
         self.states[key] = record.state
         self.noted.append(record)
