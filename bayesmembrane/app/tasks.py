@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -75,8 +76,7 @@ def _question(task: Task) -> Question:
 def sample(task: Task, whole: Measurement, work: Work) -> tuple[Answer[Any], Values]:
     """The posterior: parameters, and how well it was sampled."""
     walk = Settings(**(task.options or {})["sampling"])
-    work = Work(work.seed, work.out, work.ess, work.tell, walk)
-    answer = analyses.sample(_part(task, whole), _claim(task), work, whole=whole)
+    answer = analyses.sample(_part(task, whole), _claim(task), replace(work, walk=walk), whole=whole)
     return answer, sampled(answer.document)
 
 
