@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-import study-seeds study-sbc clean
+.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-import study-scale study-seeds study-sbc clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -22,6 +22,7 @@ help:
 	@echo "make study-reliability  are probabilities frequencies; hours; goes on where it was; RELIABILITY='--count 60' asks for less"
 	@echo "make study-second  the same on the second generator, once and at the end; SECOND='--count 60' asks for less"
 	@echo "make study-fuzz  500 calls at random, each judged, an hour or so; goes on where it was; FUZZ='--only fit' asks for less"
+	@echo "make study-scale  ten thousand tiny runs in a campaign, some minutes: what it costs beside the work itself"
 	@echo "make study-import 10 000 damaged exports, what becomes of them, some minutes; IMPORT='--count 1000' asks for less"
 	@echo "make study-seeds 50 seeds for the statistical tests, lanes on and off, hours; goes on where it was; SEEDS='--group quick' asks for less"
 	@echo "make study-sbc  simulation-based calibration of every material, hours; goes on where it was; SBC='--only gent --limit 20' asks for less"
@@ -76,6 +77,9 @@ study-second: $(STAMP)
 
 study-fuzz: $(STAMP)
 	$(PY) -m tests.fuzz.run --jobs $(PYTEST_WORKERS) $(FUZZ)
+
+study-scale: $(STAMP)
+	$(PY) -m tests.studies.scale --table docs/studies/scale.md $(SCALE)
 
 study-import: $(STAMP)
 	$(PY) -m tests.studies.imports --table docs/studies/import.md $(IMPORT)

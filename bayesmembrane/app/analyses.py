@@ -19,7 +19,7 @@ from bayesmembrane.calibration.fit import fit as run_fit
 from bayesmembrane.calibration.predictions import Wanted, rest_of
 from bayesmembrane.calibration.run import Run, RunSettings, predictions_of
 from bayesmembrane.calibration.run import sample as run_sample
-from bayesmembrane.calibration.sampling.walk import Progress
+from bayesmembrane.calibration.sampling.walk import Progress, Settings
 from bayesmembrane.comparison.compare import Range, compare_ranges
 from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.result import Comparison
@@ -56,12 +56,14 @@ class Work:
     out : folder of all answers; None stores nothing
     ess : effective sample size of posteriors
     tell : is told (label, what is being done for it: a text, or the `Progress` of sampling)
+    walk : how `sample` walks, instead of the usual way to ``ess``
     """
 
     seed: int = 0
     out: Path | None = None
     ess: float = 1000.0
     tell: Tell = silent
+    walk: Settings | None = None
 
     @property
     def solve(self) -> Solve:
@@ -114,7 +116,7 @@ def sample(
         work.tell(claim.label(), progress)
 
     solve = work.solve
-    how = RunSettings(work.seed, work.out, name, work.ess, predictions=False)
+    how = RunSettings(work.seed, work.out, name, work.ess, settings=work.walk, predictions=False)
     run = run_sample(measurement, claim, how, progress=tell, solve=solve)
     rest = rest_of(measurement, whole)
     if run.path is not None:  # of an interrupted run, too: a report shows what there is, and solves nothing

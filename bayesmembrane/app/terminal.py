@@ -20,7 +20,7 @@ import typer
 from bayesmembrane.ground.errors import SettingsError
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from rich.console import Console, RenderableType
 
     from bayesmembrane.calibration.sampling.walk import Progress
 
@@ -140,6 +140,20 @@ def bars() -> Iterator[Callable[[str, Progress | str], None]]:
                 shown.update(tasks[label], completed=share(now), text=in_words(now))
 
         yield tell
+
+
+@contextmanager
+def live() -> Iterator[Callable[[RenderableType], None]]:
+    """Something on stderr that changes in place: call what this yields with what is to be seen now."""
+    from rich.live import Live
+
+    with Live(console=_console(True), auto_refresh=False, transient=True) as shown:
+        yield lambda what: shown.update(what, refresh=True)
+
+
+def show(what: RenderableType) -> None:
+    """Something on stdout."""
+    _console(False).print(what)
 
 
 def share(progress: Progress) -> float:

@@ -31,3 +31,8 @@ def whole_page(**content: Any) -> str:
     """The page; ``content`` is what its template names."""
     environment = _environment()
     return environment.get_template("report.html.j2").render(fragment=fragment, **content)
+
+
+def campaign_page(**content: Any) -> str:
+    """The page of a campaign; ``content`` is what its template names."""
+    return _environment().get_template("campaign.html.j2").render(**content)

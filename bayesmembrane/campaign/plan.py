@@ -1,0 +1,61 @@
+"""All tasks of a campaign, stored whole, so that resuming asks for exactly the same."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from bayesmembrane.campaign.task import Task
+from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.files import write_text
+from bayesmembrane.ground.plain import json_text
+
+PLAN, FORMAT = "plan.json", 1
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be done.
+
+    name : of the campaign
+    source : its file
+    tasks : in the order in which they begin
+    deadline : time of day at which it ends, done or not; None: when all is done
+    """
+
+    name: str
+    source: str
+    tasks: tuple[Task, ...]
+    deadline: str | None = None
+
+
+def write_plan(folder: Path, made: Plan) -> Path:
+    """Store a plan in the folder of its campaign, in place of an older one.
+
+    Raises `StorageError` if that cannot be, or the folder holds something else.
+    """
+    if folder.exists() and not (folder / PLAN).is_file() and (not folder.is_dir() or any(folder.iterdir())):
+        raise StorageError("the folder holds files that are no campaign", str(folder), "choose another with --out")
+    head = {"program": "bayesmembrane", "format": FORMAT, "name": made.name, "source": made.source}
+    body = {"deadline": made.deadline, "tasks": [task.plain() for task in made.tasks]}
+    return write_text(folder / PLAN, json_text({**head, **body}), "the plan of the campaign")
+
+
+def read_plan(folder: Path) -> Plan:
+    """The plan in the folder of a campaign; raises `StorageError` if there is none, or it is damaged."""
+    path = folder / PLAN
+    if not path.is_file():
+        raise StorageError("there is no campaign in this folder", str(folder), "name the folder that campaign run made")
+    try:
+        held = json.loads(path.read_text(encoding="utf-8"))
+        tasks = tuple(Task.from_plain(values) for values in held["tasks"])
+        if held["format"] != FORMAT:
+            raise ValueError(f"it has the format {held['format']}, and this version reads {FORMAT}")
+        return Plan(str(held["name"]), str(held["source"]), tasks, held["deadline"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise StorageError(
+            f"the plan of the campaign is damaged ({type(error).__name__}: {error})",
+            str(path),
+            "give campaign run the campaign file again: what is done stays done",
+        ) from None
