@@ -64,8 +64,10 @@ def raised() -> Iterator[None]:
 @contextmanager
 def _handled(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
     before = {number: signal.getsignal(number) for number in SIGNALS}
+    # What is ignored stays so: a worker leaves Ctrl-C to the process that it works for.
+    before = {number: old for number, old in before.items() if old is not signal.SIG_IGN}
     try:
-        for number in SIGNALS:
+        for number in before:
             signal.signal(number, handler)
         yield
     finally:
