@@ -21,8 +21,9 @@ from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.files import make_folder, remove_parts, unwritable, write_whole
 from bayesmembrane.ground.fingerprint import digest
 from bayesmembrane.ground.locks import alone
+from bayesmembrane.ground.netcdf import packed
 from bayesmembrane.ground.quiet import arviz
-from bayesmembrane.ground.sealed import checked, damaged, read_json, read_toml, seal, write_json, write_toml
+from bayesmembrane.ground.sealed import checked, damaged, read_json, read_toml, sealed, write_json, write_toml
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 ASKED, POSTERIOR, STATUS = "run.toml", "posterior.nc", "status.json"
@@ -214,14 +215,10 @@ def write_run(folder: Path, data: Any, status: dict[str, Any]) -> None:
     Every file is then as it was before, or complete; a status beside draws that it does not belong to is told by
     `read_run`, and is written again when the run goes on.
     """
-    sums: list[str] = []
-
-    def save(part: Path) -> None:
-        data.to_netcdf(str(part), engine="h5netcdf")
-        sums.append(seal(part))
-
-    write_whole(folder / POSTERIOR, save, "the run")
-    write_json(folder / STATUS, {"posterior_sha256": sums[-1], **status}, "the run")
+    groups = {name: data[name] for name in data.groups()}
+    content, found = sealed(packed(groups))
+    write_whole(folder / POSTERIOR, lambda part: part.write_bytes(content), "the run")
+    write_json(folder / STATUS, {"posterior_sha256": found, **status}, "the run")
 
 
 def read_run(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Any]:

@@ -64,17 +64,14 @@ def read_json(path: Path, what: str) -> dict[str, Any]:
     return content
 
 
-def seal(path: Path) -> str:
-    """Put the checksum of a file after its end, and return it."""
-    with path.open("rb") as file:
-        found = hashlib.file_digest(file, KEY).hexdigest()
-    with path.open("ab") as file:
-        file.write(_END + found.encode() + b"\n")
-    return found
+def sealed(content: bytes) -> tuple[bytes, str]:
+    """The content of a file with its checksum after the end, and that checksum."""
+    found = hashlib.sha256(content).hexdigest()
+    return content + _END + found.encode() + b"\n", found
 
 
-def checked(path: Path, what: str) -> str:
-    """The checksum that `seal` put after a file, "" if there is none.
+def checked(path: Path, what: str, remedy: str = AGAIN) -> str:
+    """The checksum that `sealed` put after a file, "" if there is none.
 
     Raises `StorageError` if the file cannot be read, or is not what was written.
     """
@@ -94,9 +91,9 @@ def checked(path: Path, what: str) -> str:
                 found.update(block)
                 left -= len(block)
     except OSError as error:
-        raise damaged(path, what, error.strerror or str(error)) from None
+        raise damaged(path, what, error.strerror or str(error), remedy) from None
     if found.hexdigest().encode() != end[len(_END) : -1]:
-        raise damaged(path, what, "its content is not what was written")
+        raise damaged(path, what, "its content is not what was written", remedy)
     return found.hexdigest()
 
 
