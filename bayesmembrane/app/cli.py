@@ -11,7 +11,7 @@ import typer
 
 from bayesmembrane.app import verbs
 from bayesmembrane.app.options import spread
-from bayesmembrane.app.terminal import INTERRUPTED, note
+from bayesmembrane.app.terminal import INTERRUPTED, note, ready
 from bayesmembrane.ground.errors import BayesmembraneError
 from bayesmembrane.ground.interrupts import raised
 
@@ -38,6 +38,7 @@ def assembled() -> typer.Typer:
 
 def main() -> None:
     """Run a verb. Exit status: 0 done; 1 wrong data or settings, in one sentence; 2 wrong usage; 130 interrupted."""
+    ready()
     try:
         with raised():  # the signal by which clusters and shutdowns end programs, as Ctrl-C
             assembled()(standalone_mode=True)

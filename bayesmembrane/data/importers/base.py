@@ -13,6 +13,7 @@ from typing import ClassVar
 
 import tomli_w
 
+from bayesmembrane.data.tables import read_bytes
 from bayesmembrane.data.writing import csv_text, write_new
 from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.parameters import Array
@@ -107,7 +108,7 @@ def import_export(export: str | Path, out: str | Path | None = None) -> Written:
 
 def _bytes(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_bytes(path)
     except FileNotFoundError:
         raise DataError("there is no such file", str(path), "check the path") from None
     except (OSError, ValueError) as error:
