@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-kill study-seeds clean
+.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-kill study-damage study-seeds clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -23,6 +23,7 @@ help:
 	@echo "make study-second  the same on the second generator, once and at the end; SECOND='--count 60' asks for less"
 	@echo "make study-fuzz  500 calls at random, each judged, an hour or so; goes on where it was; FUZZ='--only fit' asks for less"
 	@echo "make study-kill  runs killed at random moments and while they write, some minutes; KILL='--kills 20' asks for less"
+	@echo "make study-damage  every stored file damaged 500 times, an hour or less; DAMAGE='--times 50' asks for less"
 	@echo "make study-seeds 50 seeds for the statistical tests, lanes on and off, hours; goes on where it was; SEEDS='--group quick' asks for less"
 	@echo "make install  the set-up alone, into $(VENV)"
 	@echo "make lint     style, types and floors alone"
@@ -77,6 +78,9 @@ study-fuzz: $(STAMP)
 
 study-kill: $(STAMP)
 	$(PY) -m tests.studies.kill --table docs/studies/kill.md $(KILL)
+
+study-damage: $(STAMP)
+	$(PY) -m tests.studies.damage --table docs/studies/damage.md $(DAMAGE)
 
 study-seeds: $(STAMP)
 	$(PY) -m tests.studies.seeds $(SEEDS)

@@ -11,6 +11,7 @@ However a run ends, the next call with the same folder goes on after its last se
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -103,6 +104,18 @@ class Run(Showable):
     def draws(self) -> Array:
         """Coordinates of all draws, all ensembles together, shape (B, k)."""
         return np.stack([self.data.posterior[n].values.ravel() for n in self.hypothesis.names], axis=1)
+
+    def walk(self, every: int | None = None) -> Iterator[Array]:
+        """The walk after burn-in, (E, n, walkers, k) at a time: every ``every``-th step, None for the largest tau.
+
+        One segment is held at a time, so that a chain of any length can be looked at. Raises `StorageError` if the walk
+        is not stored, or damaged.
+        """
+        if self.path is None or not Segments(self.path).paths:
+            raise StorageError("the walk is not stored", self.name, "sample again with out=")
+        taus = [tau for tau in self.status["tau"].values() if tau is not None]
+        every = every or max(1, int(np.ceil(max(taus, default=1.0))))
+        return Segments(self.path).thinned(every, int(self.status["burn"]))
 
     def curves(self) -> Array:
         """Force curves of all draws without noise, shape (B, N), N."""

@@ -23,7 +23,16 @@ from bayesmembrane.ground.fingerprint import digest
 from bayesmembrane.ground.locks import alone
 from bayesmembrane.ground.netcdf import packed
 from bayesmembrane.ground.quiet import arviz
-from bayesmembrane.ground.sealed import checked, damaged, read_json, read_toml, sealed, write_json, write_toml
+from bayesmembrane.ground.sealed import (
+    checked,
+    damaged,
+    is_sealed,
+    read_json,
+    read_toml,
+    sealed,
+    write_json,
+    write_toml,
+)
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 ASKED, POSTERIOR, STATUS = "run.toml", "posterior.nc", "status.json"
@@ -227,6 +236,9 @@ def read_run(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Any]:
         if not (folder / name).is_file():
             raise StorageError(f"there is no complete run: {name} is missing", str(folder), "sample again")
     asked, status = read_asked(folder), read_json(folder / STATUS, "the run")
+    for name in (n for n in (ASKED, STATUS) if not is_sealed(folder / n)):
+        if is_sealed(folder / (STATUS if name == ASKED else ASKED)):
+            raise damaged(folder / name, "the run", "its checksum is gone")
     found, belongs = checked(folder / POSTERIOR, "the run"), status.pop("posterior_sha256", None)
     if belongs is not None and belongs != found:
         raise damaged(folder / POSTERIOR, "the run", f"it does not belong to {STATUS}")

@@ -97,6 +97,15 @@ def checked(path: Path, what: str, remedy: str = AGAIN) -> str:
     return found.hexdigest()
 
 
+def is_sealed(path: Path) -> bool:
+    """Whether a TOML or JSON file says that it has a checksum."""
+    try:
+        with path.open("rb") as file:
+            return KEY.encode() in file.read(40)
+    except OSError as error:
+        raise damaged(path, "the file", error.strerror or str(error)) from None
+
+
 def damaged(path: Path, what: str, reason: str, remedy: str = AGAIN) -> StorageError:
     """The error that says why a stored file cannot be used, and what to do."""
     return StorageError(f"{what} is damaged ({reason})", str(path), remedy)

@@ -5,6 +5,7 @@ import os
 import shutil
 import signal
 import threading
+import tracemalloc
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,9 +15,10 @@ import pytest
 
 from bayesmembrane.calibration import run as run_module
 from bayesmembrane.calibration import store as store_module
-from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.posterior import Evaluation, Outcome, Outcomes, Posterior
 from bayesmembrane.calibration.run import Run, RunSettings, load_run, sample
 from bayesmembrane.calibration.sampling import walk
+from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.proposals import learned, mixture
 from bayesmembrane.calibration.sampling.segments import Segments
 from bayesmembrane.calibration.sampling.walk import Settings
@@ -26,6 +28,7 @@ from bayesmembrane.ground.errors import SettingsError, StorageError
 from bayesmembrane.ground.locks import alone
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from bayesmembrane.words.sampling import sentences
 
 CLAIM = hypothesis("neo_hookean")
 FEW = Settings(ess=1e6, walkers=8, chunk=30, most_steps=70)  # over lessons at 22 and 44
@@ -85,6 +88,7 @@ def alike(one: Run, other: Run) -> None:
     assert np.array_equal(a.x, b.x)
     assert np.array_equal(a.log_posterior, b.log_posterior)
     assert a.counts == b.counts
+    assert a.counts.examples == b.counts.examples  # type: ignore[attr-defined]
     assert a.lessons == b.lessons
     assert {**one.status, "seconds": 0} == {**other.status, "seconds": 0}
     for group in one.data.groups():
@@ -319,3 +323,54 @@ def test_what_was_walked_is_kept_before_anything_else_can_fail(tmp_path: Path, m
     walked = Segments(folder).read()
     assert walked is not None
     assert walked.steps == 70
+
+
+def test_failures_are_counted_with_an_example_each(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A point of every outcome but ok; and a share of failures above the stated one is said."""
+    evaluate, seen = Posterior.evaluate, []
+
+    def some_fail(posterior: Posterior, x: np.ndarray) -> Evaluation:
+        found = evaluate(posterior, x)
+        fails = (x[:, 0] == np.max(x[:, 0])) & (len(x) == 4)  # of half an ensemble that moves; starts are possible
+        seen.append(x[fails])
+        outcome = np.where(fails, Outcome.UNRESOLVED, found.outcome).astype(np.int8)
+        return replace(found, log_likelihood=np.where(fails, -np.inf, found.log_likelihood), outcome=outcome)
+
+    monkeypatch.setattr(Posterior, "evaluate", some_fail)
+    left = iter(range(25))
+    run = sample(strip(), CLAIM, how(tmp_path), stop=lambda: next(left, None) is None)
+    failures = load_run(run.path).status["failures"]  # type: ignore[arg-type]
+    assert failures["share"] == pytest.approx(run.status["tally"]["unresolved"] / run.status["evaluations"])
+    assert failures["noteworthy"]
+    example = np.array([failures["examples"]["unresolved"][name] for name in CLAIM.names])
+    assert any(np.any(np.all(x == example, axis=1)) for x in seen)
+    assert any("could not be solved" in sentence for sentence in sentences(run.quality))
+
+
+def test_a_walk_is_read_in_parts(whole: Run) -> None:
+    assert whole.path is not None
+    chains = Segments(whole.path).read()
+    assert chains is not None
+    for every, first in ((1, 0), (3, 0), (7, 20), (100, 5)):
+        parts = list(Segments(whole.path).thinned(every, first))
+        assert np.array_equal(np.concatenate(parts, axis=1), chains.x[:, first::every])
+    tau = int(np.ceil(max(whole.status["tau"].values())))
+    walked = np.concatenate(list(whole.walk()), axis=1)
+    assert np.array_equal(walked, chains.x[:, whole.status["burn"] :: tau])
+
+
+def test_a_long_walk_is_never_held_whole(tmp_path: Path) -> None:
+    """Forty segments, and no more memory than for a few of them."""
+    rng, size = np.random.default_rng(0), 0
+    states = tuple(np.random.RandomState(e).get_state() for e in range(2))
+    segments = Segments(tmp_path)
+    for _ in range(40):
+        x = rng.standard_normal((2, 500, 16, 3))
+        size += x.nbytes
+        segments.write(Chains(x, x[..., 0], states, Outcomes(), 0.0))
+    tracemalloc.start()
+    count = sum(part.size for part in segments.thinned(10))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert count == 2 * 2000 * 16 * 3
+    assert peak < size / 4

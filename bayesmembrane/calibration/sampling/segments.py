@@ -13,17 +13,18 @@ import hashlib
 import io
 import json
 import zipfile
-from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bayesmembrane.calibration.sampling.chains import Chains, joined
+from bayesmembrane.calibration.posterior import Outcomes
+from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.files import remove_parts, write_whole
+from bayesmembrane.ground.parameters import Array
 
 FOLDER, LOCK, FORMAT = "segments", "lock", 1
 _FAULTS = (OSError, KeyError, ValueError, TypeError, IndexError, AttributeError, EOFError, zipfile.BadZipFile)
@@ -94,9 +95,30 @@ class Segments:
             yield part
 
     def read(self) -> Chains | None:
-        """The whole walk; None if there is none. Raises `StorageError` as iterating does."""
-        parts = list(self)
-        return joined(parts) if parts else None
+        """The whole walk, held once; None if there is none. Raises `StorageError` as iterating does."""
+        if not self.paths:
+            return None
+        steps, whole, at = _head(self.paths[-1]).end, dict[str, Array](), 0
+        for part in self:
+            for name in ("x", "log_posterior"):
+                values = getattr(part, name)
+                held = whole.setdefault(name, np.empty((len(values), steps, *values.shape[2:])))
+                held[:, at : at + part.steps] = values
+            at += part.steps
+        return replace(part, **whole)
+
+    def thinned(self, every: int, first: int = 0) -> Iterator[Array]:
+        """(E, n, walkers, k) the steps ``first``, ``first`` + ``every``, ... of each segment that holds some; one
+        segment is held at a time.
+
+        Raises `StorageError` as iterating does.
+        """
+        at = 0
+        for part in self:
+            begin = first - at if at < first else -(at - first) % every
+            if begin < part.steps:
+                yield part.x[:, begin::every]
+            at += part.steps
 
     @property
     def end(self) -> str:
@@ -116,7 +138,13 @@ def _packed(part: Chains) -> bytes:
     states: dict[str, Any] = {}
     for e, (_, key, position, has_gauss, gauss) in enumerate(part.random_states):
         states |= {f"key{e}": key, f"rest{e}": np.array([position, has_gauss, gauss])}
-    about = {"counts": part.counts, "seconds": part.seconds, "lessons": part.lessons, "look": part.look}
+    about = {
+        "counts": part.counts,
+        "examples": getattr(part.counts, "examples", {}),
+        "seconds": part.seconds,
+        "lessons": part.lessons,
+        "look": part.look,
+    }
     file = io.BytesIO()
     np.savez(file, x=part.x, log_posterior=part.log_posterior, about=np.array(json.dumps(about)), **states)
     return file.getvalue()
@@ -131,7 +159,8 @@ def _unpacked(payload: bytes) -> Chains:
             for e, rest in ((e, f[f"rest{e}"]) for e in range(len(x)))
         )
         lessons = tuple(int(s) for s in about["lessons"])
-        counts, seconds, look = Counter(about["counts"]), float(about["seconds"]), int(about["look"])
+        counts, seconds, look = Outcomes(about["counts"]), float(about["seconds"]), int(about["look"])
+        counts.examples = {str(label): tuple(map(float, at)) for label, at in about["examples"].items()}
         return Chains(x, f["log_posterior"], states, counts, seconds, lessons, look)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -12,7 +11,7 @@ from typing import Any
 import emcee
 import numpy as np
 
-from bayesmembrane.calibration.posterior import Posterior, tally
+from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.sampling.chains import Chains, joined
 from bayesmembrane.calibration.sampling.convergence import LEAST_TAUS, Convergence, convergence
 from bayesmembrane.calibration.sampling.proposals.learned import learn, next_lesson
@@ -166,7 +165,7 @@ def walkers_of(posterior: Posterior, settings: Settings) -> int:
 
 def _start(posterior: Posterior, settings: Settings, seed: int) -> Chains:
     """Ensembles at different overdispersed starts."""
-    began, counts = time.perf_counter(), Counter[str]()
+    began, counts = time.perf_counter(), Outcomes()
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(settings.ensembles + 1)[-1])
     x = starting_points(posterior, rng, settings.ensembles, walkers_of(posterior, settings), counts)
     return replace(begun(posterior, x, seed), counts=counts, seconds=time.perf_counter() - began)
@@ -177,7 +176,7 @@ def begun(posterior: Posterior, x: Array, seed: int) -> Chains:
     seeds = np.random.SeedSequence(seed).spawn(len(x) + 1)
     states = tuple(np.random.RandomState(np.random.MT19937(s)).get_state() for s in seeds[:-1])
     lp = np.stack([posterior.evaluate(e).log_posterior for e in x])
-    return Chains(x[:, None], lp[:, None], states, Counter(), 0.0)
+    return Chains(x[:, None], lp[:, None], states, Outcomes(), 0.0)
 
 
 @dataclass
@@ -211,7 +210,7 @@ class _Walk:
     chains: Chains
 
     def __post_init__(self) -> None:
-        self.counts = Counter(self.chains.counts)
+        self.counts = Outcomes(self.chains.counts)
         self.began = time.perf_counter() - self.chains.seconds
         self.saved = time.perf_counter()
         self.standing = (self.chains.steps, self.chains)
@@ -260,7 +259,7 @@ class _Walk:
                 replace(
                     self.chains,
                     random_states=tuple(s.random_state for s in states),
-                    counts=Counter(self.counts),
+                    counts=Outcomes(self.counts),
                     seconds=time.perf_counter() - self.began,
                     look=look,
                 ),
@@ -273,7 +272,7 @@ class _Walk:
 
         def log_probability(x: Array) -> Array:
             e = self.posterior.evaluate(x)
-            self.counts.update(tally(e.outcome))
+            self.counts.note(x, e.outcome)
             return e.log_posterior
 
         x, lp = self.chains.x[ensemble, -1], self.chains.log_posterior[ensemble, -1]
