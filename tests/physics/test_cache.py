@@ -102,6 +102,17 @@ def test_a_posterior_of_one_modulus_solves_once():
     assert (remembered.tally.misses, remembered.tally.hits, remembered.tally.bypassed) == (1, 299, 0)
 
 
+def test_who_asked_first_does_not_show():
+    """To the last bit: runs that share a folder must not depend on their order."""
+    films = np.random.default_rng(1).uniform(1, 20, (5, 1))
+    one, other = CachedSolver(), CachedSolver()
+    one(request(NeoHookean, films[:1], FIFTEEN, **RADII))
+    other(request(NeoHookean, films[4:], FIFTEEN, **RADII))
+    for name in FIELDS:
+        a, b = (getattr(solver(request(NeoHookean, films, FIFTEEN, **RADII)), name) for solver in (one, other))
+        np.testing.assert_array_equal(a, b, err_msg=name)
+
+
 def test_the_tally_counts_what_was_done_since():
     remembered = CachedSolver()
     remembered(request(NeoHookean, [7.5], FIFTEEN, **RADII))

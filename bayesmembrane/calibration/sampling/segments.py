@@ -98,14 +98,13 @@ class Segments:
         """The whole walk, held once; None if there is none. Raises `StorageError` as iterating does."""
         if not self.paths:
             return None
-        steps, whole, at = _head(self.paths[-1]).end, dict[str, Array](), 0
+        steps, at = _head(self.paths[-1]).end, 0
         for part in self:
-            for name in ("x", "log_posterior"):
-                values = getattr(part, name)
-                held = whole.setdefault(name, np.empty((len(values), steps, *values.shape[2:])))
-                held[:, at : at + part.steps] = values
+            if not at:
+                x, lp = (np.empty((len(v), steps, *v.shape[2:])) for v in (part.x, part.log_posterior))
+            x[:, at : at + part.steps], lp[:, at : at + part.steps] = part.x, part.log_posterior
             at += part.steps
-        return replace(part, **whole)
+        return replace(part, x=x, log_posterior=lp)
 
     def thinned(self, every: int, first: int = 0) -> Iterator[Array]:
         """(E, n, walkers, k) the steps ``first``, ``first`` + ``every``, ... of each segment that holds some; one
