@@ -13,7 +13,7 @@ from bayesmembrane.ground.parameters import Array
 Residuals = Callable[[Array], tuple[Array, Array]]
 """x (B, k) -> r (B, N) and dr/dx (B, N, k); nan where there is nothing to compare, or no slope."""
 
-DAMPING, EASIER, HARDER, HOPELESS = 1e-2, 0.2, 5.0, 1e12
+DAMPING, EASIER, HARDER, HOPELESS = 1e-2, 0.1, 4.0, 1e12
 SLOW = 1e-9  # relative decrease of |r|^2 below which a step counts as slow
 PATIENCE = 3  # slow steps in a row that end a search
 CRAWL, CRAWLS = 1e-3, 4  # the same of a search that is far behind the best one
@@ -46,10 +46,12 @@ def descend(
     with coordinates at a bound left out while the step would leave it, and those in ``held`` (M, k) left out always.
     A row whose |r|^2 is more than ``patience.behind`` times the least is given up when it crawls: films at the edge of
     what can be solved cost most. One whose |r|^2 falls by less than its part ``patience.slow_below`` a few times in a
-    row is done. Returns x (M, k) and |r| (M,), inf where a start has no residuals or no slopes: neither a start nor a
-    step goes where one of them is not a number.
+    row, or promises no more, is done. Returns x (M, k) and |r| (M,), inf where a start has no residuals or no slopes:
+    neither a start nor a step goes where one of them is not a number.
 
-    D. W. Marquardt, J. SIAM 11 (1963) 431; a row that finds no better point with any damping is done.
+    D. W. Marquardt, J. SIAM 11 (1963) 431, with the damping of H. B. Nielsen (IMM-REP-1999-05, Technical University of
+    Denmark): it falls as far as the gain is what was promised, and rises faster with every step that gains nothing. A
+    row that finds no better point with any damping is done.
     """
     patience = patience or Patience()
     low, high = bounds
@@ -57,7 +59,8 @@ def descend(
     free = np.ones(x.shape, bool) if held is None else ~held
     r, jacobian = residuals(x)
     size = _square(r, jacobian)
-    damping, slow, crawl = np.full(len(x), DAMPING), np.zeros(len(x), int), np.zeros(len(x), int)
+    damping, harder = np.full(len(x), DAMPING), np.full(len(x), HARDER)
+    slow, crawl = np.zeros(len(x), int), np.zeros(len(x), int)
     going = np.isfinite(size)
     for _ in range(iterations):
         rows = np.flatnonzero(going)
@@ -69,28 +72,34 @@ def descend(
         new_size = _square(new_r, new_jacobian)
         better = new_size < size[rows]
         take = rows[better]
-        gain = (size[take] - new_size[better]) / np.maximum(size[take], 1e-300)
-        slow[take] = np.where(gain < patience.slow_below, slow[take] + 1, 0)
-        crawl[rows] += 1
-        crawl[take[gain > CRAWL]] = 0
+        won = size[rows] - new_size
+        promise = size[rows] - _square(r[rows] + np.einsum("mnk,mk->mn", jacobian[rows], trial - x[rows]))
+        little = np.where(better, won, promise) < patience.slow_below * size[rows]
+        slow[rows] = np.where(little, slow[rows] + 1, 0)
+        crawl[rows] = np.where(better & (won > CRAWL * size[rows]), 0, crawl[rows] + 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            eased = np.clip(1 - (2 * won / promise - 1) ** 3, EASIER, HARDER)
+        damping[rows] *= np.where(better, np.where(promise > 0, eased, 1.0), harder[rows])
+        damping = np.maximum(damping, 1e-12)
+        harder[rows] = np.where(better, HARDER, 2 * harder[rows])
         x[take], r[take], jacobian[take], size[take] = (
             trial[better],
             new_r[better],
             new_jacobian[better],
             new_size[better],
         )
-        damping[rows] *= np.where(better, EASIER, HARDER)
-        damping = np.maximum(damping, 1e-12)
         lost = (crawl[rows] >= CRAWLS) & (size[rows] / patience.behind > np.min(size))
         going[rows] = (damping[rows] < HOPELESS) & (slow[rows] < PATIENCE) & ~lost
     return x, np.sqrt(size)
 
 
-def _square(r: Array, jacobian: Array) -> Array:
+def _square(r: Array, jacobian: Array | None = None) -> Array:
     """|r|^2 (M,) of r (M, N) with slopes (M, N, k); inf where one of them is not a number, or too large to square."""
     with np.errstate(over="ignore", invalid="ignore"):
         size = np.sum(r * r, axis=1)
-        known = np.isfinite(size) & np.isfinite(np.sum(jacobian * jacobian, axis=(1, 2)))
+        known = np.isfinite(size)
+        if jacobian is not None:
+            known &= np.isfinite(np.sum(jacobian * jacobian, axis=(1, 2)))
     return np.where(known, size, np.inf)
 
 

@@ -18,7 +18,7 @@ from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.rigs.base import rig_of
 
 LOSSES = ("euclidean", "weighted")
-SCREENED, INFLATED = 768, 256
+SCREENED, INFLATED = 1024, 0.25  # draws that are looked at, and the part of them from a wider prior
 INFLATION = 2.5
 MOST = 300  # evaluations of one search
 ON_THE_WAY = 24  # states at which a film is looked at before it is solved
@@ -99,11 +99,12 @@ class Objective:
             good = np.all((x >= self.low[:n]) & (x <= self.high[:n]), axis=1) & (s > 0) & np.isfinite(size)
         return x[good], size[good]
 
-    def pool(self, rng: np.random.Generator) -> tuple[Array, Array]:
+    def pool(self, rng: np.random.Generator, draws: int = SCREENED) -> tuple[Array, Array]:
         """Rescaled draws (M, k) and |r| (M,), the best first: of the prior and of a wider one, or of the bounds."""
         n, k = self.hypothesis.material_size, self.hypothesis.curve_size
-        prior = JointPrior(self.hypothesis).draw(rng, SCREENED + INFLATED)[:, :k]
-        prior[SCREENED:] = self.centre + INFLATION * (prior[SCREENED:] - self.centre)
+        prior = JointPrior(self.hypothesis).draw(rng, draws)[:, :k]
+        wide = prior[draws - int(draws * INFLATED) :]
+        wide[:] = self.centre + INFLATION * (wide - self.centre)
         anywhere = rng.uniform(self.low, self.high, prior.shape)
         for candidates in (np.clip(prior, self.low, self.high), anywhere):
             films = self.hypothesis.films(candidates)

@@ -110,6 +110,10 @@ class SearchThresholds:
 
     iterations: int = 40
     """Steps of a search, at most."""
+    draws: int = 512
+    """Of the material's prior, that the first searches' starts are chosen from."""
+    readings: int = 24
+    """By which they are chosen: a film without effects needs no more."""
     material_starts: int = 3
     """Draws of the material's prior that searches start from, besides the model's own fit."""
     small_share: float = 0.1
@@ -122,7 +126,7 @@ class SearchThresholds:
     """Of the sum of squares: searches whose steps gain less are near enough, for the linear model knows the rest."""
     least_form: float = 1e-2
     """Of the noise: what the form error does below it is nothing."""
-    given_up: float = 4.0
+    given_up: float = 1.03
     """Times the least sum of squares: a search as far behind is not waited for."""
     at_bound: float = 1e-3
     """Of the width of the bounds: an estimate as near lies at its bound."""
@@ -156,10 +160,12 @@ class FormThresholds:
     """Standard deviations of the prior to either side within which the most probable size is looked for."""
     iterations: int = 60
     """Of that search."""
-    tolerance: float = 1e-9
-    """Relative change of ln p at which it ends."""
-    step: float = 1e-2
-    """In ln of a size: of the differences that make the curvature."""
+    tolerance: float = 1e-5
+    """In ln p: it ends where a step promises less."""
+    largest_step: float = 2.0
+    """In ln of a size: of that search."""
+    halvings: int = 20
+    """Of a step that gains nothing, at most."""
     least_curvature: float = 0.25
     """Of that of the prior: a flatter place is one where Laplace's approximation does not hold."""
     far_bound: float = 6.0

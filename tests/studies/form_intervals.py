@@ -27,6 +27,7 @@ from bayesmembrane.data.motion import Motion
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.ground.errors import BayesmembraneError
 from bayesmembrane.ground.parameters import Normal
+from bayesmembrane.physics.form_error import mixed
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.noise import form
@@ -153,7 +154,7 @@ def _line(posterior: Posterior, objective: Objective, x: Array) -> Line:
     log_weights, means, covariances = [], [], []
     for theta, log_prior in zip(nodes, prior, strict=True):
         power = np.exp(2 * theta[0]) * scale**2
-        s = np.exp(theta[sizes]) if c else np.empty(0)
+        s = np.exp(np.append(theta, 0.0)[sizes]) if c else np.empty(0)
         inner = np.eye(c) + gram[:c, :c] * s[:, None] * s / power
         across = gram[:c, c:] * s[:, None] / power
         white = gram[c:, c:] / power - across.T @ np.linalg.solve(inner, across)
@@ -169,12 +170,13 @@ def _line(posterior: Posterior, objective: Objective, x: Array) -> Line:
 
 
 def _columns(noise: Any) -> tuple[Array, NDArray[np.intp]]:
-    """Columns (N, r) of the form error at relative errors of one, and the coordinate that scales each."""
+    """Columns (N, r) of the form error at relative errors of one, and the coordinate that scales each, or -1."""
     if not hasattr(noise, "factors"):
         return np.empty((noise.variance.size, 0)), np.empty(0, dtype=int)
     f = noise.factors
-    parts = [noise.force[0][:, None] * f.state, *(t[:, None] * f.progress for t in noise.traces[0])]
-    return np.concatenate(parts, axis=1), np.repeat([1, *(2,) * (len(parts) - 1)], [p.shape[1] for p in parts])
+    film, laws = noise.force[0][:, None] * f.state, [t[:, None] * f.progress for t in noise.traces[0]]
+    parts = [film, *laws, mixed(noise.force[0], noise.traces[0]) * film]
+    return np.concatenate(parts, axis=1), np.repeat([1, *(2 for _ in laws), -1], [p.shape[1] for p in parts])
 
 
 def _nodes(h: Hypothesis, share: Array) -> tuple[Array, Array]:

@@ -18,8 +18,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, lapack, solve_triangular
-from scipy.optimize import minimize
+from scipy.linalg import lapack
 from scipy.special import log_ndtr, logsumexp, ndtr, ndtri
 
 from bayesmembrane.diagnosis.thresholds import FORM
@@ -43,8 +42,20 @@ class Block:
 
 
 @dataclass(frozen=True, eq=False)
+class Density:
+    """ln p(d, theta), its slopes (h,) and second derivatives (h, h) in theta."""
+
+    value: float
+    slope: Array
+    bend: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Linear:
     """d (N,) ~ N(0, s^2 1 + sum_b eta_b^2 B_b B_b^T), freed of noise.
+
+    Everything follows from C = 1 + V^(1/2) B^T B V^(1/2) / s^2, which is as small as there are columns: its inverse is
+    the covariance of the coefficients in units of their own eta.
 
     ln_scale_sd : sd of the prior of ln s about 0
     """
@@ -54,14 +65,17 @@ class Linear:
     ln_scale_sd: float
 
     def __post_init__(self) -> None:
-        self._reduced  # noqa: B018 - what cannot be decomposed is said here
+        if not all(np.all(np.isfinite(p)) for p in self._products):
+            raise np.linalg.LinAlgError("the data or the columns of a linear model are not all numbers")
 
     @cached_property
-    def _reduced(self) -> tuple[Array, Array, Array, float]:
-        """(Q, R, Q^T d, squares of d beside Q) of all columns."""
-        q, r = np.linalg.qr(np.column_stack([b.columns for b in self.blocks]))
-        along = q.T @ self.data
-        return q, r, along, max(float(self.data @ self.data - along @ along), 0.0)
+    def _columns(self) -> Array:
+        return np.column_stack([b.columns for b in self.blocks])
+
+    @cached_property
+    def _products(self) -> tuple[Array, Array]:
+        """(B^T B, B^T d)."""
+        return self._columns.T @ self._columns, self._columns.T @ self.data
 
     @cached_property
     def priors(self) -> Array:
@@ -84,51 +98,92 @@ class Linear:
             out.append(np.full(b.columns.shape[1], number if b.ln_eta is not None else 0))
         return np.concatenate(out)
 
+    @cached_property
+    def _members(self) -> Array:
+        """(h, m) 1 where a theta scales a column; the first row has those that none scales."""
+        return np.asarray(self.owner == np.arange(len(self.priors))[:, None], dtype=float)
+
     def variances(self, theta: Array) -> Array:
         """(m,) of the coefficients."""
         return np.where(self.owner > 0, np.exp(2 * theta[self.owner]), 1.0)
 
-    def log_density(self, theta: Array) -> tuple[float, Array]:
-        """(ln p(d, theta), its slopes (h,)), without the noise's own determinant, which all hypotheses share."""
-        q, r, along, rest = self._reduced
-        n, p = q.shape
-        square, v = float(np.exp(2 * theta[0])), self.variances(theta)
-        m = (r * v) @ r.T
-        m[np.diag_indices(p)] += square
-        if not np.all(np.isfinite(m)):  # larger than doubles hold: no size of noise or form error is like that
-            return -1e300, np.zeros(len(theta))
-        inverse, log_det = _inverse(m)
-        a = inverse @ along
-        value = -0.5 * (float(along @ a) + rest / square + log_det + 2 * (n - p) * float(theta[0]))
-        value -= 0.5 * n * float(np.log(2 * np.pi))
-        pulls = v * ((r.T @ a) ** 2 - np.einsum("ij,ij->j", r, inverse @ r))
-        slope = np.bincount(self.owner, pulls, len(theta))
-        # What scales no column belongs to none of theta: the first is the noise's.
-        slope[0] = square * (float(a @ a) - float(np.trace(inverse))) + rest / square - (n - p)
-        z = (theta - self.priors[:, 0]) / self.priors[:, 1]
-        value -= 0.5 * float(z @ z) + float(np.sum(np.log(self.priors[:, 1] * np.sqrt(2 * np.pi))))
-        return value, slope - z / self.priors[:, 1]
+    def _solved(self, theta: Array) -> tuple[Array, Array, Array, float] | None:
+        """(V^(1/2), C^-1, coefficients in units of their eta, ln det C); None where doubles do not hold C."""
+        gram, along = self._products
+        root = np.sqrt(self.variances(theta))
+        scale = root * np.exp(-theta[0])
+        c = gram * scale * scale[:, None]
+        c[np.diag_indices(root.size)] += 1.0
+        if not np.all(np.isfinite(c)):
+            return None
+        # LAPACK by itself, without SciPy's checks: this is done thousands of times.
+        factor, fault = lapack.dpotrf(c.T, lower=1, overwrite_a=1)
+        if fault:
+            raise np.linalg.LinAlgError("the covariance of a linear model is not positive definite")
+        own, _ = lapack.dpotrs(factor, scale * np.exp(-theta[0]) * along, lower=1)
+        log_det = 2 * float(np.sum(np.log(np.diag(factor))))
+        half, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
+        inverse = np.tril(half)
+        inverse += np.tril(half, -1).T
+        return root, inverse, own, log_det
+
+    def log_density(self, theta: Array) -> Density:
+        """ln p(d, theta), without the noise's own determinant, which all hypotheses share.
+
+        With phi = theta - theta_0 for the blocks, and -theta_0 for those of fixed size, ln det C and s^2 times the
+        squares depend on phi alone; with K = 1 - C^-1 and coefficients c in units of their own eta
+
+            d ln det C = 2 tr K,   d^2 ln det C = 4 tr K - 4 |K|^2,   d q = -2 c^2,   d^2 q = -4 c^2 + 8 c K c,
+
+        block by block.
+        """
+        h, n = theta.size, self.data.size
+        found = self._solved(theta)
+        if found is None:  # larger than doubles hold: no size of noise or form error is like that
+            return Density(-1e300, np.zeros(h), -np.eye(h))
+        root, inverse, own, log_det = found
+        left = self.data - self._columns @ (root * own)
+        squares = float(left @ left) * float(np.exp(-2 * theta[0])) + float(own @ own)
+        value = -0.5 * (squares + log_det + n * (2 * theta[0] + float(np.log(2 * np.pi))))
+        k = -inverse
+        k[np.diag_indices(own.size)] += 1.0
+        inside, wide = self._members, self._members * own
+        trace, pull = inside @ np.diag(k), wide @ own
+        by_phi = trace - pull
+        # Half of the second derivatives of ln det C + q in phi.
+        bend_phi = np.diag(2 * by_phi) - 2 * (inside @ (k * k) @ inside.T) + 4 * (wide @ k @ wide.T)
+        # From phi to theta: every phi falls with theta_0, and the first, of fixed blocks, does nothing else.
+        to = np.eye(h)
+        to[0, 0] = 0.0
+        to[:, 0] -= 1.0
+        slope = -(to.T @ by_phi)
+        slope[0] += squares - n
+        mixed = np.zeros((h, h))
+        mixed[0] = 2 * (to.T @ pull)
+        bend = -(to.T @ bend_phi @ to) - mixed - mixed.T
+        bend[0, 0] -= 2 * squares
+        mean, sd = self.priors.T
+        z = (theta - mean) / sd
+        value -= 0.5 * float(z @ z) + float(np.sum(np.log(sd * np.sqrt(2 * np.pi))))
+        return Density(value, slope - z / sd, bend - np.diag(1 / sd**2))
 
     def coefficients(self, theta: Array) -> tuple[Array, Array]:
         """(mean (m,), covariance (m, m)) of all coefficients given d and theta."""
-        _, r, along, _ = self._reduced
-        root = np.sqrt(self.variances(theta))
-        square = float(np.exp(2 * theta[0]))
-        scaled = r * root
-        precision = np.eye(root.size) + scaled.T @ scaled / square
-        factor = cholesky(precision, lower=True, check_finite=False)
-        half = solve_triangular(factor, np.diag(root), lower=True, check_finite=False)
-        covariance = half.T @ half
-        return covariance @ (r.T @ along) / square, covariance
+        root, inverse, own, _ = self._certain(theta)
+        return root * own, inverse * root * root[:, None]
 
     def freed(self, theta: Array, values: Array) -> Array:
         """(s^2 1 + B V B^T)^-1 v of values (N, c)."""
-        q, r, _, _ = self._reduced
         square = float(np.exp(2 * theta[0]))
-        m = (r * self.variances(theta)) @ r.T
-        m[np.diag_indices(len(m))] += square
-        along = q.T @ values
-        return np.asarray((values - q @ along) / square + q @ np.linalg.solve(m, along))
+        root, inverse, _, _ = self._certain(theta)
+        scaled = self._columns * root
+        return np.asarray((values - scaled @ (inverse @ (scaled.T @ values)) / square) / square)
+
+    def _certain(self, theta: Array) -> tuple[Array, Array, Array, float]:
+        found = self._solved(theta)
+        if found is None:
+            raise np.linalg.LinAlgError("a linear model is asked for sizes larger than numbers hold")
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,48 +201,46 @@ def weighed(model: Linear, start: Array | None = None) -> Weighed:
     """ln Z by Laplace's approximation over theta, from the better of the prior's centre and ``start``."""
     starts = [model.priors[:, 0]]
     if start is not None and start.size == len(model.priors):
-        starts.append(start)
-    begin = max(starts, key=lambda t: model.log_density(t)[0])
+        starts.append(np.clip(start, *model.ends))
+    theta, top = _climbed(model, starts)
+    log_det = float(np.linalg.slogdet(_precision(model, top.bend, FORM.least_curvature))[1])
+    return Weighed(top.value + 0.5 * theta.size * float(np.log(2 * np.pi)) - 0.5 * log_det, theta)
+
+
+def _climbed(model: Linear, starts: Sequence[Array]) -> tuple[Array, Density]:
+    """The most probable theta between its ends, from the best of ``starts``, by Newton's steps that bounds cut off.
+
+    A direction in which ln p bends up is taken as one in which it bends down as much; a step that gains nothing is
+    halved (J. Nocedal, S. J. Wright, Numerical Optimization (2006), 3.4 and 16.7).
+    """
     low, high = model.ends
-
-    def cost(theta: Array) -> tuple[float, Array]:
-        value, slope = model.log_density(theta)
-        return -value, -slope
-
-    done = minimize(
-        cost, np.clip(begin, low, high), jac=True, method="L-BFGS-B", bounds=list(zip(low, high, strict=True)),
-        options={"maxiter": FORM.iterations, "ftol": FORM.tolerance},
-    )  # fmt: skip
-    theta = np.asarray(done.x)
-    bend = _curvature(model, theta)
-    log_det = float(np.linalg.slogdet(bend)[1])
-    value = float(-done.fun) + 0.5 * theta.size * float(np.log(2 * np.pi)) - 0.5 * log_det
-    return Weighed(value, theta)
-
-
-def _inverse(m: Array) -> tuple[Array, float]:
-    """(M^-1, ln det M) of a positive definite matrix, by LAPACK alone: it is needed thousands of times."""
-    factor, fault = lapack.dpotrf(m, lower=1, overwrite_a=1)
-    if fault:
-        raise np.linalg.LinAlgError("the covariance of a linear model is not positive definite")
-    log_det = 2 * float(np.sum(np.log(np.diag(factor))))
-    half, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
-    lower = np.tril(half)
-    return np.asarray(lower + np.tril(half, -1).T), log_det
-
-
-def _curvature(model: Linear, theta: Array) -> Array:
-    """(h, h) of -ln p(d, theta), by differences of its slopes; nowhere flatter than half of the prior's."""
-    h = FORM.step
-    rows = []
-    for i in range(theta.size):
+    theta, now = max(((t, model.log_density(t)) for t in starts), key=lambda pair: pair[1].value)
+    for _ in range(FORM.iterations):
+        free = ~(((theta <= low) & (now.slope < 0)) | ((theta >= high) & (now.slope > 0)))
+        precision = _precision(model, now.bend, 0.0)[np.ix_(free, free)]
         step = np.zeros(theta.size)
-        step[i] = h
-        rows.append((model.log_density(theta - step)[1] - model.log_density(theta + step)[1]) / (2 * h))
-    bend = 0.5 * (np.array(rows) + np.array(rows).T)
-    value, vector = np.linalg.eigh(bend * np.outer(model.priors[:, 1], model.priors[:, 1]))
-    bent = (vector * np.maximum(value, FORM.least_curvature)) @ vector.T
-    return np.asarray(bent / np.outer(model.priors[:, 1], model.priors[:, 1]))
+        step[free] = np.linalg.solve(precision, now.slope[free])
+        step *= min(1.0, FORM.largest_step / max(float(np.max(np.abs(step))), 1e-300))
+        if float(step @ now.slope) < FORM.tolerance:
+            break
+        for _ in range(FORM.halvings):
+            trial = np.clip(theta + step, low, high)
+            there = model.log_density(trial)
+            if there.value > now.value:
+                break
+            step *= 0.5
+        else:
+            break
+        theta, now = trial, there
+    return theta, now
+
+
+def _precision(model: Linear, bend: Array, least: float) -> Array:
+    """(h, h) positive definite: -``bend`` with curvatures, of the prior's, by size and no less than ``least``."""
+    sd = model.priors[:, 1]
+    value, vector = np.linalg.eigh(-bend * np.outer(sd, sd))
+    value = np.maximum(value, least) if least > 0 else np.maximum(np.abs(value), FORM.least_curvature)
+    return np.asarray((vector * value) @ vector.T / np.outer(sd, sd))
 
 
 def log_inside(mean: Array, covariance: Array, low: Array, high: Array) -> float:

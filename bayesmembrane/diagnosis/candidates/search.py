@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import repeat
 
 import numpy as np
 
@@ -72,14 +73,21 @@ class Search:
         """The solver without its last resort: films that only shooting resolves cost a hundred times as much."""
         return api.unaided(asked, self.solve)
 
+    @cached_property
+    def _few(self) -> Measurement:
+        """Readings spread over the measured deflections."""
+        order = np.argsort(self.measurement.deflection, kind="stable")
+        rows = np.linspace(0, order.size - 1, min(order.size, SEARCH.readings)).round().astype(int)
+        return self.measurement.select(np.sort(order[rows]))
+
     def material_starts(self, hypothesis: Hypothesis) -> list[Array]:
         """Starts (k,) from draws of the material's prior brought to their best modulus, without any effect.
 
         The plain model bends the material until it imitates what is missing: searches must not only start there.
         """
         plain = replace(hypothesis, effects=())
-        objective = Objective(plain, self.measurement, "euclidean", self.quick)
-        pool, _ = objective.pool(np.random.default_rng(self.seed))
+        objective = Objective(plain, self._few, "euclidean", self.quick)
+        pool, _ = objective.pool(np.random.default_rng(self.seed), SEARCH.draws)
         nothing = np.concatenate([np.empty(0), *(e.null for e in hypothesis.effects)])
         return [np.concatenate([x, nothing]) for x in separated(pool, objective.spread, SEARCH.material_starts)]
 
@@ -159,8 +167,8 @@ class Search:
 
     # ---- form error ----------------------------------------------------------------------------------------------
 
-    def _columns(self, candidate: Candidate) -> list[tuple[Parameter, Array]]:
-        """What its form error could look like, in N, each with the parameter of its relative size."""
+    def _columns(self, candidate: Candidate) -> list[tuple[Parameter | None, Array]]:
+        """What its form error could look like, in N, each with the parameter of its relative size, if that is open."""
         fitted = self.measurement.force - candidate.residual
         return form_columns(self.factors, fitted, candidate.hypothesis.effects, candidate.traces)
 
@@ -171,17 +179,17 @@ class Search:
     def _freeing(self, parent: Candidate | None, capped: bool = True) -> Freeing:
         if parent is None:
             force, nothing = np.abs(self.measurement.force), np.empty((0, len(self.measurement)))
-            made = form_columns(self.factors, force, (), nothing)
-            columns = np.column_stack([np.exp(_moments(size)[0]) * self.noise.white(c) for size, c in made])
+            forms = [_form(size, self.noise.white(c)) for size, c in form_columns(self.factors, force, (), nothing)]
         else:
             forms = self._forms(parent)
-            # A poor parent's form error is large, and would take what the coordinates are to explain.
-            usual = np.array([b.ln_eta[0] for b in forms if b.ln_eta is not None])
-            eta = np.exp(np.minimum(parent.theta[1:], usual) if capped else parent.theta[1:])
-            columns = np.column_stack([e * b.columns for e, b in zip(eta, forms, strict=True)])
-        q, s, _ = np.linalg.svd(columns, full_matrices=False)
-        keep = s > SEARCH.least_form
-        return Freeing(self.noise, q[:, keep], 1 - 1 / np.sqrt(1 + s[keep] ** 2))
+        found: Iterator[float] = repeat(np.inf) if parent is None else iter(parent.theta[1:].tolist())
+        etas = [1.0 if b.ln_eta is None else _eta(b.ln_eta[0], next(found), capped) for b in forms]
+        columns = np.column_stack([eta * b.columns for eta, b in zip(etas, forms, strict=True)])
+        # From the products: LAPACK's decomposition of the columns themselves fails where some are next to nothing.
+        square, v = np.linalg.eigh(columns.T @ columns)
+        keep = square > SEARCH.least_form**2
+        q = columns @ (v[:, keep] / np.sqrt(square[keep]))
+        return Freeing(self.noise, q, 1 - 1 / np.sqrt(1 + square[keep]))
 
     # ---- one fit -------------------------------------------------------------------------------------------------
 
@@ -260,7 +268,14 @@ def starts_with(bases: Sequence[Array], effect: Effect, measurement: Measurement
     return out
 
 
-def _form(size: Parameter, columns: Array) -> Block:
+def _eta(usual: float, found: float, capped: bool) -> float:
+    """Of two ln eta; capped, for a poor parent's is large, and would take what the coordinates are to explain."""
+    return float(np.exp(min(usual, found) if capped else found))
+
+
+def _form(size: Parameter | None, columns: Array) -> Block:
+    if size is None:
+        return Block(columns)
     return Block(columns, _moments(size), float(np.log(LARGEST[size.name])))
 
 

@@ -13,7 +13,7 @@ from scipy.linalg import solve_triangular
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array, Natural, Parameter
-from bayesmembrane.physics.form_error import ENERGY, LAW, FormFactors, form_factors, joint_factors
+from bayesmembrane.physics.form_error import ENERGY, LAW, FormFactors, form_factors, joint_factors, mixed
 from bayesmembrane.physics.noise.base import LN_SD, SD, Elsewhere, Noise, NoiseLikelihood, conditional, force_scale
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ TINY = 1e-12
 
 @dataclass(frozen=True)
 class Form(Noise):
-    """Sigma = Sigma_given + tau^2 I + eta_a^2 D_F K_u D_F + sum_e eta_e^2 D_te K_v D_te, with eta_e the same for all e.
+    """Sigma = Sigma_given + tau^2 I + (eta_a^2 + m^2) D_F K_u D_F + sum_e eta_e^2 D_te K_v D_te, one eta_e for all e.
 
     laws : whether there are effects whose law may be off; without, eta_e is not inferred
     """
@@ -107,12 +107,16 @@ class FormLikelihood(NoiseLikelihood):
         axes = np.empty((0, 0)) if self.axes is None else self.axes
         r = residual if self.axes is None else residual @ self.axes
         parts = (r, force, traces, np.maximum(variance, 1e-300))
-        square, log_det = _squares(*(np.ascontiguousarray(p, dtype=float) for p in parts), eta, law, *self._roots, axes)
+        total = np.ascontiguousarray(np.hypot(eta, mixed(force, traces)))
+        square, log_det = _squares(
+            *(np.ascontiguousarray(p, dtype=float) for p in parts), total, law, *self._roots, axes
+        )
         return square, log_det
 
     def covariance(self, x: Array) -> Array:
         power, eta, law = self._sizes(x[None, :])
-        u = self._columns(self.factors, self.force[0], self.traces[0], float(eta[0]), float(law[0]))
+        total = float(np.hypot(eta[0], mixed(self.force[0], self.traces[0])))
+        u = self._columns(self.factors, self.force[0], self.traces[0], total, float(law[0]))
         own = np.diag(self.own) if self.axes is None else (self.axes * self.own) @ self.axes.T
         return np.asarray(own + power[0] * np.eye(len(own)) + u @ u.T)
 
@@ -120,7 +124,8 @@ class FormLikelihood(NoiseLikelihood):
         power, eta, law = self._sizes(x)
         force, traces = self._curves(len(x))
         own = self.own if self.axes is None else (self.axes**2) @ self.own
-        smooth = (eta[:, None] * force) ** 2 + law[:, None] ** 2 * np.sum(traces**2, axis=1)
+        total = np.hypot(eta, mixed(force, traces))
+        smooth = (total[:, None] * force) ** 2 + law[:, None] ** 2 * np.sum(traces**2, axis=1)
         return np.asarray(np.sqrt(own + power[:, None] + smooth))
 
     def pointwise(self, residual: Array, x: Array) -> Array:
@@ -140,9 +145,10 @@ class FormLikelihood(NoiseLikelihood):
     def draw(self, x: Array, rng: np.random.Generator) -> Array:
         force, traces = self._curves(len(x))
         _, eta, law = self._sizes(x)
+        total = np.hypot(eta, mixed(force, traces))
         out = self.fresh(x, rng)
         for b in range(len(x)):
-            u = self._columns(self.factors, force[b], traces[b], eta[b], law[b])
+            u = self._columns(self.factors, force[b], traces[b], total[b], law[b])
             out[b] += u @ rng.standard_normal(u.shape[1])
         return out
 
@@ -152,7 +158,11 @@ class FormLikelihood(NoiseLikelihood):
         return z if self.axes is None else np.asarray(z @ self.axes.T)
 
     def recurring(self, residual: Array, x: Array, rng: np.random.Generator, there: Elsewhere | None = None) -> Array:
-        """(B, N) or (B, G) N: U a with a ~ N(M^-1 U^T Lambda^-1 r, M^-1), the errors of this energy and these laws."""
+        """(B, N) or (B, G) N: U a with a ~ N(M^-1 U^T Lambda^-1 r, M^-1), the errors of this energy and these laws.
+
+        Where no effect is at work, what effects and the film mix is none of the film's: of the two, which are alike in
+        all that was seen, the energy's error has its own part.
+        """
         n = len(self.measurement)
         joint = self.factors if there is None else joint_factors(self.measurement, there.path)
         here = FormFactors(joint.state[:n], joint.progress[:n])
@@ -160,11 +170,16 @@ class FormLikelihood(NoiseLikelihood):
         beyond = slice(0, n) if there is None else slice(n, None)
         away = FormFactors(joint.state[beyond], joint.progress[beyond])
         _, eta, law = self._sizes(x)
+        total = np.hypot(eta, mixed(*self._curves(len(x))))
+        alone, size = there is not None and there.traces is None, joint.state.shape[1]
         out = np.empty(force.shape)
         for b, (u, variance, root) in enumerate(self._each(x, here)):
             a = _mean(u, variance, root, self._turned(residual[b]))
             a += solve_triangular(root, rng.standard_normal(len(a)), lower=True, trans="T", check_finite=False)
-            out[b] = self._columns(away, force[b], traces[b], eta[b], law[b]) @ a
+            if alone:
+                own = eta[b] / total[b]
+                a[:size] = own * a[:size] + np.sqrt(1 - own**2) * rng.standard_normal(size)
+            out[b] = self._columns(away, force[b], traces[b], eta[b] if alone else total[b], law[b]) @ a
         return out
 
     # ---- pieces ------------------------------------------------------------------------------------------------------
@@ -203,8 +218,9 @@ class FormLikelihood(NoiseLikelihood):
         """U (N, r) and Lambda (N,) on the axes, and the root of M (r, r), draw by draw."""
         force, traces = self._curves(len(x))
         power, eta, law = self._sizes(x)
+        total = np.hypot(eta, mixed(force, traces))
         for b in range(len(x)):
-            u = self._columns(factors or self.factors, force[b], traces[b], eta[b], law[b])
+            u = self._columns(factors or self.factors, force[b], traces[b], total[b], law[b])
             u = u if self.axes is None else self.axes.T @ u
             variance = np.maximum(self.own + power[b], 1e-300)
             yield u, variance, _root(np.ascontiguousarray(u / np.sqrt(variance)[:, None]))

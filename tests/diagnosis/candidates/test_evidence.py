@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.optimize import approx_fprime
+from scipy.optimize import approx_fprime, minimize
 from scipy.stats import multivariate_normal, norm
 
 from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, log_inside, weighed
@@ -29,13 +29,30 @@ def dense(linear: Linear, theta: np.ndarray) -> float:
 @pytest.mark.parametrize("theta", [(0.0, -1.0, -2.0), (0.3, 0.5, -4.0), (-0.4, -6.0, 0.1)])
 def test_the_density_equals_that_of_the_dense_covariance(theta) -> None:
     linear = model(1)
-    assert linear.log_density(np.array(theta))[0] == pytest.approx(dense(linear, np.array(theta)), abs=1e-8)
+    assert linear.log_density(np.array(theta)).value == pytest.approx(dense(linear, np.array(theta)), abs=1e-8)
 
 
 def test_slopes_are_those_of_the_density() -> None:
     linear, theta = model(2), np.array([0.1, -0.7, -1.5])
-    numeric = approx_fprime(theta, lambda t: linear.log_density(t)[0], 1e-6)
-    assert linear.log_density(theta)[1] == pytest.approx(numeric, rel=1e-4, abs=1e-4)
+    numeric = approx_fprime(theta, lambda t: linear.log_density(t).value, 1e-6)
+    assert linear.log_density(theta).slope == pytest.approx(numeric, rel=1e-4, abs=1e-4)
+
+
+def test_second_derivatives_are_those_of_the_slopes() -> None:
+    linear, theta = model(2), np.array([0.1, -0.7, -1.5])
+    numeric = approx_fprime(theta, lambda t: linear.log_density(t).slope, 1e-6)
+    assert linear.log_density(theta).bend == pytest.approx(numeric, rel=1e-4, abs=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_most_probable_sizes_are_those_of_another_search(seed) -> None:
+    linear = model(seed, size=(0.0, 0.3, 3.0)[seed % 3])
+    low, high = linear.ends
+    other = max(
+        -minimize(lambda t: -linear.log_density(t).value, begin, bounds=list(zip(low, high, strict=True))).fun
+        for begin in (linear.priors[:, 0], 0.5 * (low + linear.priors[:, 0]), np.zeros(3))
+    )
+    assert linear.log_density(weighed(linear).theta).value == pytest.approx(other, abs=1e-4)
 
 
 def test_coefficients_are_those_of_a_ridge_regression() -> None:
@@ -63,7 +80,7 @@ def test_the_evidence_integrates_the_size_of_a_form_error(size) -> None:
     top = weighed(linear)
 
     def density(t: float) -> float:
-        return float(np.exp(linear.log_density(np.array([0.0, t]))[0] - top.log_evidence))
+        return float(np.exp(linear.log_density(np.array([0.0, t])).value - top.log_evidence))
 
     # ln s is normal with so small a deviation that it integrates to one.
     ratio = quad(density, -7, 5, limit=200)[0] * 1e-4 * np.sqrt(2 * np.pi)

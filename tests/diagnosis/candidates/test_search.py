@@ -88,7 +88,7 @@ def test_evidence_equals_importance_sampling(cyclic, name) -> None:
     own = covariance[:k, :k]
     inside = log_inside(mean[:k], own, low / spread, high / spread)
     replaced = axes.log_replaced(u, mean[:k] * spread, np.diag(own) * spread**2)
-    linear = model.log_density(found.theta)[0] + replaced + inside
+    linear = model.log_density(found.theta).value + replaced + inside
     prior_of_sizes = norm.logpdf(found.theta, model.priors[:, 0], model.priors[:, 1]).sum()
 
     law = multivariate_t(mean[:k] * spread, 1.5 * own * np.outer(spread, spread), df=4, seed=8, allow_singular=True)
@@ -114,7 +114,8 @@ def _inverse(search: Search, found: Candidate) -> Array:
     eta = np.exp(found.theta)
     fitted = search.measurement.force - found.residual
     columns = form_columns(search.factors, fitted, found.hypothesis.effects, found.traces)
-    columns = [size * c for size, (_, c) in zip(eta[1:], columns, strict=True)]
+    sizes = iter(eta[1:])
+    columns = [c if size is None else next(sizes) * c for size, c in columns]
     white = search.noise.white(np.column_stack(columns))
     return np.linalg.inv(eta[0] ** 2 * np.eye(N) + white @ white.T)
 

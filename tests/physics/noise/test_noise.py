@@ -10,6 +10,7 @@ from scipy.stats import multivariate_normal
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.form_error import MIXED
 from bayesmembrane.physics.noise.ar1 import AR1
 from bayesmembrane.physics.noise.base import SD, Elsewhere, Noise, NoiseLikelihood
 from bayesmembrane.physics.noise.form import Form
@@ -185,8 +186,8 @@ def test_white_noise_can_do_without_its_own() -> None:
 
 def smooth_part(bound: NoiseLikelihood, x: np.ndarray) -> np.ndarray:
     """The covariance of the form error alone."""
-    none = np.array([-25.0, *x[1:]])
-    return bound.covariance(none) - bound.covariance(np.full(len(x), -25.0))
+    quiet = np.array([-25.0, *x[1:]])
+    return bound.covariance(quiet) - bound.at(bound.force, 0 * bound.traces).covariance(np.full(len(x), -25.0))
 
 
 @pytest.mark.parametrize("given", GIVEN)
@@ -194,7 +195,7 @@ def test_no_form_error_is_white_noise(given: str) -> None:
     m = measurement(given)
     residual = 0.03 * np.random.default_rng(SEED).standard_normal((5, N))
     x = np.column_stack([np.full(5, -3.0), np.full(5, -40.0), np.full(5, -40.0)])
-    white, form = White().bind(m), told(Form(laws=True), Form(laws=True).bind(m))
+    white, form = White().bind(m), Form(laws=True).bind(m).at(np.full((5, N), 2.0), np.zeros((5, 2, N)))
     assert form.log_likelihood(residual, x) == pytest.approx(white.log_likelihood(residual, x[:, :1]), rel=1e-12)
     assert form.pointwise(residual, x) == pytest.approx(white.pointwise(residual, x[:, :1]), rel=1e-9)
 
@@ -222,6 +223,25 @@ def test_what_recurs_is_the_form_error_given_the_residual(given: str) -> None:
         root = np.sqrt(np.diag(left))
         assert np.max(np.abs(np.mean(z, axis=0) - gain @ residual) / root) < 0.1
         assert np.max(np.abs(np.cov(z.T) - left) / np.outer(root, root)) < 0.12
+
+
+def test_what_film_and_effects_mix_is_as_large_as_the_traces() -> None:
+    bound, x = told(Form(laws=True), Form(laws=True).bind(measurement("none")), 0), np.array([-25.0, -40.0, -40.0])
+    of_traces = np.sum(bound.traces[0] ** 2)
+    assert np.trace(bound.covariance(x)) == pytest.approx(MIXED**2 * of_traces, rel=1e-6)
+
+
+def test_the_film_alone_has_no_part_in_what_effects_mix() -> None:
+    """Where no effect is at work, only the energy's error recurs; with the effects, the other does too."""
+    m, count = measurement("none"), 2000
+    bound = told(Form(laws=True), Form(laws=True).bind(m), 0)
+    x = np.tile([-7.0, np.log(1e-4), np.log(1e-4)], (count, 1))
+    force = np.repeat(bound.force, count, axis=0)
+    one = np.zeros((count, N)), x, np.random.default_rng(SEED)
+    alone = bound.recurring(*one, Elsewhere(m.path, force))
+    both = bound.recurring(*one, Elsewhere(m.path, force, np.repeat(bound.traces, count, axis=0)))
+    assert np.std(alone / force, axis=0) == pytest.approx(np.full(N, 1e-4), rel=0.2)
+    assert np.mean(np.std(both / force, axis=0)) > 3e-4
 
 
 def test_far_from_the_readings_the_form_error_is_that_of_the_prior() -> None:
