@@ -31,7 +31,7 @@ FIELDS = [name for name in Curves.__dataclass_fields__ if name != "sensitivity"]
 def assert_same(one, other, rtol=1e-11):
     for name in FIELDS:
         # The variation of what is constant is round-off in part.
-        atol = 1e-13 if name == "variation" else 0
+        atol = 1e-12 if name == "variation" else 0
         np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=rtol, atol=atol, err_msg=name)
     assert (one.sensitivity is None) == (other.sensitivity is None)
     if one.sensitivity is not None:
