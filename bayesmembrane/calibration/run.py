@@ -52,7 +52,6 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.interrupts import Stop, never
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.sealed import damaged
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.cache import CachedSolver, Tally
 from bayesmembrane.physics.forward import Solve
@@ -280,8 +279,9 @@ def load_run(path: str | Path) -> Run:
         # What an earlier version or another hand wrote is looked at before anybody relies on it.
         run.quality, run.draws(), run.measurement, run.draws_name
     except _FAULTS as error:
-        reason = f"{type(error).__name__}, {error}"
-        raise damaged(path, "the run", reason, "see that all its files are of one run, or sample again") from None
+        raise StorageError(
+            f"another version wrote the run ({type(error).__name__}: {error})", str(path), "sample again"
+        ) from None
     return run
 
 
