@@ -253,8 +253,8 @@ two steps, and no segment is written meanwhile).
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--kills", type=int, default=120)
-    parser.add_argument("--steps", type=int, default=150)
+    parser.add_argument("--kills", type=int, default=110)
+    parser.add_argument("--steps", type=int, default=110)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--table", type=Path)
     given = parser.parse_args()
