@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.thinning import thinned
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
-from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, Tell, opened
 from bayesmembrane.diagnosis.explanation.growth import grown
 from bayesmembrane.diagnosis.explanation.total import Judged, summed
@@ -23,7 +20,7 @@ from bayesmembrane.diagnosis.left.shape import residual_shape
 from bayesmembrane.diagnosis.reference.outliers import without_outliers
 from bayesmembrane.diagnosis.result import Diagnosis, thinning
 from bayesmembrane.diagnosis.separation import Experiment, experiments
-from bayesmembrane.diagnosis.thresholds import TINY, VERDICT
+from bayesmembrane.diagnosis.thresholds import VERDICT
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -131,12 +128,8 @@ def _validated(case: OpenCase, search: Search, found: Verdict) -> HeldOut | None
     if found.verdict not in ("named", "ambiguous", "material"):
         return validate(search, null, null, [])
     nulls = [j for j in found.ranking[3:] if j.candidate.label == null.label]
-    return validate(search, null, found.members[0].candidate, [_believed(j) for j in (*found.ranking[:3], *nulls)])
-
-
-def _believed(j: Judged) -> tuple[Candidate, float]:
-    """A candidate, and ln of what was believed of it before the data, up to a constant."""
-    return j.candidate, float(np.log(max(j.probability, TINY))) / BELIEFS.counts - j.log_evidence
+    rivals = [(j.candidate, j.believed) for j in (*found.ranking[:3], *nulls)]
+    return validate(search, null, found.members[0].candidate, rivals)
 
 
 def _experiments(search: Search, found: Verdict) -> tuple[Experiment, ...]:

@@ -39,7 +39,8 @@ Watch = Callable[[str], Callback | None]
 class Stage:
     """One hypothesis, sampled.
 
-    log_evidence, log_evidence_sd : ln Z by bridge sampling, divided by the prior's mass
+    log_evidence, log_evidence_sd : ln Z by bridge sampling, divided by the prior's mass; its error, with what modes
+        that the draws are known to have missed would add
     elpd_loo, loo_se : expected log predictive density of left-out points, and its standard error
     coverage : part of the measured points inside the 90 % predictive band
     """
@@ -203,7 +204,7 @@ def _stage(run: Run, solve: Solve, seed: int) -> Stage:
     return Stage(
         run,
         z.log_evidence - float(np.log(mass.value)),
-        float(np.hypot(z.sd, mass.sd / mass.value)),
+        float(np.linalg.norm([z.sd, mass.sd / mass.value, z.missed])),
         loo.elpd,
         loo.se,
         coverage(run),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import comb, log
+from math import comb, log, sqrt
 
 
 @dataclass(frozen=True)
@@ -15,9 +15,10 @@ class Beliefs:
 
     effects: tuple[float, ...] = (0.40, 0.40, 0.15, 0.05)
     """Of none, one, two and three effects beyond those given; sets of one size are equally probable."""
-    counts: float = 0.5
-    """Of every ln Bayes factor: real laws differ from the library's in more ways than the form error knows, so that
-    factors as they come are too sure. Chosen by the log score of the calibration half of `make study-reliability`."""
+    plain_gain: float = 100.0
+    """ln of the Bayes factor of the best explanation over none, from which on factors count much less than they say:
+    real laws differ from the library's in more ways than the form error knows, which matters the more the larger the
+    effects are. Chosen by the log score of the calibration half of `make study-reliability`."""
     foreign: float = 0.15
     """Of something that no effect of the library describes, on top of whatever else is at work."""
     supported: float = 1.0
@@ -33,6 +34,10 @@ class Beliefs:
     def most(self) -> int:
         """Effects of the largest set."""
         return len(self.effects) - 1
+
+    def counts(self, gain: float) -> float:
+        """What part of every ln Bayes factor counts where the best explanation has ln K = ``gain`` over none."""
+        return 1.0 / sqrt(1.0 + max(gain, 0.0) / self.plain_gain)
 
     def log_set(self, size: int, visible: int) -> float:
         """ln of the probability of one set of ``size`` of the ``visible`` effects."""

@@ -42,6 +42,12 @@ class Grown:
         if key not in self.found or candidate.log_evidence > self.found[key].log_evidence:
             self.found[key] = candidate
 
+    @property
+    def counts(self) -> float:
+        """What part of every ln Bayes factor counts, with the gain of the best so far."""
+        best = max(c.log_evidence for c in self.found.values())
+        return BELIEFS.counts(best - self.of_size(0)[0].log_evidence)
+
     def of_size(self, size: int) -> list[Candidate]:
         """Those with so many effects beyond the given ones, the most probable first."""
         given = len(self.case.null.names)
@@ -190,5 +196,5 @@ def _worth_more(out: Grown, size: int) -> bool:
 
 def _mass(out: Grown, candidates: Iterable[Candidate] | Sequence[Candidate], size: int) -> float:
     visible = len(out.case.visible)
-    every = [BELIEFS.counts * c.log_evidence for c in candidates]
+    every = [out.counts * c.log_evidence for c in candidates]
     return float(np.logaddexp.reduce(every)) + BELIEFS.log_set(size, visible) if every else -np.inf

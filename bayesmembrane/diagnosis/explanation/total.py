@@ -30,6 +30,7 @@ class Judged:
     gain : ln of the Bayes factor over the null model
     unexplained : part of the squares beyond noise that the null model leaves, which this one leaves
     reduced_chi2 : of what it leaves, its form error not taken away
+    believed : ln of its probability before the data
     """
 
     candidate: Candidate
@@ -37,6 +38,7 @@ class Judged:
     gain: float
     unexplained: float
     reduced_chi2: float
+    believed: float = 0.0
 
     @property
     def log_evidence(self) -> float:
@@ -96,12 +98,14 @@ def summed(grown: Grown) -> Total:
     """All that was grown, and what is foreign beside the most probable of it."""
     case = grown.case
     given, visible = case.null.names, len(case.visible)
-    every = list(grown.found.values())
+    every, counts = list(grown.found.values()), grown.counts
+
+    def believed(c: Candidate) -> float:
+        energy = BELIEFS.log_energy(c.hypothesis.material.name, case.question.energy, len(case.plain))
+        return BELIEFS.log_set(len(c.names) - len(given), visible) + energy
 
     def weight(c: Candidate) -> float:
-        size = len(c.names) - len(given)
-        energy = BELIEFS.log_energy(c.hypothesis.material.name, case.question.energy, len(case.plain))
-        return BELIEFS.counts * c.log_evidence + BELIEFS.log_set(size, visible) + energy
+        return counts * c.log_evidence + believed(c)
 
     every.sort(key=weight, reverse=True)
     found = _foreign(grown, every, given)
@@ -109,10 +113,12 @@ def summed(grown: Grown) -> Total:
     nothing = BELIEFS.log_foreign(0) if kinds else 0.0
     terms = [(c, NOTHING, weight(c) + nothing) for c in every]
     # What the data do not speak for is neither seen nor excluded, like a further effect that is idle.
-    seen = [f for f in found if BELIEFS.counts * f.gain > BELIEFS.supported]
-    terms += [(f.base, f.kind, weight(f.base) + BELIEFS.counts * f.gain + BELIEFS.log_foreign(kinds)) for f in seen]
+    seen = [f for f in found if counts * f.gain > BELIEFS.supported]
+    terms += [(f.base, f.kind, weight(f.base) + counts * f.gain + BELIEFS.log_foreign(kinds)) for f in seen]
     p = _normalised(np.array([w for _, _, w in terms]))
-    judged = [_judged(grown, c, float(q)) for (c, kind, _), q in zip(terms, p, strict=True) if kind == NOTHING]
+    judged = [
+        _judged(grown, c, float(q), believed(c)) for (c, kind, _), q in zip(terms, p, strict=True) if kind == NOTHING
+    ]
     owners = _owners(grown, [c for c, kind, _ in terms if kind == NOTHING])
     joint, energies = defaultdict[tuple[str, str], float](float), defaultdict[str, float](float)
     for (c, kind, _), q in zip(terms, p, strict=True):
@@ -172,7 +178,7 @@ def _owners(grown: Grown, every: Sequence[Candidate]) -> dict[str, str]:
         if smaller:
             less = max(smaller, key=lambda s: best[s].log_evidence)
             gain = best[own].log_evidence - best[less].log_evidence
-            idle = BELIEFS.counts * gain < BELIEFS.supported
+            idle = grown.counts * gain < BELIEFS.supported
             if idle and squares[less] - squares[own] < BELIEFS.takes:
                 out[own] = out[less]
     return {_joined(own): _joined(owner) for own, owner in out.items()}
@@ -182,7 +188,7 @@ def _joined(names: frozenset[str]) -> str:
     return "+".join(sorted(names)) or NOTHING
 
 
-def _judged(grown: Grown, c: Candidate, probability: float) -> Judged:
+def _judged(grown: Grown, c: Candidate, probability: float, believed: float) -> Judged:
     null = grown.found[(grown.case.null.hypothesis.material.name, frozenset(grown.case.null.names))]
     left, before = grown.search.excess(c), grown.search.excess(null)
     n = c.residual.size
@@ -192,4 +198,5 @@ def _judged(grown: Grown, c: Candidate, probability: float) -> Judged:
         c.log_evidence - null.log_evidence,
         min(left / before, 1.0) if before > 0 else 0.0,
         (left + n - c.x.size) / max(n - c.x.size, 1),
+        believed,
     )

@@ -110,13 +110,12 @@ def _first_order(case: OpenCase) -> Probabilities:
     """Probabilities of single effects beside the energies, from their traces alone."""
     count, visible = len(case.plain), case.visible
     log_energy = {
-        name: BELIEFS.counts * c.log_evidence + BELIEFS.log_energy(name, case.question.energy, count)
-        for name, c in case.plain.items()
+        name: c.log_evidence + BELIEFS.log_energy(name, case.question.energy, count) for name, c in case.plain.items()
     }
     none = float(np.logaddexp.reduce(list(log_energy.values())))
     sets = {NOTHING: BELIEFS.log_set(0, len(visible))}
     for e in visible:
-        gain = BELIEFS.counts * first_order(case.search, case.null, e)
+        gain = first_order(case.search, case.null, e)
         if gain > BELIEFS.supported:
             sets[e.name] = BELIEFS.log_set(1, len(visible)) + gain
     return Probabilities(_shares(sets), _shares({n: w - none for n, w in log_energy.items()}), {NOTHING: 1.0})

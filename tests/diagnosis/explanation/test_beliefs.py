@@ -1,0 +1,29 @@
+"""Prior probabilities add up, and factors count less the more an explanation gains."""
+
+from math import comb, exp
+
+import numpy as np
+import pytest
+
+from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
+
+
+@pytest.mark.parametrize("visible", [3, 7, 12])
+def test_sets_share_what_their_size_has(visible: int) -> None:
+    total = sum(comb(visible, size) * exp(BELIEFS.log_set(size, visible)) for size in range(BELIEFS.most + 1))
+    assert total == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("declared", [None, "gent"])
+def test_energies_share_one(declared: str | None) -> None:
+    names = ["gent", "yeoh", "ogden"]
+    assert sum(exp(BELIEFS.log_energy(n, declared, len(names))) for n in names) == pytest.approx(1.0)
+
+
+def test_factors_count_whole_where_little_is_gained_and_less_the_more_there_is() -> None:
+    gains = np.array([-5.0, 0.0, 1.0, 10.0, 100.0, 1e4])
+    counts = np.array([BELIEFS.counts(g) for g in gains])
+    assert counts[0] == counts[1] == 1.0
+    assert np.all(np.diff(counts[1:]) < 0)
+    # What is gained still counts for more, the more it is.
+    assert np.all(np.diff(counts[1:] * gains[1:]) > 0)
