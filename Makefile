@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-kill study-damage study-seeds clean
+.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-kill study-damage study-import study-seeds study-sbc clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -24,7 +24,9 @@ help:
 	@echo "make study-fuzz  500 calls at random, each judged, an hour or so; goes on where it was; FUZZ='--only fit' asks for less"
 	@echo "make study-kill  runs killed at random moments and while they write, some minutes; KILL='--kills 20' asks for less"
 	@echo "make study-damage  every stored file damaged 500 times, an hour or less; DAMAGE='--times 50' asks for less"
+	@echo "make study-import 10 000 damaged exports, what becomes of them, some minutes; IMPORT='--count 1000' asks for less"
 	@echo "make study-seeds 50 seeds for the statistical tests, lanes on and off, hours; goes on where it was; SEEDS='--group quick' asks for less"
+	@echo "make study-sbc  simulation-based calibration of every material, hours; goes on where it was; SBC='--only gent --limit 20' asks for less"
 	@echo "make install  the set-up alone, into $(VENV)"
 	@echo "make lint     style, types and floors alone"
 	@echo "make clean    remove caches and build products; keeps $(VENV), chains and reports"
@@ -82,8 +84,14 @@ study-kill: $(STAMP)
 study-damage: $(STAMP)
 	$(PY) -m tests.studies.damage --table docs/studies/damage.md $(DAMAGE)
 
+study-import: $(STAMP)
+	$(PY) -m tests.studies.imports --table docs/studies/import.md $(IMPORT)
+
 study-seeds: $(STAMP)
 	$(PY) -m tests.studies.seeds $(SEEDS)
+
+study-sbc: $(STAMP)
+	$(PY) -m tests.studies.sbc --jobs $(PYTEST_WORKERS) --table docs/studies/sbc.md $(SBC)
 
 clean:
 	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

@@ -24,6 +24,7 @@ from bayesmembrane.comparison.compare import Range, compare_ranges
 from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.phases import phases_of
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.diagnosis.diagnose import diagnose as run_diagnose
 from bayesmembrane.diagnosis.explanation.case import Question
@@ -34,6 +35,7 @@ from bayesmembrane.ground.interrupts import Stop, never
 from bayesmembrane.ground.jobs import Tell, silent
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components, materials
+from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -94,6 +96,8 @@ def fit(
     found = run_fit(measurement, claim, loss=loss, seed=work.seed, starts=starts)
     settings = {"seed": work.seed, "loss": loss, "starts": [list(s) for s in starts]}
     what = asked("fit", run_fit, [measurement], [claim], settings)
+    if work.out is not None:
+        _keep_phases(measurement, work.out / what.name)
     return kept("fit", found, document(found), what, work.out)
 
 
@@ -122,7 +126,15 @@ def sample(
     rest = rest_of(measurement, whole)
     if run.path is not None:  # of an interrupted run, too: a report shows what there is, and solves nothing
         predictions_of(run, Wanted(rest=rest, breaks=tuple(breaks)) if breaks or rest is not None else None, solve)
+        _keep_phases(measurement, run.path)
     return Answer(run, {**document(run), "stored": None if run.path is None else str(run.path)})
+
+
+def _keep_phases(measurement: Measurement, folder: Path) -> None:
+    """What was done to the film, beside the answer about it, if it was more than one pull."""
+    found = phases_of(measurement)
+    if found is not None:
+        store(folder, "phases", found, {"phases": len(found.parts), "cycles": int(found.cycle.max())})
 
 
 def compare(

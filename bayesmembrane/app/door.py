@@ -15,8 +15,10 @@ from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.calibration.run import Run, predictions_of
 from bayesmembrane.comparison.compare import Range
 from bayesmembrane.comparison.result import Comparison
+from bayesmembrane.data.exports.hints import hints_of
+from bayesmembrane.data.importers.base import read_export
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.reading import read_measurement
+from bayesmembrane.data.reading import read_measurement as read_files
 from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
@@ -34,7 +36,18 @@ Folder = str | Path
 
 def read(curve: Folder, specimen: Folder) -> Measurement:
     """The measured curve (CSV) of a specimen (TOML), in SI; raises `DataError` that says what is wrong where."""
-    return read_measurement(Path(curve), Path(specimen))
+    return read_files(Path(curve), Path(specimen))
+
+
+def read_measurement(export: Folder, specimen: Folder | None = None, **said: Any) -> Measurement:
+    """The measurement in a testing machine's export, in SI, as the verb ``import`` reads it; nothing is written.
+
+    ``specimen`` is a TOML with film and rig, if there is one; ``said`` are the options of ``import`` with underscores:
+    ``rig="uniaxial", thickness_um=500, gauge_length_mm=50, columns="time_s,travel_mm,force_N"``. What was guessed, and
+    what the export contradicts, stands in ``.provenance.notes``. Raises `DataError` for what cannot be read with
+    confidence, `SettingsError` for options that there are not, and where film or rig are not known.
+    """
+    return read_export(export, hints_of(said), specimen)
 
 
 def hypothesis(

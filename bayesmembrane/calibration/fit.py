@@ -14,6 +14,7 @@ from bayesmembrane.calibration.descent import descend
 from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.calibration.posterior import enough_points
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.thinning import shortened
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.convexity import FREE, REACHED, RESTRICTING
@@ -29,6 +30,7 @@ FEW, ROUGH = 50, 1e-4  # evaluations and tolerance of a first search
 NEAR = 1e-3  # of the width of the bounds: an estimate this close is at the bound
 FLAT = 1e-4  # a loss that rises by less than this part on the way to the bound has no minimum before it
 TO_BOUND = 40  # iterations towards a bound
+MANY = 5000  # readings with which valleys are looked for: hundreds of films at once are kept in memory
 LOWER = 1e-9  # a simpler energy's optimum is taken where it leads lower by more than this part: less is round-off
 
 
@@ -124,22 +126,30 @@ def fit(
     part but for the convexity constraint. Ogden films are sought among those with c_i a_i > 0 only, which its
     coordinates cover.
 
+    Of more than `MANY` readings the valleys are looked for with that many of them (`data.thinning.shortened`), and the
+    optimum is then that of all; the one under the convexity prior is that of the part, with the loss of all.
+
     Standard errors are s^2 (J^T J)^-1 with s^2 = |r|^2 / (N - k): the misfit counts as noise.
 
     Raises `SettingsError` for fewer points than parameters, a loss that is unknown or lacks a noise, and a material
     whose films cannot reach the data.
     """
     enough_points(hypothesis, measurement)
-    objective = Objective(hypothesis, measurement, loss, solve)
+    few = shortened(measurement, MANY)
+    objective = Objective(hypothesis, few, loss, solve)
     rng = np.random.default_rng(seed)
     pool, size = objective.pool(rng)
     contained = _contained(objective, seed)
     published = [np.asarray(s, dtype=float) for s in starts]
     x, status = _best_of_starts(objective, pool[size < HOPEFUL * size[0]], published, contained)
+    search = objective
+    if few is not measurement:
+        objective = Objective(hypothesis, measurement, loss, solve)
+        x, _, status = objective.polish(x)
     free = _result(objective, x, status)
     if not hypothesis.convexity.restricts or free.convex or not np.isfinite(free.objective):
         return replace(free, constrained=free)
-    y = constrained_optimum(objective, pool, free.coordinates, contained)
+    y = constrained_optimum(search, pool, free.coordinates, contained)
     held = None if y is None else _result(objective, y, "converged")
     if held is not None and held.objective < free.objective:
         # The constraint led to a better valley: it is open without the constraint too.

@@ -19,7 +19,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.ground.registry import component
 
-MOTION = ("deflection", "time", "across")
+MOTION = ("deflection", "time", "across", "said_leg", "said_cycle")
 OPTIONAL = ("time", "force_sd", "covariance", "across")
 
 
@@ -69,7 +69,6 @@ def measurement_of(data: Any) -> Measurement:
     arrays = {name: array(name) for name in ("deflection", *OPTIONAL) if name in held}
     motion = {n: array(f"motion_{n}") for n in MOTION if f"motion_{n}" in held}
     places = array("places").astype(int) if motion else None
-    whole = (motion["deflection"], motion.get("time"), about["full_range"], motion.get("across")) if motion else None
     if "covariance" in arrays:
         arrays.pop("force_sd", None)
     notes = {**about["provenance"], "notes": tuple(about["provenance"]["notes"])}
@@ -79,7 +78,7 @@ def measurement_of(data: Any) -> Measurement:
         specimen=Specimen(**about["specimen"]),
         provenance=Provenance(**notes),
         full_range=about["full_range"],
-        motion=None if whole is None else Motion(*whole),
+        motion=Motion(**{"time": None, "full_range": about["full_range"], **motion}) if motion else None,
         places=places,
         **arrays,
     )

@@ -38,14 +38,15 @@ class Objective:
     def __init__(self, hypothesis: Hypothesis, measurement: Measurement, loss: str, solve: Solve) -> None:
         if loss not in LOSSES:
             raise unknown_name("loss", loss, LOSSES)
-        covariance = measurement.noise_covariance
-        if loss == "weighted" and covariance is None:
+        if loss == "weighted" and measurement.force_sd is None:
             raise SettingsError(
                 'the loss "weighted" needs the noise of the measurement, and it states none',
                 remedy='give force_sd_N in the specimen file, or use "euclidean"',
             )
         self.hypothesis, self.measurement, self.loss = hypothesis, measurement, loss
-        self.root = np.linalg.cholesky(covariance) if loss == "weighted" and covariance is not None else None
+        weighted, covariance = loss == "weighted", measurement.covariance
+        self.root = np.linalg.cholesky(covariance) if weighted and covariance is not None else None
+        self.sd = measurement.force_sd if weighted and covariance is None else None
         self.forward = Forward(hypothesis, measurement, measurement.deflection, solve)
         self.parameters = hypothesis.parameters[: hypothesis.curve_size]
         self.low, self.high = np.array([p.bounds for p in self.parameters], dtype=float).T
@@ -53,6 +54,8 @@ class Objective:
 
     def whiten(self, r: Array) -> Array:
         """L^-1 r along the first axis of r (N, ...)."""
+        if self.sd is not None:  # independent noise: a matrix of a long measurement would not fit into memory
+            return np.asarray(r / self.sd.reshape(-1, *[1] * (r.ndim - 1)))
         return r if self.root is None else np.asarray(solve_triangular(self.root, r, lower=True, check_finite=False))
 
     def batch(self, x: Array) -> tuple[Array, Array]:
@@ -60,7 +63,7 @@ class Objective:
         p = self.forward(x, sensitivities=True, reached=False)
         assert p.sensitivity is not None
         r, j = p.force - self.measurement.force, p.sensitivity
-        if self.root is None:
+        if self.root is None and self.sd is None:
             return r, j
         wide = np.concatenate([r[:, :, None], j], axis=2)
         white = self.whiten(np.moveaxis(wide, 1, 0).reshape(r.shape[1], -1))

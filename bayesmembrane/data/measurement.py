@@ -158,6 +158,8 @@ class Measurement:
         if self.motion is not None:
             for array in (self.motion.deflection, self.motion.time, self.on_path.astype(float)):
                 digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
+            for array in (self.motion.said_leg, self.motion.said_cycle):
+                digest.update(b"" if array is None else np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()
 
     def up_to(self, max_deflection: float) -> Measurement:
@@ -182,11 +184,10 @@ class Measurement:
         covariance = None if self.covariance is None else self.covariance[keep][:, keep]
         places = self.on_path[keep]
         end = int(places[-1]) + 1 if places.size else 0
-        remembers = places.size != end
-        past, across = (None if v is None else v[:end] for v in (self.path.time, self.path.across))
+        remembers = places.size != end or self.path.said
         return replace(
             self,
-            motion=Motion(self.path.deflection[:end], past, self.full_range, across) if remembers else None,
+            motion=self.path.up_to(end) if remembers else None,
             across=part(self.across),
             places=places if remembers else None,
             deflection=self.deflection[keep],

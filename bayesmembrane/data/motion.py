@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,10 +14,13 @@ from bayesmembrane.ground.parameters import Array
 
 REVERSAL = 0.005
 """A reversal of the deflection counts as a new leg beyond this part of the whole range; less is jitter."""
-
-
+LONG, SWINGS, MOST_JITTER = 200, 12.0, 0.05
+"""From so many readings on the noise of the deflections is asked for: legs turn where they leave an extreme by so many
+standard deviations (two extremes of 200 000 readings lie nine apart), but by no more than this part of the range."""
 HELD, STILL = 12, 0.1
 """Readings of a hold, at least, and the part of the speed before it at which the disc counts as standing still."""
+MOST_HELD = 4000
+"""In a longer record holds are looked for in means of neighbours, half as many as this."""
 NOMINAL_SPEED = 1e-3
 """m/s: without times the disc counts as moved at this speed, so that a second is a millimetre of travel."""
 SLOWEST = 1e-3
@@ -33,22 +37,37 @@ class Motion:
     time : (N,) s, strictly increasing, or None
     full_range : the deflection in m that histories are measured against, the largest of the whole measurement
     across : (N,) stretch across the direction of pull where it was measured (biaxial tests), or None
+    said_leg, said_cycle : (N,) `leg` and `cycle` as whoever measured says them, or None: then they are read off
     """
 
     deflection: Array
     time: Array | None
     full_range: float
     across: Array | None = None
+    said_leg: Array | None = None
+    said_cycle: Array | None = None
 
     @cached_property
     def leg(self) -> NDArray[np.int8]:
         """(N,) +1 while the deflection grows, -1 while it falls."""
-        return legs(self.deflection)
+        return legs(self.deflection) if self.said_leg is None else self.said_leg.astype(np.int8)
 
     @cached_property
     def cycle(self) -> NDArray[np.int64]:
         """(N,) number of the cycle, from 1."""
-        return cycles(self.leg)
+        return cycles(self.leg) if self.said_cycle is None else self.said_cycle.astype(np.int64)
+
+    @property
+    def said(self) -> bool:
+        """Whether legs or cycles were said."""
+        return self.said_leg is not None or self.said_cycle is not None
+
+    def up_to(self, end: int) -> Motion:
+        """The first ``end`` stations."""
+        parts = (self.deflection, self.time, self.across, self.said_leg, self.said_cycle)
+        deflection, time, across, leg, cycle = (None if v is None else v[:end] for v in parts)
+        assert deflection is not None
+        return Motion(deflection, time, self.full_range, across, leg, cycle)
 
     @cached_property
     def steps(self) -> Array:
@@ -93,7 +112,7 @@ class Motion:
 
 def legs(deflection: Array) -> NDArray[np.int8]:
     """(N,) +1 on loading and -1 on unloading legs of the deflections (N,), reversals within `REVERSAL` left aside."""
-    tolerance = _jitter(deflection)
+    tolerance = jitter(deflection)
     result = np.ones(deflection.size, dtype=np.int8)
     direction, turn = 1, 0
     for i, x in enumerate(deflection):
@@ -117,22 +136,42 @@ def cycles(leg: NDArray[np.int8]) -> NDArray[np.int64]:
 
 def first_loading(deflection: Array, leg: NDArray[np.int8]) -> NDArray[np.bool_]:
     """(N,) True where the film is loaded to a deflection that it has not seen before."""
-    reached = np.maximum.accumulate(deflection)
-    return np.asarray((leg > 0) & (deflection >= reached - _jitter(deflection)))
+    return np.asarray((leg > 0) & (deflection >= reached(deflection) - jitter(deflection)))
+
+
+def reached(deflection: Array) -> Array:
+    """(N,) m: the largest deflection so far. In a long record no single reading sets it alone."""
+    if deflection.size < LONG:
+        return np.maximum.accumulate(deflection)
+    before, here, after = deflection[:-2], deflection[1:-1], deflection[2:]
+    middle = np.maximum(np.minimum(before, here), np.minimum(np.maximum(before, here), after))
+    return np.maximum.accumulate(np.concatenate([deflection[:1], middle, deflection[-1:]]))
+
+
+def _leaves(deflection: Array, start: int, tolerance: float) -> int:
+    """The first reading after ``start`` that is farther from it than the tolerance, or their number."""
+    low, step = start, 4 * HELD
+    while low < deflection.size:
+        away = np.flatnonzero(np.abs(deflection[low : low + step] - deflection[start]) > tolerance)
+        if away.size:
+            return low + int(away[0])
+        low, step = low + step, 2 * step
+    return int(deflection.size)
 
 
 def holds(deflection: Array) -> list[NDArray[np.intp]]:
     """The readings of each time at which the disc stands still: `HELD` and more of them within the jitter, after a way
     at least ten times as fast.
     """
-    tolerance, n = _jitter(deflection), deflection.size
+    if deflection.size > MOST_HELD:
+        return _holds_of_means(deflection)
+    tolerance, n = jitter(deflection), deflection.size
     found, i = [], 0
     while i + HELD <= n:
         if abs(deflection[i + HELD - 1] - deflection[i]) > tolerance:
             i += 1
             continue
-        away = np.flatnonzero(np.abs(deflection[i:] - deflection[i]) > tolerance)
-        end = i + int(away[0]) if away.size else n
+        end = _leaves(deflection, i, tolerance)
         before = abs(deflection[i] - deflection[max(i - HELD, 0)]) / HELD
         during = abs(deflection[end - 1] - deflection[i]) / max(end - i, 1)
         if end - i >= HELD and during < STILL * before:
@@ -141,6 +180,14 @@ def holds(deflection: Array) -> list[NDArray[np.intp]]:
         else:
             i += 1
     return found
+
+
+def _holds_of_means(deflection: Array) -> list[NDArray[np.intp]]:
+    """Of a long record: the holds of means of neighbours, which have less noise. Shorter ones are not told."""
+    each = -(-2 * deflection.size // MOST_HELD)
+    whole = deflection.size // each
+    means = np.mean(deflection[: whole * each].reshape(whole, each), axis=1)
+    return [np.arange(part[0] * each, (part[-1] + 1) * each) for part in holds(means)]
 
 
 def check_time(time: Array, places: list[str]) -> None:
@@ -178,5 +225,11 @@ def check_order(deflection: Array, places: list[str]) -> None:
         raise DataError(fault, places[k], remedy)
 
 
-def _jitter(deflection: Array) -> float:
-    return REVERSAL * float(np.max(deflection) - np.min(deflection))
+def jitter(deflection: Array) -> float:
+    """m, of deflections (N,) m: less is no movement; in a long record, what noise alone can make."""
+    reach = float(np.max(deflection) - np.min(deflection))
+    if deflection.size < LONG:
+        return REVERSAL * reach
+    bends = np.abs(np.diff(deflection, 2))  # of white noise: sqrt(6) times its standard deviation
+    noise = float(np.median(bends)) / (0.6745 * math.sqrt(6.0))
+    return max(REVERSAL * reach, min(SWINGS * noise, MOST_JITTER * reach))

@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
 
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen, check_covariance
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.data.settings import TomlSection, load_toml
 from bayesmembrane.data.tables import TextTable, parse_table, read_matrix, read_text
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
-from bayesmembrane.ground.units import FORCE, LENGTH, TIME
+from bayesmembrane.ground.units import FORCE, LENGTH, RATIO, TIME
 
 # What lies beyond these is a wrong unit, not a film.
 THICKNESSES = (1e-8, 5e-3)  # m
 RIG_SIZES = (1e-6, 1.0)  # m
 LARGEST_LIFT = 20.0  # largest deflection relative to the size of the rig
 LEAST_SD = 1e-12  # N
+PHASES = MappingProxyType({"cycle": RATIO, "direction": RATIO})
+"""Columns by which whoever measured says cycles (1, 2, ...) and legs (1 loading, -1 unloading)."""
 
 T = TypeVar("T")
 
@@ -38,14 +43,19 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     rig = _rig(root.section("rig"))
     specimen = _specimen(root.section("specimen"), rig, curve_csv.stem)
     options = root.section("measurement", required=False)
-    columns, notes = curve_columns(table, rig.columns, rig.noise)
+    columns, notes = curve_columns(table, rig.columns, rig.noise, PHASES if rig.has_path else {})
     found = _at(table.file, rig.from_columns, columns, specimen.thickness)
     deflection, force, across = found["deflection"], found["force"], found.get("across")
+    motion = _said_motion(table, found, rig)
     rig.check_readings(found, table.file, table.lines)
     _check_size(deflection, table, rig)
     single = _stated(options, rig, specimen.thickness)
     sd, covariance, covariance_file = _noise(options, single, found.get("force_sd"), force.size)
     origin = [options.text("origin"), root.section("origin", required=False).all_text()]
+    understood = root.section("import", required=False)  # how an export was understood, for people
+    understood.all_text()
+    doubts = understood.table.get("contradictions", [])
+    notes = (*notes, *(f"export: {d}" for d in doubts if isinstance(d, str))) if isinstance(doubts, list) else notes
     for section in (options, root):
         section.finish()
     provenance = Provenance(
@@ -58,7 +68,10 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     if sd is not None and np.min(sd) < LEAST_SD:
         fault = f"a standard deviation of {np.min(sd):g} N looks like a wrong unit"
         raise DataError(fault, options.where, "check the unit of the noise")
-    return Measurement(deflection, force, rig, specimen, found.get("time"), sd, covariance, provenance, across=across)
+    measured = Measurement(
+        deflection, force, rig, specimen, found.get("time"), sd, covariance, provenance, across=across
+    )
+    return measured if motion is None else replace(measured, motion=motion, places=np.arange(force.size))
 
 
 def _rig(section: TomlSection) -> Fixture:
@@ -97,15 +110,18 @@ def _at(where: str, cls: Callable[..., T], *values: Any) -> T:
 
 
 def curve_columns(
-    table: TextTable, required: Mapping[str, str] = Fixture.columns, noise: Mapping[str, str] = Fixture.noise
+    table: TextTable,
+    required: Mapping[str, str] = Fixture.columns,
+    noise: Mapping[str, str] = Fixture.noise,
+    phases: Mapping[str, str] = MappingProxyType({}),
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """The columns of a curve in SI, (N,) each, by name: ``required`` ones, time and ``noise``; a note on the others.
+    """The columns of a curve in SI, (N,) each, by name: ``required``, time, ``noise``, ``phases``; a note on the rest.
 
-    Both map names to quantities. Raises `DataError` if one is missing or holds what is no number, and for
+    They map names to quantities. Raises `DataError` if one is missing or holds what is no number, and for
     fewer than two points.
     """
     places = {name: table.require(name, quantity) for name, quantity in required.items()}
-    for name, quantity in (("time", TIME), *noise.items()):
+    for name, quantity in (("time", TIME), *noise.items(), *phases.items()):
         if (place := table.find(name, quantity)) is not None:
             places[name] = place
     if len(table.rows) < 2:
@@ -114,6 +130,29 @@ def curve_columns(
     ignored = [h for i, h in enumerate(table.header) if i not in used and h]
     notes = (f"ignored columns: {', '.join(ignored)}",) if ignored else ()
     return {name: table.column(*place) for name, place in places.items()}, notes
+
+
+def _said_motion(table: TextTable, found: Mapping[str, Array], rig: Fixture) -> Motion | None:
+    """The path with the legs and cycles that columns say, None if there are no such columns."""
+    leg, cycle = found.get("direction"), found.get("cycle")
+    if leg is None and cycle is None:
+        return None
+    for name, values, good in (
+        ("direction", leg, None if leg is None else np.abs(leg) == 1),
+        (
+            "cycle",
+            cycle,
+            None if cycle is None else (cycle >= 1) & (cycle == np.round(cycle)) & (np.diff(cycle, prepend=0) >= 0),
+        ),
+    ):
+        if values is not None and good is not None and not np.all(good):
+            k = int(np.argmin(good))
+            rule = "1 while loading and -1 while unloading" if name == "direction" else "1, 2, 3 in their order"
+            raise DataError(
+                f"{values[k]:g} is no {name}", f"{table.file}, line {table.lines[k]}, column {name}", f"write {rule}"
+            )
+    reach = float(np.max(found["deflection"]))
+    return Motion(found["deflection"], found.get("time"), reach, None, leg, cycle)
 
 
 def _check_size(deflection: Array, table: TextTable, rig: Fixture) -> None:

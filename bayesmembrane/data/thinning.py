@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.motion import HELD
+from bayesmembrane.data.motion import HELD, Motion
 
 MOST = 1500
 """Readings that a diagnosis takes, at most: its time and memory grow with them."""
@@ -24,20 +27,36 @@ def thinned(measurement: Measurement, most: int = MOST) -> Measurement:
     n = len(measurement)
     if n <= most:
         return measurement
-    must = _kept(measurement)
+    if measurement.across is not None:  # states, and no path
+        return measurement.select(_with_even(np.array([0, n - 1]), n, most))
+    return measurement.select(kept_rows(measurement.leg, measurement.holds, most))
+
+
+def shortened(measurement: Measurement, most: int) -> Measurement:
+    """`thinned`, and the film remembers no more than the readings that are left: for a first search."""
+    few = thinned(measurement, most)
+    if few is measurement:
+        return measurement
+    leg, cycle = (few.leg, few.cycle) if few.path.said else (None, None)
+    said = (None if v is None else v.astype(float) for v in (leg, cycle))
+    path = Motion(few.deflection, few.time, few.full_range, few.across, *said)
+    return replace(few, motion=path, places=np.arange(len(few)))
+
+
+def kept_rows(leg: NDArray[np.int8], holds: Sequence[NDArray[np.intp]], most: int) -> NDArray[np.intp]:
+    """At most ``most`` rows of N, evenly along the test: with both ends, the last reading of each ``leg`` (N,), and of
+    each hold both ends and enough readings to tell it.
+    """
+    turns = np.flatnonzero(np.diff(leg.astype(int)))
+    stills = [hold[_even(hold.size, 2 * HELD)] for hold in holds]
+    return _with_even(np.unique(np.concatenate([[0, leg.size - 1], turns, *stills]).astype(np.intp)), leg.size, most)
+
+
+def _with_even(must: NDArray[np.intp], n: int, most: int) -> NDArray[np.intp]:
+    """Rows that must be kept, and others evenly between them."""
     if must.size > most // 2:
         must = must[_even(must.size, most // 2)]
-    return measurement.select(np.union1d(must, _even(n, most - must.size)))
-
-
-def _kept(measurement: Measurement) -> NDArray[np.intp]:
-    """Both ends, the last reading of each leg, and of each hold both ends and enough readings to tell it."""
-    last = len(measurement) - 1
-    if measurement.across is not None:  # states, and no path
-        return np.array([0, last])
-    turns = np.flatnonzero(np.diff(measurement.leg.astype(int)))
-    stills = [hold[_even(hold.size, 2 * HELD)] for hold in measurement.holds]
-    return np.unique(np.concatenate([[0, last], turns, *stills]).astype(np.intp))
+    return np.union1d(must, _even(n, most - must.size))
 
 
 def _even(n: int, count: int) -> NDArray[np.intp]:

@@ -243,3 +243,35 @@ def test_a_long_measurement_is_thinned_and_it_is_said(run: Run, tmp_path: Path) 
     assert "of the 1900 readings were diagnosed" in answer["thinning"]
     assert answer["sentence"].endswith(answer["thinning"])
     assert "of the 1900 readings are diagnosed" in " ".join(err.split())
+
+
+def test_an_export_becomes_a_page_in_three_commands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    rows = "".join(f"{k},{k / 2},{0.1 * (1 + k / 50) ** 0.5 * k}\n" for k in range(30))
+    sizes = "Gauge length (mm),50\nWidth (mm),10\nThickness (mm),0.5\nTest speed (mm/min),60\n"
+    Path("e.csv").write_text(sizes + "Time (s),Extension (mm),Load (N)\n" + rows)
+
+    def run(*words: str) -> str:
+        monkeypatch.setattr(sys, "argv", ["bayesmembrane", *words])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        assert ended.value.code in (0, None)
+        return capsys.readouterr().out
+
+    monkeypatch.setattr(sys, "argv", ["bayesmembrane", "import", "e.csv", "--json"])
+    with pytest.raises(SystemExit):
+        main()
+    shown = capsys.readouterr()
+    said = json.loads(shown.out)
+    assert (said["curve"], said["importer"], said["n_points"], said["complete"]) == ("curve.csv", "delimited", 30, True)
+    assert {"what", "value", "why", "option"} == set(said["guesses"][0])
+    assert 'column of force: "Load (N)" in N, since its name says so (--columns force=... overrides)' in " ".join(
+        shown.err.split()
+    )
+    assert "CONTRADICTION: the stated speed of 60 mm/min" in " ".join(shown.err.split())
+    run("fit", "curve.csv", "--specimen", "curve.toml", "--material", "neo_hookean", "--out", "chains")
+    run("report", "chains", "--out", "page")
+    assert "the stated speed of 60 mm/min" in Path("curve.toml").read_text()
+    assert Path("page/index.html").is_file()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bayesmembrane.calibration.fit import fit
+from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
@@ -15,6 +16,7 @@ from bayesmembrane.ground.stored import answer, read, store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import Request, request, solve
 from bayesmembrane.physics.mechanics.solution import Curves
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.physics.predicting import predict
 
 FILMS = {
@@ -185,3 +187,36 @@ def test_where_there_is_no_fit_a_sentence_says_so(film) -> None:  # type: ignore
     assert np.isnan(found.rmse_N)
     assert "no yeoh film was found that reaches 50 mm with finite forces and slopes" in found.status
     assert all(e.sd is None for e in found.parameters.values())
+
+
+def test_valleys_looked_for_with_a_part_lead_to_the_optimum_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(3)
+    strip = Uniaxial(0.05, 0.01)
+    d = 0.05 * np.interp(np.linspace(0, 1, 1500), [0, 0.6, 1], [0, 1.2, 0.1])
+    stretch = 1 + d / 0.05
+    force = 150.0 * 0.01 * (stretch - stretch**-2) + 0.01 * rng.standard_normal(d.size)
+    m = Measurement(
+        d, force, strip, Specimen("strip", 5e-4), time=np.arange(d.size) * 0.1, force_sd=np.full(d.size, 0.01)
+    )
+    for loss in ("euclidean", "weighted"):
+        whole = fit(m, hypothesis("yeoh"), loss=loss)
+        monkeypatch.setattr("bayesmembrane.calibration.fit.MANY", 300)
+        part = fit(m, hypothesis("yeoh"), loss=loss)
+        monkeypatch.undo()
+        assert part.objective == pytest.approx(whole.objective, rel=1e-8)
+        assert part.deflection.size == d.size
+        for name, e in whole.parameters.items():
+            assert e.sd is not None
+            assert part.parameters[name].value == pytest.approx(e.value, abs=1e-2 * e.sd)
+
+
+def test_independent_noise_weighs_as_its_matrix_does() -> None:
+    """A standard deviation at each reading is the same claim as a diagonal covariance."""
+    d = np.linspace(0.001, 0.05, 12)
+    sd = np.linspace(0.01, 0.03, 12)
+    force = 1.5 * (1 + d / 0.05 - (1 + d / 0.05) ** -2) + sd * np.sin(7 * np.arange(12.0))
+    each = Measurement(d, force, Uniaxial(0.05, 0.01), Specimen("strip", 5e-4), force_sd=sd)
+    matrix = Measurement(d, force, Uniaxial(0.05, 0.01), Specimen("strip", 5e-4), covariance=np.diag(sd**2))
+    a, b = (fit(m, hypothesis("neo_hookean"), loss="weighted") for m in (each, matrix))
+    assert a.objective == pytest.approx(b.objective, rel=1e-10)
+    assert a.coordinates == pytest.approx(b.coordinates, rel=1e-8)

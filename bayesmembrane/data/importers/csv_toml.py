@@ -6,14 +6,28 @@ import re
 from dataclasses import replace
 from typing import ClassVar
 
+from bayesmembrane.data.exports.hints import Hints
 from bayesmembrane.data.fixture import Fixture, check_lifted
-from bayesmembrane.data.importers.base import Imported, Importer
+from bayesmembrane.data.importers.base import Imported, Importer, TableImporter
 from bayesmembrane.data.reading import curve_columns
 from bayesmembrane.data.tables import TextTable, decode, number, parse_table
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.units import split_header
 
-_NAMES = {*Fixture.columns, "time", "force_sd"}
+_TABLE_HINTS = (
+    "encoding",
+    "delimiter",
+    "decimal",
+    "columns",
+    "units",
+    "sheet",
+    "part",
+    "zero",
+    "sign",
+    "strain",
+    "stress",
+    "readings_per_s",
+)
 _BRACKETS = re.compile(r"(?P<name>[^\[\](),]+?)[\s_]*(?:\[(?P<a>[^\[\]]*)\]|\((?P<b>[^()]*)\))")
 
 
@@ -34,7 +48,16 @@ class CsvToml(Importer):
             return False
         lines = [x for x in _text(data).splitlines() if x.strip() and not x.lstrip().startswith("#")]
         header = re.split(r"[;\t,]", lines[0]) if lines else []
-        return any(split_header(_plain(h.strip(' "')))[0].lower() in _NAMES for h in header)
+        names = {split_header(_plain(h.strip(' "')))[0].lower() for h in header}
+        return set(Fixture.columns) <= names
+
+    @classmethod
+    def read_with(cls, data: bytes, file: str, hints: Hints) -> Imported:
+        """As `read`; where more is said than film and rig, as any table is read."""
+        said = (getattr(hints, name) for name in _TABLE_HINTS)
+        if any(said) or hints.rig not in ("", "annulus"):
+            return TableImporter.read_with(data, file, hints)
+        return super().read_with(data, file, hints)
 
     @staticmethod
     def read(data: bytes, file: str) -> Imported:

@@ -8,13 +8,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bayesmembrane.data.importers.base import Importer, import_export
+from bayesmembrane.data.importers.base import Importer, import_export, read_export, recognising
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.registry import component, components
 
 IMPORTERS: dict[str, type[Importer]] = components("importers")
 SPECIMEN = "[specimen]\nthickness_um = 50\n[rig]\nkind = 'annulus'\ninner_radius_mm = 10\nouter_radius_mm = 35\n"
+STRIP = "[specimen]\nthickness_um = 500\n[rig]\nkind = 'uniaxial'\nlength_mm = 50\nwidth_mm = 10\n"
 every = pytest.mark.parametrize("importer", IMPORTERS.values(), ids=IMPORTERS)
 
 
@@ -30,29 +31,40 @@ def test_it_is_documented(importer: type[Importer]) -> None:
 def test_it_reads_its_example(importer: type[Importer]) -> None:
     assert importer.recognises(importer.example)
     found = importer.read(importer.example, "export")
-    n = len(found.columns["force"])
+    curves = [{"deflection", "force"}, {"stretch", "nominal_stress"}]
+    need = next(c for c in curves if c <= set(found.columns))
+    n = len(found.columns[min(need)])
     assert n >= 2
-    assert {"deflection", "force"} <= set(found.columns) <= {"deflection", "force", "time", "force_sd"}
+    assert set(found.columns) - need <= {"time", "force_sd", "cycle", "direction"}
     assert all(np.shape(v) == (n,) and np.all(np.isfinite(v)) for v in found.columns.values())
     assert "export" in found.origin
+    assert all(g.what and g.value and g.why for g in found.guesses)
 
 
 @every
 def test_only_it_recognises_its_example(importer: type[Importer]) -> None:
     """The first one that recognises a file reads it: layouts must not be taken for each other."""
     assert [i for i in IMPORTERS.values() if i.recognises(importer.example)] == [importer]
+    assert recognising(importer.example) is importer
 
 
 @every
 def test_what_it_imports_is_a_measurement(importer: type[Importer], tmp_path: Path) -> None:
     (tmp_path / "export").write_bytes(importer.example)
-    written = import_export(tmp_path / "export", tmp_path / "curve.csv")
-    assert written.importer == importer.name
-    written.specimen.write_text(SPECIMEN + written.specimen.read_text())
-    m = read_measurement(written.curve, written.specimen)
     columns = importer.read(importer.example, "export").columns
-    assert m.deflection == pytest.approx(columns["deflection"], rel=1e-12)
-    assert m.force == pytest.approx(columns["force"], rel=1e-12)
+    strip = "stretch" in columns
+    (tmp_path / "film.toml").write_text(STRIP if strip else SPECIMEN)
+    written = import_export(tmp_path / "export", tmp_path / "curve.csv", specimen=tmp_path / "film.toml")
+    assert written.importer == importer.name
+    assert written.complete
+    m = read_measurement(written.curve, written.specimen)
+    if strip:
+        assert 1 + m.deflection / m.rig.lengths["length"] == pytest.approx(columns["stretch"], rel=1e-12)
+    else:
+        assert m.deflection == pytest.approx(columns["deflection"], rel=1e-12)
+        assert m.force == pytest.approx(columns["force"], rel=1e-12)
+    again = read_export(tmp_path / "export", specimen=tmp_path / "film.toml")
+    assert again.data_hash == m.data_hash
 
 
 @every

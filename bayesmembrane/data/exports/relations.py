@@ -1,0 +1,104 @@
+"""Columns and lines of a preamble that say the same thing twice, and the rows in which they do not agree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bayesmembrane.data.motion import legs
+from bayesmembrane.ground.parameters import Array
+
+APART = 0.02
+"""Two columns contradict each other where they differ by more than this part of the larger one's range."""
+SPEED_APART = 0.10
+JUMP, STEPS = 0.02, 5.0
+"""A reading that leaves its neighbours by this part of the range, and so many times the usual step, and comes back."""
+REGULAR, SKIPS = 0.01, 5
+"""Times whose steps differ by no more than this part are regular, and so few steps of twice the size are gaps."""
+
+
+def apart(what: str, said: Array, other: Array, lines: Sequence[int], tolerance: float = APART) -> str:
+    """A sentence on the rows in which ``said`` (N,) and ``other`` (N,) differ; "" if they agree.
+
+    ``what`` names both, "A and B".
+    """
+    reach = max(float(np.ptp(said)), float(np.ptp(other)), 1e-300)
+    difference = np.abs(said - other)
+    bad = np.flatnonzero(~(difference <= tolerance * reach))
+    if bad.size == 0:
+        return ""
+    worst = int(bad[np.argmax(difference[bad])])
+    where = f"line {lines[bad[0]]}" if bad.size == 1 else f"lines {lines[bad[0]]} to {lines[bad[-1]]}"
+    return (
+        f"{what} contradict each other in {bad.size} of {said.size} rows ({where}; "
+        f"most in line {lines[worst]}: {said[worst]:.4g} against {other[worst]:.4g})"
+    )
+
+
+def gauge_length_behind(travel: Array, strain: Array) -> tuple[float, float]:
+    """(L, scatter): the length in m for which strain = travel / L, and the part of the range by which it fails."""
+    t, e = travel - travel[0], strain - strain[0]
+    if not np.any(e) or not np.any(t):
+        return np.nan, np.inf
+    length = float(np.dot(t, t) / np.dot(t, e)) if np.dot(t, e) > 0 else np.nan
+    return length, float(np.max(np.abs(t / length - e)) / np.ptp(e)) if np.isfinite(length) else np.inf
+
+
+def logarithmic_length_behind(travel: Array, strain: Array) -> tuple[float, float]:
+    """The same for strain = ln(1 + travel / L), by the end of the largest strain."""
+    t, e = travel - travel[0], strain - strain[0]
+    k = int(np.argmax(np.abs(e)))
+    if not abs(e[k]) > 0 or abs(e[k]) > 5:
+        return np.nan, np.inf
+    length = float(t[k] / np.expm1(e[k]))
+    if not (np.isfinite(length) and length > 0) or np.any(t <= -length):
+        return np.nan, np.inf
+    return length, float(np.max(np.abs(np.log1p(t / length) - e)) / np.ptp(e))
+
+
+def speed_against(travel: Array, time: Array, speed: float, lines: Sequence[int]) -> str:
+    """A sentence if the travel (N,) m of the first way does not go on with ``speed`` (m/s), "" if it does."""
+    first = int(np.argmax(np.append(legs(travel - travel[0]) < 0, True)))
+    if first < 5:
+        return ""
+    t, x = time[:first] - time[0], np.abs(travel[:first] - travel[0])
+    return apart(
+        f"the stated speed of {6e4 * speed:.4g} mm/min times the time and the travel (mm)",
+        1e3 * speed * t,
+        1e3 * x,
+        lines[:first],
+        SPEED_APART,
+    )
+
+
+def jumps(what: str, values: Array, lines: Sequence[int]) -> str:
+    """A sentence on readings that leave their neighbours and come back at once; "" if there are none."""
+    if values.size < 20:
+        return ""
+    step = np.abs(np.diff(values))
+    reach = float(np.ptp(np.sort(values)[1:-1]))
+    least = max(STEPS * float(np.quantile(step, 0.9)), JUMP * reach)
+    inner = (np.minimum(step[:-1], step[1:]) > least) & (
+        np.abs(values[2:] - values[:-2]) < 0.5 * np.minimum(step[:-1], step[1:])
+    )
+    bad = np.flatnonzero(np.concatenate([[step[0] > least], inner, [step[-1] > least]]))
+    if bad.size == 0:
+        return ""
+    named = ", ".join(f"{lines[k]}" for k in bad[:5]) + (" and more" if bad.size > 5 else "")
+    return (
+        f"the {what} leaves its neighbours and comes back at once in line {named}: damaged, or an event of the machine"
+    )
+
+
+def gaps(time: Array, lines: Sequence[int]) -> str:
+    """A sentence on times that go on in equal steps and skip one here and there; "" if they do not."""
+    step = np.diff(time)
+    if step.size < 20:
+        return ""
+    low, usual, high = np.quantile(step, (0.1, 0.5, 0.9)).tolist()
+    wide = np.flatnonzero(step > 1.9 * usual)
+    if high - low > REGULAR * usual or not 0 < wide.size <= SKIPS:
+        return ""
+    named = ", ".join(f"{lines[k]}" for k in wide.tolist())
+    return f"the times go on in steps of {usual:.4g} s and skip more after line {named}: lines may be missing"

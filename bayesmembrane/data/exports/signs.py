@@ -1,0 +1,97 @@
+"""Travel and force as a film feels them: their signs, and where they are zero."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayesmembrane.data.exports.columns import Read
+from bayesmembrane.data.exports.export import Export
+from bayesmembrane.ground.errors import DataError
+from bayesmembrane.ground.parameters import Array
+
+RESTS = 0.02
+"""A force below this part of the largest counts as none: the film is at rest there."""
+AWAY = 0.02, 0.2
+"""By these parts of its range, back or ahead, a first travel may lie off the second; more is no start of a test."""
+NEAR = 0.05
+"""A travel that starts within this part of its range starts near zero."""
+
+
+def signed(export: Export, x: Array, f: Array, free: bool) -> tuple[Array, Array]:
+    """Travel and force so that both are positive where the film is pulled; ``free``: a push is a pull from below."""
+    said = export.hints.sign
+    flips = {"keep": (1, 1), "flip": (-1, -1), "flip-force": (1, -1), "flip-travel": (-1, 1)}
+    if said:
+        export.guess("sign", said, "it was said", "--sign")
+        return flips[said][0] * x, flips[said][1] * f
+    at = int(np.argmax(np.abs(f)))
+    back, pushed = bool(x[at] < x[0]), bool(f[at] < 0)
+    if not back and not pushed:
+        return x, f
+    if not free:
+        if back != pushed:
+            which = (
+                "force is negative and the travel goes on" if pushed else "travel goes back and the force is positive"
+            )
+            fault = f"where most is carried the {which}"
+            raise DataError(fault, export.block.place, "say --sign flip-force or flip-travel (pulled), or flip or keep")
+        export.guess("sign", "kept", "travel and force are negative, as in compression", "--sign")
+        return x, f
+    words = {(True, True): "travel and force are", (True, False): "the travel is", (False, True): "the force is"}
+    why = f"{words[back, pushed]} negative where most is carried, and a lifted disc has both positive"
+    turned = "both" if back and pushed else "travel" if back else "force"
+    export.guess("sign", f"{turned} turned round", why, "--sign")
+    return (-x if back else x), (-f if pushed else f)
+
+
+def zeroed(export: Export, travel: Read, x: Array, f: Array) -> Array:
+    """The travel from where the film was at rest."""
+    said, start, reach = export.hints.zero, float(x[0]), float(np.ptp(x))
+    if said and "travel" not in said:
+        export.guess("zero of the travel", "as the file has it", "it was said", "--zero")
+        return x
+    if said:
+        export.guess("zero of the travel", f"{1e3 * start:.6g} mm", "it was said: where it starts", "--zero")
+        return x - start
+    if abs(start) <= NEAR * reach:
+        if start:
+            where = f"as the file has it, it starts at {1e3 * start:.4g} mm"
+            export.guess("zero of the travel", where, "that is near zero", "--zero")
+        return x
+    absolute = any(c.reading.absolute for c in export.found if c.column.at == travel.column.at)
+    rests = abs(float(f[0])) <= RESTS * float(np.max(np.abs(f)))
+    ahead = float(np.sign(x[int(np.argmax(np.abs(f)))] - x[1]) * (x[1] - x[0]))
+    if x.size >= 10 and not -AWAY[0] * reach <= ahead <= AWAY[1] * reach:
+        fault = f"the travel starts at {1e3 * start:.4g} mm and goes on at {1e3 * x[1]:.4g} mm"
+        raise DataError(fault, export.block.sheet.place(export.rows[0]), "correct the first line, or say --zero none")
+    if absolute or rests or abs(start) > reach:
+        why = (
+            "its name says that it is a position"
+            if absolute
+            else "the film carries nothing there"
+            if rests
+            else "it starts farther from zero than it goes"
+        )
+        export.guess("zero of the travel", f"{1e3 * start:.6g} mm, where it starts", why, "--zero")
+        return x - start
+    share = 100 * abs(f[0]) / np.max(np.abs(f))
+    fault = f"the travel starts at {1e3 * start:.4g} mm under {share:.3g} % of the largest load"
+    raise DataError(
+        fault,
+        export.block.sheet.place(export.rows[0]),
+        "say --zero none if it counts from rest, --zero travel if it starts there",
+    )
+
+
+def zeroed_force(export: Export, f: Array) -> Array:
+    """The force as the file has it, or from its start if that was said."""
+    said, start = export.hints.zero, float(f[0])
+    if "force" in said:
+        export.guess("zero of the force", f"{start:.4g} N", "it was said: where it starts", "--zero")
+        return f - start
+    if abs(start) > 0.01 * float(np.max(np.abs(f))):
+        share = f"{100 * abs(start) / float(np.max(np.abs(f))):.2g} % of the largest"
+        export.guess(
+            "zero of the force", "as the file has it", f"its start at {share} may be a preload", "--zero force"
+        )
+    return f

@@ -1,0 +1,189 @@
+# ruff: noqa: E501 - a line for each file
+"""What an export leaves open is refused with its place and the option that settles it, or said; nothing is invented."""
+
+import numpy as np
+import pytest
+
+from bayesmembrane.ground.errors import BayesmembraneError
+from tests.data.exports.test_layouts import FORCE, LENGTH, STRESS, STRETCH, TIME, TRAVEL, imported, lines
+
+MM = 1e3 * TRAVEL
+STRIP = {"rig": "uniaxial", "gauge_length": 0.05, "width": 0.01, "thickness": 5e-4}
+
+
+def refusal(text: str | bytes, **said: object) -> str:
+    data = text if isinstance(text, bytes) else text.encode()
+    with pytest.raises(BayesmembraneError) as caught:
+        imported(data, **said)
+    return str(caught.value)
+
+
+def damaged(text: str, line: int, cell: int, value: str, sep: str = ",") -> str:
+    rows = text.split("\n")
+    cells = rows[line - 1].split(sep)
+    cells[cell] = value
+    rows[line - 1] = sep.join(cells)
+    return "\n".join(rows)
+
+
+PLAIN = lines("Time (s),Extension (mm),Load (N)", TIME, MM, FORCE)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (lines((), TIME, MM, FORCE), ["line 1", "names them", "--columns time_s,travel_mm,force_N"]),
+        (lines("A,B,C", TIME, MM, FORCE), ["line 1", "no column is known to hold travel and force", "A, B, C"]),
+        (lines("Time (s),Extension (mm)", TIME, MM), ["line 1", "the force or stress", "--columns"]),
+        (lines("Time (s),Load (N)", TIME, FORCE), ["line 1", "how far the film was pulled", "--columns"]),
+        (lines("Time (s),Extension,Load (N)", TIME, MM, FORCE), ['"Extension" names no unit', "--units travel=mm"]),
+        (lines("Extension (furlong),Load (N)", MM, FORCE), ['"furlong" is none of it', "--units travel=mm"]),
+        (lines("Load 1 (N),Load 2 (N),Weg (mm)", FORCE, 2 * FORCE, MM), ["may each be the force", '--columns "force=Load 1']),
+        (lines("Strain,Stress (MPa)", 0.4 * TIME, STRESS / 1e6), ['"Strain" names no unit', "--units strain=percent"]),
+        (lines("Strain (mm/mm),Stress (MPa)", STRETCH, STRESS / 1e6), ["starts at 1", "--strain stretch"]),
+        (lines("Stretch,Stress (MPa)", STRETCH - 1, STRESS / 1e6), ["called a stretch and starts at 0", "strain=Stretch"]),
+        (lines("Strain (%),Load (N)", 100 * (STRETCH - 1), FORCE), ["nominal stress", "--width-mm and --thickness-um"]),
+        (lines("Weg;Kraft", MM + 1, FORCE + 1, sep=";", form="%.3f"), ["may have decimals or thousands", "--decimal point"]),
+        (damaged(PLAIN, 9, 2, "0.2x31"), ["line 9", "Load (N)", '"0.2x31" is not a number']),
+        (damaged(PLAIN, 9, 1, ""), ["line 9", "Extension (mm)", "the cell is empty"]),
+        (damaged(PLAIN, 9, 1, "NaN"), ["line 9", "Extension (mm)", '"NaN" is not a measured value']),
+        (damaged(PLAIN, 9, 0, "1.5"), ["line 9", "the time falls", "--readings-per-s"]),
+        (PLAIN.replace("\n3.5000000,", "\nstopped by the operator\n3.5000000,"), ["line 9", "stands within the numbers"]),
+        (b"PK\x03\x04" + 100 * b"a", ["the workbook cannot be opened"]),
+        ("hello, world\n", ["no two lines"]),
+        (lines("Weg (mm),Kraft (N)", MM, 0 * FORCE + 1), ["the force is the same in all rows", "--columns"]),
+        (lines("Travel (mm),Load (N)", MM + 0.5 * np.ptp(MM), FORCE + 0.4), ["starts at 10 mm", "--zero none", "--zero travel"]),
+    ],
+)  # fmt: skip
+def test_a_file_that_leaves_something_open_is_refused(text: str | bytes, said: list[str]) -> None:
+    message = refusal(text)
+    assert "export" in message
+    assert [s for s in said if s not in message] == []
+
+
+def test_without_times_a_curve_must_be_in_order() -> None:
+    noisy = MM + 0.5 * np.sin(40 * np.arange(MM.size))
+    text = lines("Extension (mm),Load (N)", noisy, FORCE)
+    assert "--readings-per-s 10" in refusal(text)
+    found = imported(text.encode(), readings_per_s=2.0)
+    assert found.columns["time"] == pytest.approx(TIME)
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ({"columns": "time_s,travel_mm,force_N,force_N"}, "names 4 columns, and the file has 3"),
+        ({"columns": "time_s,banana_mm,force_N"}, '"banana" in --columns is no kind of column'),
+        ({"columns": "force=Weg"}, '"Weg" in --columns is none of its columns'),
+        ({"units": "mm"}, '"mm" in --units is no pair'),
+        ({"units": "travel=furlong"}, "names no unit of length"),
+        ({"decimal": "dot"}, '--decimal cannot be "dot"; choose point, comma'),
+        ({"zero": "yes"}, "choose none, travel, force"),
+        ({"encoding": "klingon"}, 'there is no encoding "klingon"'),
+        ({"sheet": "Values"}, 'there is no sheet "Values"'),
+        ({"rig": "uniaxial"}, "the gauge length is not known; say --gauge-length-mm"),
+        ({"rig": "trampoline"}, 'there is no rig called "trampoline"'),
+        ({"width": -1.0}, "width must be positive"),
+    ],
+)
+def test_wrong_options_say_what_there_is(said: dict[str, object], message: str) -> None:
+    assert message in refusal(PLAIN, **said)
+
+
+def test_several_specimens_are_listed_and_chosen() -> None:
+    second = lines(("Sample B", "Time (s),Extension (mm),Load (N)"), TIME, MM, 2 * FORCE)
+    text = "Sample A\n" + PLAIN + second
+    message = refusal(text)
+    assert "2 sets of readings (1: Sample A, 2: Sample B)" in message
+    assert "--part 1" in message
+    for part, times in (("1", 1), ("Sample B", 2)):
+        assert imported(text.encode(), part=part).columns["force"] == pytest.approx(times * FORCE, abs=1e-6)
+
+
+def test_specimens_beside_each_other() -> None:
+    heads = ("1 _ 1,,,1 _ 2,,", "Time,Force,Stroke,Time,Force,Stroke", "sec,N,mm,sec,N,mm")
+    text = lines(heads, TIME, FORCE, MM, TIME, 2 * FORCE, MM)
+    rows = text.strip().split("\n")
+    rows[-3:] = [",".join([*r.split(",")[:3], "", "", ""]) for r in rows[-3:]]  # the second was shorter
+    text = "\n".join(rows)
+    assert "1: 1 _ 1, 2: 1 _ 2" in refusal(text)
+    assert len(imported(text.encode(), part="1").columns["force"]) == TIME.size
+    assert imported(text.encode(), part="1 _ 2").columns["force"] == pytest.approx(2 * FORCE[:-3], abs=1e-6)
+
+
+# ---- what a file says twice ------------------------------------------------------------------------------------------
+
+
+def contradictions(text: str, **said: object) -> str:
+    return " ".join(imported(text.encode(), **said).contradictions)
+
+
+def test_strain_against_travel_is_reported_with_its_rows() -> None:
+    strain = 100 * (STRETCH - 1)
+    strain[10:14] *= 1.2
+    text = lines("Extension (mm),Strain (%),Stress (MPa)", MM, strain, STRESS / 1e6)
+    found = contradictions(text, gauge_length=LENGTH)
+    assert "contradict each other in 4 of 25 rows (lines 12 to 15" in found
+
+
+def test_true_against_engineering_stress() -> None:
+    text = lines("Strain (%),Stress (MPa),True stress (MPa)", 100 * (STRETCH - 1), STRESS / 1e6, STRESS / 1e6)
+    assert "true stress and engineering stress times stretch contradict" in contradictions(text)
+    text = lines("Strain (%),Stress (MPa),True stress (MPa)", 100 * (STRETCH - 1), STRESS / 1e6, STRESS * STRETCH / 1e6)
+    assert contradictions(text) == ""
+
+
+@pytest.mark.parametrize(("speed", "agrees"), [(50.0, True), (60.0, False)])
+def test_speed_times_time_against_displacement(speed: float, agrees: bool) -> None:
+    x = np.linspace(0, 10, 25)  # mm in 12 s
+    text = lines("Time (s),Extension (mm),Load (N)", TIME, x, FORCE, before=f"Test speed (mm/min),{speed}\n")
+    assert ("times the time and the travel" not in contradictions(text)) == agrees
+
+
+def test_stress_against_force_over_area() -> None:
+    text = lines("Strain (%),Force (N),Stress (MPa)", 100 * (STRETCH - 1), FORCE, STRESS / 2e6)
+    assert "stress and force over width and thickness" in contradictions(text, width=0.01, thickness=5e-4)
+
+
+def test_area_against_width_and_thickness() -> None:
+    text = lines("Extension (mm),Load (N)", MM, FORCE, before="Cross-section (mm2),6\nGauge length (mm),50\n")
+    assert "5 mm2" in contradictions(text, width=0.01, thickness=5e-4)
+
+
+def test_two_thicknesses_count_as_none() -> None:
+    text = lines("Extension (mm),Load (N)", MM, FORCE, before="Thickness (mm),0.5\nThickness (mm),0.6\n")
+    found = imported(text.encode())
+    assert found.film.thickness is None
+    assert "neither is used, say --thickness-um" in found.contradictions[0]
+
+
+def test_a_reading_that_jumps_is_reported() -> None:
+    text = damaged(PLAIN, 12, 2, "40.0")
+    assert "the force leaves its neighbours and comes back at once in line 12" in contradictions(text)
+
+
+# ---- every guess -----------------------------------------------------------------------------------------------------
+
+
+def test_every_guess_is_said() -> None:
+    found = imported(lines("Position (mm);Strain (%);Force (N)", MM - 40, 2 * MM, FORCE, sep=";").encode(), **STRIP)
+    said = {g.what: g for g in found.guesses}
+    assert {
+        "encoding",
+        "delimiter",
+        "decimal sign",
+        "column of travel",
+        "column of force",
+        "zero of the travel",
+    } <= set(said)
+    assert all(g.why and g.value for g in found.guesses)
+    assert {g.option.split()[0] for g in found.guesses} <= {
+        "--encoding",
+        "--delimiter",
+        "--decimal",
+        "--columns",
+        "--zero",
+        "--rig",
+        "--strain",
+        "--stress",
+    }
