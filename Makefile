@@ -15,7 +15,7 @@ export MPLBACKEND ?= Agg
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
 	@echo "make test     style, types, floors and tests"
-	@echo "make bench    the table of solver times"
+	@echo "make bench    the table of solver times, and of what a curve costs in use"
 	@echo "make study    statistical studies, minutes to hours"
 	@echo "make study-loop  diagnosis of synthetic faults, an hour or two; goes on where it was; LOOP='--limit 130' asks for less"
 	@echo "make study-cycles  real cyclic tests with each energy declared and with none, an hour or so; goes on where it was; CYCLES='--declare none' asks for less"
@@ -59,6 +59,7 @@ lint: $(STAMP)
 
 bench: $(STAMP)
 	$(PY) -m tests.benchmarks.bench
+	$(PY) -m tests.benchmarks.in_use
 
 study: $(STAMP)
 	$(PY) -m pytest -n $(PYTEST_WORKERS) -m study

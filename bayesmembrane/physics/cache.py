@@ -91,7 +91,7 @@ class CachedSolver:
             self.tally.bypassed += gd.size
             return api.solve(asked)
         begun = time.perf_counter()
-        asked = replace(asked, spare=Spared.NONE, exact_up_to=np.inf)  # what is kept serves everybody
+        asked = replace(asked, spare=Spared.NONE, read=None)  # what is kept serves everybody
         keys = _keys(asked, gd)
         entries = {key: self._find(key) for key in dict.fromkeys(keys)}
         missing = [key for key, entry in entries.items() if entry is None]

@@ -241,9 +241,9 @@ class Forward:
         spare: Spared = Spared.NONE,
     ) -> Curves:
         """Curves of ``films`` (B, n) without effects at ``deflection`` (N,) m on the rig of the measurement."""
-        # What lies beyond is solved to see whether the film stays convex there.
-        exact = np.inf if spare is Spared.NONE else float(np.max(self.deflection))
-        return self.rig.curves(self._films(films, sensitivities, solver, spare), self.measurement, deflection, exact)
+        # What is added to the measured points is solved to see whether the film stays convex there.
+        read = None if spare is Spared.NONE else self.deflection.size
+        return self.rig.curves(self._films(films, sensitivities, solver, spare), self.measurement, deflection, read)
 
     def jacobian(self, x: Array) -> Array:
         """d films / d coordinates, (B, n, k), by central differences of fourth order: exact to 1e-12 or so."""

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import poisson
 
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.materials.base import Material
-from bayesmembrane.physics.materials.yeoh import Yeoh
 from bayesmembrane.physics.mechanics import Request, Status, fallback
 from bayesmembrane.physics.mechanics.ritz import kernels as ritz_kernels
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
@@ -26,6 +26,12 @@ AT = np.concatenate([[0.05 * MM, 0.5 * MM, 2 * MM], FIFTEEN, [100 * MM]])
 RTOL, STEADY = 1e-12, 1e-8  # of the reference: its tolerance, and the change of R P1 sin(theta) that it may have
 FINEST = len(ritz.LEVELS) - 1
 MOST_FINEST = 100  # films of a material that are followed with the finest basis: it takes a second for each
+# Wide draws: rigs, and for half of the films a pre-stretch of 1 plus an exponential of this mean; deflections in R2.
+RATIOS, STRETCHED, REACH = (1.1, 1.5, 3.5, 10.0), 0.05, (0.2, 2.5)
+# Energies or slopes that differ by this are those of two states: of a film that can buckle shooting finds branches with
+# more energy, or with less that no path leads to. So few of the forces may be such.
+OTHER, OTHER_SLOPE, MOST_OTHER = 1e-3, 0.1, 0.01
+MOST_SHOT = 1e-3  # share of the films that Ritz may leave to shooting
 NO_STATE = (Status.NOT_ELLIPTIC, Status.INDEFINITE)
 FLAGGED = (Status.UNRESOLVED, Status.ITERATION_LIMIT)
 REPORT = Path(__file__).parents[2] / "docs" / "studies" / "solver_accuracy.md"
@@ -89,7 +95,7 @@ def finest(question: Request, films: NDArray[np.intp]) -> Array:
     """Forces (K, N) of ``films`` with the finest basis alone, followed from the flat film; nan where it is lost."""
     part = asked(question.material, question.parameters[films], AT)
     result, _ = ritz.follow(part, part.scaled, FINEST)
-    solved = np.isin(result[:, ritz_kernels.STATUS], (Status.OK, Status.UNRESOLVED))
+    solved = result[:, ritz_kernels.STATUS] == Status.OK
     return np.where(solved, 2 * np.pi * INNER * result[:, ritz_kernels.FORCE], np.nan)
 
 
@@ -119,6 +125,43 @@ def examine(material: type[Material]) -> Line:
     )
 
 
+@dataclass(frozen=True)
+class Wide:
+    """What Ritz alone finds for films on many rigs, with and without pre-stretch; counts of films and of forces."""
+
+    name: str
+    films: int
+    left: int
+    tally: dict[str, int]
+    checked: int
+    other: int
+    off: int
+    worst: float
+
+
+def wide(material: type[Material]) -> Wide:
+    """`DRAWS` films, evenly over `RATIOS`; every force is compared that is `ok` for both solvers, of the same state."""
+    tally: dict[str, int] = {}
+    each, left, other, errors = DRAWS // len(RATIOS), 0, 0, []
+    for ratio in RATIOS:
+        rng = np.random.default_rng([SEED, round(10 * ratio)])
+        l0 = np.where(rng.random(each) < 0.5, 1.0, 1.0 + rng.exponential(STRETCHED, each))
+        end = rng.uniform(*REACH, each) * ratio * INNER
+        p = prior_draws(material, each, SEED + round(10 * ratio))
+        question = asked(material, p, end[:, None] * np.linspace(1 / 15, 1, 15), l0, ratio)
+        curves, tight = ritz.solve(question), shooting.solve(question, rtol=RTOL)
+        left += int(np.sum(np.any(np.isin(curves.status, FLAGGED), axis=1)))
+        for label, count in curves.tally().items():
+            tally[label] = tally.get(label, 0) + count
+        both = curves.ok & tight.ok & (tight.variation < STEADY)
+        same = both & (np.abs(curves.energy / tight.energy - 1) < OTHER)
+        same &= np.abs(curves.slope - tight.slope) < OTHER_SLOPE * np.abs(tight.slope)
+        other += int(np.sum(both & ~same))
+        errors.append(np.abs(curves.force / tight.force - 1)[same])
+    error = np.concatenate(errors)
+    return Wide(material.name, DRAWS, left, tally, error.size, other, int(np.sum(error > EXACT)), float(error.max()))
+
+
 def _off(question: Request, curves: Curves, tight: Curves, error: Array) -> list[Off]:
     films = np.flatnonzero(np.any(error > EXACT, axis=1))
     if not films.size:
@@ -142,7 +185,28 @@ def _table(rows: Sequence[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(cells) + " |" for cells in [rows[0], ["---"] * len(rows[0]), *rows[1:]])
 
 
-def report(lines: Sequence[Line]) -> str:
+def _wide_table(rows: Sequence[Wide]) -> str:
+    head = ["material", "films", "left to shooting", *(s.label for s in Status)]
+    head += ["checked", "another state", "off by > 1e-6", "largest error"]
+    return _table(
+        [head]
+        + [
+            [
+                row.name,
+                str(row.films),
+                f"{row.left} ({100 * row.left / row.films:.2f} %)",
+                *(str(row.tally.get(s.label, 0)) for s in Status),
+                str(row.checked),
+                str(row.other),
+                str(row.off),
+                f"{row.worst:.1e}",
+            ]
+            for row in rows
+        ]
+    )
+
+
+def report(lines: Sequence[Line], rows: Sequence[Wide]) -> str:
     labels = [s.label for s in Status if s not in NO_STATE]
     became = [["material", "draws from the prior", *labels, "flagged draws", "convex draws", "of them flagged"]]
     became += [
@@ -193,6 +257,17 @@ R P1 sin(theta) changes by less than {STEADY:g} over the film, or, where that fi
 
 {_table(errors)}
 {listed}
+## Other rigs, pre-stretch and larger deflections, by Ritz alone
+
+{DRAWS} draws per material from the same priors, none left out: R2/R1 = {", ".join(f"{r:g}" for r in RATIOS)} in equal
+parts; half of the films with a pre-stretch of 1 plus an exponential of mean {STRETCHED:g}; 15 even deflections up to
+an end between {REACH[0]:g} and {REACH[1]:g} R2. A film is left to shooting if one of its forces is `unresolved` or at
+the `iteration limit`. Errors as above, against shooting at a relative tolerance of {RTOL:g}; where the energies of
+the two solvers differ by more than {OTHER:g}, or the slopes by more than {OTHER_SLOPE:g}, they have found different
+states, which are counted.
+
+{_wide_table(rows)}
+
 Made by `python -m pytest -m study tests/statistics/test_solver_accuracy.py`.
 """
 
@@ -200,10 +275,16 @@ Made by `python -m pytest -m study tests/statistics/test_solver_accuracy.py`.
 @pytest.mark.study
 def test_forces_that_are_ok_are_exact_and_hardly_any_is_flagged() -> None:
     lines = [examine(material) for material in materials().values()]
+    rows = [wide(material) for material in materials().values()]
     REPORT.parent.mkdir(exist_ok=True)
-    REPORT.write_text(report(lines))
+    REPORT.write_text(report(lines, rows))
     for line in lines:
         assert not line.off, line.off[:3]
         assert line.tally.get(Status.ITERATION_LIMIT.label, 0) == 0, line
-        assert line.flagged <= (0.05 if line.name == Yeoh.name else 0.005), line
+        assert line.flagged <= 0.005, line
         assert line.unchecked <= 1e-3 * DRAWS * AT.size, line
+    for row in rows:
+        assert row.off == 0, row
+        assert row.other <= MOST_OTHER * DRAWS * 15, row
+        # A Poisson count of this mean stays below its bound but once in 1e6.
+        assert row.left <= poisson.isf(1e-6, MOST_SHOT * DRAWS), row

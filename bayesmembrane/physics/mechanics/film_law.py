@@ -133,7 +133,8 @@ def film_law(asked: Request, end: Array, solver: Solve = solve) -> tuple[FilmLaw
         some = asked.of(rows)
         at, l0 = knots(gap, end[rows], count), some.prestretch
         every = np.hstack([at, some.deflection]) if shown is None else at
-        curves = solver(replace(some, deflection=every))
+        # Of what was asked for, beside the knots, no force is read.
+        curves = solver(replace(some, deflection=every, read=None if some.read is None else count))
         shown = curves if shown is None else shown
         force, slope = curves.force[:, :count], curves.slope[:, :count]
         part = _tested(law(gap, l0, at, force, slope, curves.status[:, :count]))

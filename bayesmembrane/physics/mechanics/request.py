@@ -37,7 +37,8 @@ class Request:
     inner_radius, outer_radius : radii of the disc and of the ring as clamped, m
     sensitivities : whether dF/d(parameters) is wanted too
     spare : the flags of such films need not be final
-    exact_up_to : m; beyond it only the stability of films matters, and forces may be good to 1e-3
+    read : of so many deflections, the first ones, the forces are read (None: all); the others show whether films stay
+        stable and convex there, and their forces may be good to 1e-3
     solver : "ritz" (batched, exact derivatives; films that it cannot resolve are shot), "ritz_alone" or "shooting"
     """
 
@@ -49,7 +50,7 @@ class Request:
     outer_radius: float
     sensitivities: bool = False
     spare: Spared = Spared.NONE
-    exact_up_to: float = np.inf
+    read: int | None = None
     solver: str = "ritz"
 
     @property

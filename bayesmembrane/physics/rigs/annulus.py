@@ -76,7 +76,7 @@ class Annulus(Rig):
             self.outer_radius,
             sensitivities=films.sensitivities,
             spare=films.spare,
-            exact_up_to=np.inf if films.spare is Spared.NONE else float(np.max(end)),
+            read=None if films.spare is Spared.NONE else 0,
         )
         law, curves = film_law(asked, np.broadcast_to(end, (count,)), films.solve)
         indefinite, bent = (curves.status == s for s in (Status.INDEFINITE, Status.NOT_ELLIPTIC))
@@ -85,10 +85,10 @@ class Annulus(Rig):
         )
         return law, (convexity, ellipticity)
 
-    def curves(self, films: Films, measurement: Measurement, deflection: Array, exact_up_to: float = np.inf) -> Curves:
+    def curves(self, films: Films, measurement: Measurement, deflection: Array, read: int | None = None) -> Curves:
         asked = request(films.material, films.parameters, deflection, self.inner_radius, self.outer_radius)
         asked = replace(asked, sensitivities=films.sensitivities, solver=films.solver, spare=films.spare)
-        return films.solve(replace(asked, exact_up_to=exact_up_to))
+        return films.solve(replace(asked, read=read))
 
     def states(self, film: Material, deflection: Array, points: int) -> Array:
         radii = {"inner_radius": self.inner_radius, "outer_radius": self.outer_radius}

@@ -82,8 +82,8 @@ class Rig(Fixture, ABC):
         """
 
     @abstractmethod
-    def curves(self, films: Films, measurement: Measurement, deflection: Array, exact_up_to: float = np.inf) -> Curves:
-        """Curves of the films at ``deflection`` (N,) m; beyond ``exact_up_to`` only their stability matters."""
+    def curves(self, films: Films, measurement: Measurement, deflection: Array, read: int | None = None) -> Curves:
+        """Curves of the films at ``deflection`` (N,) m; beyond the first ``read`` only their stability matters."""
 
     @abstractmethod
     def states(self, film: Material, deflection: Array, points: int) -> Array:
@@ -147,7 +147,7 @@ class Strip(Rig, ABC):
         shown = strip_curves(law, at)
         return law, (shown.convexity, shown.ellipticity)
 
-    def curves(self, films: Films, measurement: Measurement, deflection: Array, exact_up_to: float = np.inf) -> Curves:
+    def curves(self, films: Films, measurement: Measurement, deflection: Array, read: int | None = None) -> Curves:
         across = measurement.path.across
         if across is not None and deflection.size == len(measurement):  # the path may hold more points
             across = measurement.across

@@ -1,4 +1,4 @@
-"""Compiled inner loops of the spectral Ritz method, `LANES` films side by side.
+"""Compiled inner loops of the Ritz method, `LANES` films side by side, each on elements of its own lengths.
 
 Unknowns, in t = ln(R/R1) with lengths in units of the stress-free inner radius and l0 the pre-stretch:
     l2(t) = l0 + sum_i a_i phi_i(t),      h(t) = d t/T + sum_i b_i phi_i(t),      T = ln(R2/R1)
@@ -9,12 +9,14 @@ is minimised by Newton's method with the exact Hessian K. With g the gradient, K
 z = K^-1 K_d, one factorisation gives
     step -K^-1 g,  F ~ I_d - z.g,  dF/dd ~ I_dd - z.K_d,  dq/dd = -z,  dF/dp ~ I_dp - z.g_p  (envelope theorem).
 
+On an element t = a + (1 + x) half, -1 < x < 1, the functions are the hats of its ends and ``per - 1`` bubbles N_i(x),
+the same for all elements and films: local function i is ``value[i]`` and has the slope ``rate[i]`` / half, and is
+function e per - 1 + i of the film; hats of the edges do not exist. One element has bubbles alone. Unknowns are
+2i for a_i and 2i+1 for b_i; K is banded: K_ij (j <= i) stands in row i width + i - j, low[i] is the least such j.
+
 Every array of films is C-contiguous with shape (rows, LANES), moved by `simd.load` and `simd.store`; lanes never mix,
-so a film's result does not depend on its neighbours. Functions are numbered 0..n-1, with unknown 2i for a_i and 2i+1
-for b_i; function i is non-zero only at the points g with first[g] <= i < last[g], that is start[i] <= g < stop[i],
-which keeps K banded when there are several elements: K_ij (j <= i) stands in row i width + i - j.
-Loops are ordered so that neighbouring steps do not wait for each other's sums.
-``derivatives``, ``sensitivities`` and ``FIELDS`` are the material's (see `compiled.bind`).
+so a film's result does not depend on its neighbours. Loops are ordered so that neighbouring steps do not wait for each
+other's sums. ``derivatives``, ``sensitivities`` and ``FIELDS`` are the material's (see `compiled.bind`).
 """
 
 from __future__ import annotations
@@ -44,106 +46,160 @@ FRESH, RUNNING, DONE, LOST = 0.0, 1.0, 2.0, 3.0
 OK, NOT_ELLIPTIC, INDEFINITE, UNRESOLVED, ITERATION_LIMIT = 0.0, 2.0, 3.0, 4.0, 5.0
 
 
-def states(q, d, l0, p, points, phi, both, slope, beta, first, last, x):
-    """Local quantities x (ROWS G, LANES) at the first ``points`` points, from the unknowns q (2n, LANES)."""
+def measure(ends, nodes, weights, half, growth, weight):
+    """Half lengths (E, LANES) of elements with these ends (E+1, LANES), and exp(t) and weights at their points."""
+    elements, size = half.shape[0], nodes.shape[0]
+    for e in range(elements):
+        start = load(ends, e)
+        h = 0.5 * (load(ends, e + 1) - start)
+        store(half, e, h)
+        for g in range(size):
+            grow = np.exp(start + h * (1.0 + nodes[g]))
+            store(growth, e * size + g, grow)
+            store(weight, e * size + g, weights[g] * h * grow * grow)
+    for edge in range(2):
+        store(growth, elements * size + edge, np.exp(load(ends, edge * elements)))
+
+
+def state(q, d, l0, p, e, elements, column, value, rate, half, grow, r, x):
+    """Local quantities, rows r .. of x, at one point: ``column`` of the tables, in element e."""
+    per, s, bend, rise = value.shape[0] - 1, l0, splat(0.0), d * half
+    for i in range(1 if e == 0 else 0, per if e == elements - 1 else per + 1):
+        o = 2 * (e * per - 1 + i)
+        a, t = load(q, o), rate[i, column]
+        s = s + a * value[i, column]
+        bend = bend + a * t
+        rise = rise + load(q, o + 1) * t
+    u, w = s + bend / half, rise / (half * grow)
+    l1 = np.sqrt(u * u + w * w)
+    energy, p1, p2, p11, p12, p22 = derivatives(p, l1, s)
+    store(x, r + U, u)
+    store(x, r + S, s)
+    store(x, r + W, w)
+    store(x, r + L1, l1)
+    store(x, r + P1, p1)
+    store(x, r + P2, p2)
+    store(x, r + P11, p11)
+    store(x, r + P12, p12)
+    store(x, r + P22, p22)
+    store(x, r + ENERGY, energy)
+
+
+def states(q, d, l0, p, points, span, value, rate, half, growth, x):
+    """Local quantities x (ROWS points, LANES) at the Gauss points and, if ``points`` go beyond, at the two edges."""
+    elements, size, steep = half.shape[0], value.shape[1] - 2, d / span
     for g in range(points):
-        u, s, w = l0, l0, d * beta[g]
-        for i in range(first[g], last[g]):
-            a = load(q, 2 * i)
-            u = u + a * both[i, g]
-            s = s + a * phi[i, g]
-            w = w + load(q, 2 * i + 1) * slope[i, g]
-        l1 = np.sqrt(u * u + w * w)
-        e, p1, p2, p11, p12, p22 = derivatives(p, l1, s)
-        r = ROWS * g
-        store(x, r + U, u)
-        store(x, r + S, s)
-        store(x, r + W, w)
-        store(x, r + L1, l1)
-        store(x, r + P1, p1)
-        store(x, r + P2, p2)
-        store(x, r + P11, p11)
-        store(x, r + P12, p12)
-        store(x, r + P22, p22)
-        store(x, r + ENERGY, e)
+        e, column = g // size, g % size
+        if e == elements:
+            # The edges: the last two columns of the tables, in the first and in the last element.
+            e, column = column * (elements - 1), size + column
+        state(q, steep, l0, p, e, elements, column, value, rate, load(half, e), load(growth, g), ROWS * g, x)
+
+
+def add(rows, row, value):
+    """Add a vector to a row."""
+    store(rows, row, load(rows, row) + value)
 
 
 def put(band, i, j, width, aa, ab, ba, bb):
-    """The four entries of K that couple functions i and j <= i."""
+    """Add to the four entries of K that couple functions i and j <= i."""
     o = 2 * i * width + 2 * (i - j)
-    store(band, o, aa)
-    store(band, o + width, bb)
-    store(band, o + width + 1, ba)
+    add(band, o, aa)
+    add(band, o + width, bb)
+    add(band, o + width + 1, ba)
     if j < i:
-        store(band, o - 1, ab)
+        add(band, o - 1, ab)
 
 
-def assemble(x, c, row, sums, phi, both, slope, beta, weight, start, stop, low, width, grad, mixed, band):
-    """Banded Hessian, gradient and mixed derivative (2n, LANES), and sums = (I, I_d, I_dd, least l2)."""
-    zero = splat(0.0)
-    energy, force, stiff, lowest = zero, zero, zero, splat(np.inf)
-    for g in range(weight.shape[0]):
-        om, be, r, o = weight[g], beta[g], ROWS * g, 9 * g
-        p1, p11, p12 = load(x, r + P1), load(x, r + P11), load(x, r + P12)
-        inverse = 1.0 / load(x, r + L1)
-        co, si = load(x, r + U) * inverse, load(x, r + W) * inverse
-        geo, lowest = p1 * inverse, least(load(x, r + S), lowest)
-        up, ww = om * p1 * si, om * (p11 * si * si + geo * co * co)
-        store(c, o, om * p1 * co)
-        store(c, o + 1, om * load(x, r + P2))
+def coefficients(x, first, size, steep, half, growth, weight, c, sums):
+    """What an element's integrands are made of, c (9 size, LANES), and its part of sums (I, I_d, I_dd, least l2).
+
+    For functions v with slope r / half, in a: gradient c0 v + c1 r, Hessian c3 v v' + c4 (v r' + r v') + c5 r r'; in b:
+    c2 r and c8 r r'; between them v in a and r' in b: c6 v r' + c7 r r'. The deflection acts like b with r = steep.
+    """
+    energy, force, stiff, lowest = load(sums, 0), load(sums, 1), load(sums, 2), load(sums, 3)
+    inverse = 1.0 / half
+    for g in range(size):
+        om, r, o = load(weight, first + g), ROWS * (first + g), 9 * g
+        p1, p11, inv = load(x, r + P1), load(x, r + P11), 1.0 / load(x, r + L1)
+        co, si, steeper = load(x, r + U) * inv, load(x, r + W) * inv, inverse / load(growth, first + g)
+        geo, lowest = p1 * inv, least(load(x, r + S), lowest)
+        along, up, cross = om * p1 * co, om * p1 * si * steeper, om * load(x, r + P12)
+        a, b = om * (p11 * co * co + geo * si * si), om * (p11 - geo) * co * si
+        across, flat = cross * co, om * (p11 * si * si + geo * co * co) * steeper * steeper
+        store(c, o, along + om * load(x, r + P2))
+        store(c, o + 1, along * inverse)
         store(c, o + 2, up)
-        store(c, o + 3, om * (p11 * co * co + geo * si * si))
-        store(c, o + 4, ww)
-        store(c, o + 5, om * (p11 - geo) * co * si)
-        store(c, o + 6, om * p12 * co)
-        store(c, o + 7, om * p12 * si)
-        store(c, o + 8, om * load(x, r + P22))
+        store(c, o + 3, a + 2.0 * across + om * load(x, r + P22))
+        store(c, o + 4, (a + across) * inverse)
+        store(c, o + 5, a * inverse * inverse)
+        store(c, o + 6, (b + cross * si) * steeper)
+        store(c, o + 7, b * inverse * steeper)
+        store(c, o + 8, flat)
         energy = energy + om * load(x, r + ENERGY)
-        force = force + up * be
-        stiff = stiff + ww * be * be
+        force = force + up * steep
+        stiff = stiff + flat * steep * steep
     store(sums, 0, energy)
     store(sums, 1, force)
     store(sums, 2, stiff)
     store(sums, 3, lowest)
-    for i in range(phi.shape[0]):
-        ga, gb, ka, kb = zero, zero, zero, zero
-        for g in range(start[i], stop[i]):
-            a, f, b, be, o, r = both[i, g], phi[i, g], slope[i, g], beta[g], 9 * g, 6 * g
-            us, ws, uw = load(c, o + 6), load(c, o + 7), load(c, o + 5)
-            to_w, to_b = uw * a + ws * f, load(c, o + 4) * b
-            store(row, r, load(c, o + 3) * a + us * f)
-            store(row, r + 1, us * a + load(c, o + 8) * f)
-            store(row, r + 2, to_w)
-            store(row, r + 3, uw * b)
-            store(row, r + 4, ws * b)
-            store(row, r + 5, to_b)
-            ga = ga + load(c, o) * a + load(c, o + 1) * f
-            gb = gb + load(c, o + 2) * b
-            ka = ka + to_w * be
-            kb = kb + to_b * be
-        store(grad, 2 * i, ga)
-        store(grad, 2 * i + 1, gb)
-        store(mixed, 2 * i, ka)
-        store(mixed, 2 * i + 1, kb)
-        for j in range(low[2 * i] // 2, i + 1, 2):
-            # Two functions at once: the rows are loaded once for both.
-            k = min(j + 1, i)
-            aa, ab, ba, bb = zero, zero, zero, zero
-            cc, cd, dc, dd = zero, zero, zero, zero
-            for g in range(max(start[i], start[j]), min(stop[i], stop[k])):
-                r = 6 * g
-                on_u, on_s, on_w = load(row, r), load(row, r + 1), load(row, r + 2)
-                of_u, of_s, of_w = load(row, r + 3), load(row, r + 4), load(row, r + 5)
-                aa = aa + on_u * both[j, g] + on_s * phi[j, g]
-                cc = cc + on_u * both[k, g] + on_s * phi[k, g]
-                ba = ba + of_u * both[j, g] + of_s * phi[j, g]
-                dc = dc + of_u * both[k, g] + of_s * phi[k, g]
-                ab = ab + on_w * slope[j, g]
-                cd = cd + on_w * slope[k, g]
-                bb = bb + of_w * slope[j, g]
-                dd = dd + of_w * slope[k, g]
-            put(band, i, j, width, aa, ab, ba, bb)
-            put(band, i, k, width, cc, cd, dc, dd)
+
+
+def assemble(x, c, row, sums, span, value, rate, half, growth, weight, width, grad, mixed, band):
+    """Banded Hessian, gradient and mixed derivative (2n, LANES), and sums = (I, I_d, I_dd, least l2)."""
+    zero, elements, size, per = splat(0.0), half.shape[0], value.shape[1] - 2, value.shape[0] - 1
+    for i in range(3):
+        store(sums, i, zero)
+    store(sums, 3, splat(np.inf))
+    for i in range(grad.shape[0]):
+        store(grad, i, zero)
+        store(mixed, i, zero)
+    for i in range(band.shape[0]):
+        store(band, i, zero)
+    for e in range(elements):
+        steep, start = load(half, e) / span, e * per - 1
+        coefficients(x, e * size, size, steep, load(half, e), growth, weight, c, sums)
+        lowest = 1 if e == 0 else 0
+        for i in range(lowest, per if e == elements - 1 else per + 1):
+            o = 2 * (start + i)
+            ga, gb, ka, kb = zero, zero, zero, zero
+            for g in range(size):
+                v, t, b, r = value[i, g], rate[i, g], 9 * g, 6 * g
+                both, to_b, of_b = load(c, b + 4), load(c, b + 6) * v + load(c, b + 7) * t, load(c, b + 8) * t
+                store(row, r, load(c, b + 3) * v + both * t)
+                store(row, r + 1, both * v + load(c, b + 5) * t)
+                store(row, r + 2, to_b)
+                store(row, r + 3, load(c, b + 6) * t)
+                store(row, r + 4, load(c, b + 7) * t)
+                store(row, r + 5, of_b)
+                ga = ga + load(c, b) * v + load(c, b + 1) * t
+                gb = gb + load(c, b + 2) * t
+                ka = ka + to_b
+                kb = kb + of_b
+            add(grad, o, ga)
+            add(grad, o + 1, gb)
+            add(mixed, o, ka * steep)
+            add(mixed, o + 1, kb * steep)
+            for j in range(lowest, i + 1, 2):
+                # Two functions at once: the rows are loaded once for both.
+                k = min(j + 1, i)
+                aa, ab, ba, bb = zero, zero, zero, zero
+                cc, cd, dc, dd = zero, zero, zero, zero
+                for g in range(size):
+                    r, vj, tj, vk, tk = 6 * g, value[j, g], rate[j, g], value[k, g], rate[k, g]
+                    on_v, on_t, on_b = load(row, r), load(row, r + 1), load(row, r + 2)
+                    of_v, of_t, of_b = load(row, r + 3), load(row, r + 4), load(row, r + 5)
+                    aa = aa + on_v * vj + on_t * tj
+                    cc = cc + on_v * vk + on_t * tk
+                    ba = ba + of_v * vj + of_t * tj
+                    dc = dc + of_v * vk + of_t * tk
+                    ab = ab + on_b * tj
+                    cd = cd + on_b * tk
+                    bb = bb + of_b * tj
+                    dd = dd + of_b * tk
+                put(band, start + i, start + j, width, aa, ab, ba, bb)
+                if k > j:
+                    put(band, start + i, start + k, width, cc, cd, dc, dd)
 
 
 def factorise(band, low, width, scaled, pivots):
@@ -240,7 +296,7 @@ def examine(x, points, inner, growth, gd, out):
         l1, p1, p2 = load(x, r + L1), load(x, r + P1), load(x, r + P2)
         p11, p12, p22 = load(x, r + P11), load(x, r + P12), load(x, r + P22)
         if g < inner:
-            total = total + growth[g] * p1 * load(x, r + W) / l1
+            total = total + load(growth, g) * p1 * load(x, r + W) / l1
         half = 0.5 * (p11 - p22)
         stretch = greatest(greatest(l1, load(x, r + S)), stretch)
         ellipse = least(least(p11, p22), ellipse)
@@ -249,7 +305,7 @@ def examine(x, points, inner, growth, gd, out):
     mean, square = total / inner, zero
     for g in range(inner):
         r = ROWS * g
-        e = growth[g] * load(x, r + P1) * load(x, r + W) / load(x, r + L1) - mean
+        e = load(growth, g) * load(x, r + P1) * load(x, r + W) / load(x, r + L1) - mean
         square = square + e * e
     store(out, VARIATION, np.sqrt(square / inner) / abs(mean))
     store(out, STRETCH, stretch)
@@ -260,46 +316,53 @@ def examine(x, points, inner, growth, gd, out):
     store(out, SLACK, slack)
 
 
-def energy_gain(x, weight, extra, elements, out):
-    """How much energy the next two bubbles of every element would release, sum of g^2 / (2 K_ii), into row GAIN.
+def energy_gain(x, half, growth, weight, extra, gains, out):
+    """How much energy the next two bubbles of every element would release, sum of g^2 / (2 K_ii).
 
-    extra (3, 2, points per element, elements) : phi + phi', phi and slope of these bubbles, as in the tables.
+    extra (2, 2, points per element) : value and rate of these bubbles, as in the tables
+    gains (E, LANES) : element by element; their sum goes into row GAIN of ``out``
     """
-    gain, zero = splat(0.0), splat(0.0)
-    size = extra.shape[2]
-    for e in range(elements):
+    total, zero, size = splat(0.0), splat(0.0), extra.shape[2]
+    for e in range(half.shape[0]):
+        gain, inverse = zero, 1.0 / load(half, e)
         for i in range(2):
             ga, gb, ka, kb = zero, zero, zero, zero
             for j in range(size):
                 g = e * size + j
-                a, f, b, om, r = extra[0, i, j, e], extra[1, i, j, e], extra[2, i, j, e], weight[g], ROWS * g
-                p1, p11, inverse = load(x, r + P1), load(x, r + P11), 1.0 / load(x, r + L1)
-                co, si, geo = load(x, r + U) * inverse, load(x, r + W) * inverse, p1 * inverse
+                r, om, f, steep = ROWS * g, load(weight, g), extra[0, i, j], extra[1, i, j] * inverse
+                a, b = f + steep, steep / load(growth, g)
+                p1, p11, inv = load(x, r + P1), load(x, r + P11), 1.0 / load(x, r + L1)
+                co, si, geo = load(x, r + U) * inv, load(x, r + W) * inv, p1 * inv
                 ga = ga + om * (p1 * co * a + load(x, r + P2) * f)
                 gb = gb + om * p1 * si * b
                 cross = load(x, r + P12) * co
                 ka = ka + om * ((p11 * co * co + geo * si * si) * a * a + (2.0 * cross * a + load(x, r + P22) * f) * f)
                 kb = kb + om * (p11 * si * si + geo * co * co) * b * b
             gain = gain + 0.5 * (ga * ga / abs(ka) + gb * gb / abs(kb))
-    store(out, GAIN, gain)
+        store(gains, e, gain)
+        total = total + gain
+    store(out, GAIN, total)
 
 
-def force_sensitivity(x, p, dq, inner, phi, both, slope, beta, weight, first, last, out):
+def force_sensitivity(x, p, dq, span, value, rate, half, growth, weight, out):
     """dF/dp_m = dI_d/dp_m + dq/dd.dg/dp_m, into rows RESULTS + m of ``out``."""
+    elements, size, per = half.shape[0], value.shape[1] - 2, value.shape[0] - 1
     for m in range(len(FIELDS)):
         store(out, RESULTS + m, 0.0)
-    for g in range(inner):
-        r = ROWS * g
-        l1 = load(x, r + L1)
-        co, si = load(x, r + U) / l1, load(x, r + W) / l1
-        along, across = si * beta[g], splat(0.0)
-        for i in range(first[g], last[g]):
-            a = load(dq, 2 * i)
-            along = along + co * a * both[i, g] + si * load(dq, 2 * i + 1) * slope[i, g]
-            across = across + a * phi[i, g]
+    for g in range(elements * size):
+        e, r = g // size, ROWS * g
+        h, l1 = load(half, e), load(x, r + L1)
+        across, bend, rise = splat(0.0), splat(0.0), h / span
+        for i in range(1 if e == 0 else 0, per if e == elements - 1 else per + 1):
+            o, t = 2 * (e * per - 1 + i), rate[i, g - e * size]
+            a = load(dq, o)
+            across = across + a * value[i, g - e * size]
+            bend = bend + a * t
+            rise = rise + load(dq, o + 1) * t
+        along = load(x, r + U) / l1 * (across + bend / h) + load(x, r + W) / l1 * rise / (h * load(growth, g))
         rows = sensitivities(p, l1, load(x, r + S))
         for m in range(len(FIELDS)):
-            add = weight[g] * (rows[m][1] * along + rows[m][2] * across)
+            add = load(weight, g) * (rows[m][1] * along + rows[m][2] * across)
             store(out, RESULTS + m, load(out, RESULTS + m) + add)
 
 
@@ -394,41 +457,37 @@ def solve_newton(band, low, width, grad, mixed, y, z, dots):
     store(dots, 2, kz)
 
 
-def spread(rows, films, column):
-    """Write rows (R, LANES) to films (LANES, at most R, N) at one column."""
+def spread(rows, films, first, column):
+    """Write rows (R, LANES), or as many as there is room for, to films (LANES, first + .., N) at one column."""
     for k in range(LANES):
-        for r in range(films.shape[1]):
-            films[k, r, column] = rows[r, k]
+        for r in range(min(rows.shape[0], films.shape[1] - first)):
+            films[k, first + r, column] = rows[r, k]
 
 
-def remember(out, q, everywhere, rough, trace, column):
-    """Write the unknowns that are wished for to trace (LANES, 2n, N) at one column."""
-    for k in range(LANES):
-        if everywhere or (rough and out[STATUS, k] == UNRESOLVED):
-            for i in range(q.shape[0]):
-                trace[k, i, column] = q[i, k]
-
-
-def follow_block(p_rows, gd, l0, grid, q, tables, limits, keep, wishes, result, trace):
+def follow_block(p_rows, gd, l0, grid, q, ends, tables, limits, keep, wanted, result, trace):
     """`follow` for one block; q (2n, LANES) is overwritten."""
-    phi, both, slope, beta, growth, weight, first, last, start, stop, low, width, extra = tables
+    nodes, weights, value, rate, extra, low, width = tables
     most, tolerance, gain_limit, variation_limit = limits
-    points, inner, m, p, kept = phi.shape[1], weight.shape[0], 2 * phi.shape[0], load_all(p_rows, FIELDS), 0
-    x, c, row = np.empty((ROWS * points, LANES)), np.empty((9 * inner, LANES)), np.empty((6 * inner, LANES))
+    elements, size, m = ends.shape[0] - 1, nodes.shape[0], q.shape[0]
+    p, kept, span = load_all(p_rows, FIELDS), 0, load(ends, elements)
+    inner = elements * size
+    points = inner + 2
+    half, growth, weight = np.empty((elements, LANES)), np.empty((points, LANES)), np.empty((inner, LANES))
+    measure(ends, nodes, weights, half, growth, weight)
+    x, c, row = np.empty((ROWS * points, LANES)), np.empty((9 * size, LANES)), np.empty((6 * size, LANES))
     band, y, z = np.zeros((m * width, LANES)), np.empty((m, LANES)), np.empty((m, LANES))
     grad, mixed, trial, base = np.empty((m, LANES)), np.empty((m, LANES)), q.copy(), q.copy()
     step, old, dq, dold = np.zeros((m, LANES)), q.copy(), np.zeros((m, LANES)), np.zeros((m, LANES))
     lane, sums, dots = np.zeros((8, LANES)), np.empty((4, LANES)), np.empty((3, LANES))
-    pivot, out = np.empty((1, LANES)), np.empty((RESULTS + len(FIELDS), LANES))
+    pivot, out, gains = np.empty((1, LANES)), np.empty((RESULTS + len(FIELDS), LANES)), np.empty((elements, LANES))
     for j in range(grid.shape[0]):
         d, before = load(grid, j), load(grid, max(j - 1, 0))
         if j > 0:
             predict(q, dq, old, dold, d, before, load(grid, max(j - 2, 0)), trial)
-        begin(q, dq, old, dold, lane, out)
-        count = 0
-        while count < most:
-            states(trial, d, l0, p, inner, phi, both, slope, beta, first, last, x)
-            assemble(x, c, row, sums, phi, both, slope, beta, weight, start, stop, low, width, grad, mixed, band)
+        count, awake = 0, begin(q, dq, old, dold, lane, out)
+        while awake > 0 and count < most:
+            states(trial, d, l0, p, inner, span, value, rate, half, growth, x)
+            assemble(x, c, row, sums, span, value, rate, half, growth, weight, width, grad, mixed, band)
             store(pivot, 0, factorise(band, low, width, y, z))
             solve_newton(band, low, width, grad, mixed, y, z, dots)
             count += 1
@@ -437,27 +496,36 @@ def follow_block(p_rows, gd, l0, grid, q, tables, limits, keep, wishes, result, 
             if over == LANES:
                 break
         end(lane)
-        if keep[j]:
-            states(q, d, l0, p, points, phi, both, slope, beta, first, last, x)
+        if keep[j] and awake == 0:
+            # Nobody is on the way any more: there is nothing to look at.
+            spread(out, result, 0, kept)
+            kept += 1
+        elif keep[j]:
+            states(q, d, l0, p, points, span, value, rate, half, growth, x)
             examine(x, points, inner, growth, gd, out)
-            energy_gain(x, weight, extra, extra.shape[3], out)
-            if wishes[0]:
-                force_sensitivity(x, p, dq, inner, phi, both, slope, beta, weight, first, last, out)
+            energy_gain(x, half, growth, weight, extra, gains, out)
+            if wanted:
+                force_sensitivity(x, p, dq, span, value, rate, half, growth, weight, out)
             verdict(out, grid[j], gain_limit, variation_limit)
             store(out, COUNT, float(count))
-            spread(out, result, kept)
-            remember(out, q, wishes[1], wishes[2], trace, kept)
+            spread(out, result, 0, kept)
+            spread(q, trace, 0, kept)
+            spread(gains, trace, m, kept)
             kept += 1
 
 
 def begin(q, dq, old, dold, lane, out):
-    """Make the last state the one before, and wake the lanes that are not lost."""
+    """Make the last state the one before, and wake the lanes that are not lost; returns how many these are."""
     for i in range(q.shape[0]):
         store(old, i, load(q, i))
         store(dold, i, load(dq, i))
+    awake = 0
     for k in range(LANES):
-        lane[MODE, k] = LOST if lane[MODE, k] == LOST else FRESH
+        if lane[MODE, k] != LOST:
+            lane[MODE, k] = FRESH
+            awake += 1
         out[STATUS, k] = ITERATION_LIMIT
+    return awake
 
 
 def end(lane):
@@ -467,17 +535,18 @@ def end(lane):
             lane[MODE, k] = LOST
 
 
-def follow(p, gd, l0, grid, start, tables, limits, keep, wishes, result, trace):
+def follow(p, gd, l0, grid, start, ends, tables, limits, keep, wanted, result, trace):
     """Continue B blocks of `LANES` films each through ascending scaled deflections.
 
     p (B, n_fields, LANES), gd, l0 (B, 1, LANES) : parameters, G d, pre-stretch
     grid (B, M, LANES) : scaled deflections, of which those with keep (M,) are examined, N of them
     start (B, 2n, LANES) : unknowns from which the first deflection is tried (zeros: the flat film)
-    tables : see `ritz.basis`
+    ends (B, E+1, LANES) : where in t the elements of each film end, from 0 to T
+    tables : see `elements.basis`
     limits : most iterations; Newton decrement, over d I_d, of a converged state; and what `verdict` judges by
-    wishes : whether to give sensitivities, all unknowns, or the unknowns of unresolved states
-    result (B, LANES, rows, N) : the rows FORCE .. SLACK, then dF/dp if wished for, in scaled units
-    trace (B, LANES, 2n, N) : the unknowns, if wished for
+    wanted : whether to give sensitivities
+    result (B, LANES, rows, N) : the rows FORCE .. SLACK, then dF/dp if wanted, in scaled units
+    trace (B, LANES, 2n + E, N) : the unknowns, and what is to be gained in each element
 
     A lane that loses the path has status `ITERATION_LIMIT` from there on.
     """
@@ -488,18 +557,23 @@ def follow(p, gd, l0, grid, start, tables, limits, keep, wishes, result, trace):
             load(l0[block], 0),
             grid[block],
             start[block],
+            ends[block],
             tables,
             limits,
             keep,
-            wishes,
+            wanted,
             result[block],
             trace[block],
         )
 
 
 KERNELS = (
+    measure,
+    state,
     states,
+    add,
     put,
+    coefficients,
     assemble,
     factorise,
     backsolve,
@@ -512,7 +586,6 @@ KERNELS = (
     verdict,
     update,
     spread,
-    remember,
     begin,
     end,
     follow_block,

@@ -1,100 +1,26 @@
-"""Spectral Ritz solver: forces of many films at once from the minimum of the stored energy."""
+"""Ritz solver: forces of many films at once from the minimum of the stored energy over elements."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.materials.base import Material
-from bayesmembrane.physics.mechanics.compiled import bind
 from bayesmembrane.physics.mechanics.locking import locking_deflection
 from bayesmembrane.physics.mechanics.request import Request, Spared, extensibility
 from bayesmembrane.physics.mechanics.ritz import kernels
-from bayesmembrane.physics.mechanics.ritz.simd import LANES
+from bayesmembrane.physics.mechanics.ritz.batch import LEVELS, Shapes, films, follow, run
+from bayesmembrane.physics.mechanics.ritz.elements import evaluate
+from bayesmembrane.physics.mechanics.ritz.walk import RULED_OUT_ON_THE_WAY, Walks, nearly_resolved
 from bayesmembrane.physics.mechanics.solution import Curves, Note, Status
 
-# Elements x bubbles per element: every basis contains those before it.
-LEVELS = ((1, 6), (2, 6), (4, 7), (8, 8), (24, 8))
-# A force is exact to 1e-6 while the next bubbles would release less than this part of F delta (measured: the error is
-# at most a hundred times the gain, over draws from the priors of all materials), and the first integral is even.
-GAIN_LIMIT = 2e-10
-VARIATION_LIMIT = 5e-4
-TOLERANCE = 1e-11
-MOST_ITERATIONS = 40
-LIMITS = (MOST_ITERATIONS, TOLERANCE, GAIN_LIMIT, VARIATION_LIMIT)
-# Largest step of the continuation in asinh(d), and the first deflection reached from the flat film.
-STRIDE = 0.8
-FIRST = 0.4
 # A film that is not deflected has a stiffness: it is looked at this far up (scaled).
 SMALLEST = 1e-4
-# The end of a path is searched in two sweeps of this many deflections, and believed if two bases agree to this part.
-SEARCH = 16
-SAME_END = 0.02
-# A path that ends with less than this of P11 / (G d) ends because ellipticity is about to be lost there.
-NEARLY_BENT = 0.1
 # A margin of convexity or ellipticity below minus this rules a film out, whatever finer bases would say.
 RULED_OUT = 1e-6
-LOOSE_GAIN, LOOSE_VARIATION = 1e-5, 2e-2
-RULED_OUT_ON_THE_WAY = 1e-3
-
-
-@dataclass(frozen=True)
-class Basis:
-    """Shape functions on t in [0, T], sampled at G Gauss points and, last, at the two edges."""
-
-    tables: tuple[Any, ...]
-    functions: int
-
-
-@cache
-def basis(ratio: float, elements: int, bubbles: int) -> Basis:
-    """Hats and integrated Legendre bubbles over elements in t = ln(R/R1) in [0, T], for R2/R1 = ``ratio``.
-
-    Sampled at bubbles + 3 Gauss points per element and then at the two edges.
-    """
-    span, lengths = np.log(ratio), np.diff(_ends(ratio, elements))
-    nodes, weights = legendre.leggauss(bubbles + 3)
-    size, per, n = nodes.size, bubbles + 1, elements * (bubbles + 1) - 1
-    points = np.append(_gauss_points(ratio, elements, bubbles), [0.0, span])
-    phi, slope = _shape_functions(ratio, elements, bubbles, points)
-    home = np.append(np.repeat(np.arange(elements), size), [0, elements - 1])
-    first = np.maximum(home * per - 1, 0)
-    last = np.minimum((home + 1) * per, n)
-    gauss = elements * size
-    growth = np.exp(points)
-    weight = (weights * lengths[:, None] / 2).ravel() * growth[:gauss] ** 2
-    low = np.arange(2 * n)
-    for a, b in zip(first, last, strict=True):
-        low[2 * a : 2 * b] = np.minimum(low[2 * a : 2 * b], 2 * a)
-    active = (first[None, :gauss] <= np.arange(n)[:, None]) & (np.arange(n)[:, None] < last[None, :gauss])
-    start, stop = active.argmax(1), gauss - active[:, ::-1].argmax(1)
-    width = int(np.max(np.arange(2 * n) - low)) + 1
-    floats = (np.ascontiguousarray(v) for v in (phi, phi + slope, slope / growth, 1 / (span * growth), growth, weight))
-    return Basis((*floats, first, last, start, stop, low, width, _next_bubbles(lengths, nodes, bubbles, growth)), n)
-
-
-def _next_bubbles(lengths: Array, nodes: Array, bubbles: int, growth: Array) -> Array:
-    """The two bubbles after the last of every element at its Gauss points: (phi + phi', phi, exp(-t) phi')."""
-    value, rate = (v[bubbles:] for v in _bubbles(nodes, bubbles + 2))
-    extra = np.empty((3, 2, nodes.size, lengths.size))
-    for e, length in enumerate(lengths):
-        steep = rate * 2 / length
-        extra[..., e] = value + steep, value, steep / growth[e * nodes.size : (e + 1) * nodes.size]
-    return extra
-
-
-@cache
-def _prolongation(ratio: float, level: int) -> Array:
-    """(n', n) : the functions of one level, n, as sums of those of the next, n'."""
-    points = _gauss_points(ratio, *LEVELS[level + 1])
-    new, old = (_shape_functions(ratio, *LEVELS[k], points)[0] for k in (level + 1, level))
-    return np.asarray(np.linalg.lstsq(new.T, old.T)[0])
 
 
 def shape(request: Request, t: Array) -> tuple[Array, Array, Array, Array]:
@@ -104,132 +30,17 @@ def shape(request: Request, t: Array) -> tuple[Array, Array, Array, Array]:
     """
     one = replace(request, parameters=request.parameters[:1], prestretch=request.prestretch[:1])
     d = np.where(request.deflection[:1, :1] == 0, SMALLEST, request.scaled[:1, :1])
-    for level, (elements, bubbles) in enumerate(LEVELS):
-        result, unknowns = follow(one, d, level, wishes=(False, True, False))
-        if result[0, kernels.STATUS, 0] == Status.OK:
-            span, l0 = np.log(request.ratio), request.prestretch[0]
-            phi, slope = _shape_functions(request.ratio, elements, bubbles, t)
-            a, b = unknowns[0, 0::2, 0], unknowns[0, 1::2, 0]
-            l2 = l0 + a @ phi
-            return l2, l2 + a @ slope, np.exp(-t) * (d[0, 0] / span + b @ slope), d[0, 0] * t / span + b @ phi
-    gap = np.full(t.shape, np.nan)
-    return gap, gap, gap, gap
-
-
-def _shape_functions(ratio: float, elements: int, bubbles: int, t: Array) -> tuple[Array, Array]:
-    """phi and d phi/dt, each (n, M), at t (M,) in [0, ln ratio]."""
-    ends = _ends(ratio, elements)
-    n = elements * (bubbles + 1) - 1
-    phi, slope = np.zeros((n, t.size)), np.zeros((n, t.size))
-    home = np.clip(np.searchsorted(ends, t, side="right") - 1, 0, elements - 1)
-    for e in range(elements):
-        at = np.flatnonzero(home == e)
-        length, start = ends[e + 1] - ends[e], e * (bubbles + 1)
-        x = 2 * (t[at] - ends[e]) / length - 1
-        value, rate = _bubbles(x, bubbles)
-        phi[start : start + bubbles, at], slope[start : start + bubbles, at] = value, rate * 2 / length
-        if e > 0:
-            phi[start - 1, at], slope[start - 1, at] = 0.5 * (1 - x), -1 / length
-        if e < elements - 1:
-            phi[start + bubbles, at], slope[start + bubbles, at] = 0.5 * (1 + x), 1 / length
-    return phi, slope
-
-
-def _ends(ratio: float, elements: int) -> Array:
-    """Element ends in t: shorter elements towards the edges, where soft films form boundary layers."""
-    return np.asarray(np.log(ratio) * (1 - np.cos(np.pi * np.arange(elements + 1) / elements)) / 2)
-
-
-def _gauss_points(ratio: float, elements: int, bubbles: int) -> Array:
-    """bubbles + 3 points of every element."""
-    ends, nodes = _ends(ratio, elements), legendre.leggauss(bubbles + 3)[0]
-    return np.asarray((ends[:-1, None] + 0.5 * (1 + nodes) * np.diff(ends)[:, None]).ravel())
-
-
-def _bubbles(x: Array, count: int) -> tuple[Array, Array]:
-    """Integrated Legendre polynomials N_i = int_-1^x P_i, i = 1..count, scaled to unit slope norm, and slopes."""
-    value, rate = np.empty((count, x.size)), np.empty((count, x.size))
-    for i in range(1, count + 1):
-        c = np.zeros(i + 1)
-        c[i] = np.sqrt((2 * i + 1) / 2)
-        rate[i - 1] = legendre.legval(x, c)
-        value[i - 1] = legendre.legval(x, legendre.legint(c, lbnd=-1))
-    return value, rate
-
-
-@cache
-def compiled(material: type[Material]) -> Any:
-    """The kernels of one material."""
-    return bind(kernels.KERNELS, material, FIELDS=(0.0,) * len(material.field_names()))
-
-
-def _path(d: Array, stride: float) -> tuple[Array, NDArray[np.bool_]]:
-    """From the flat film through ascending scaled deflections d (B, N) > 0, in steps of ``stride`` in asinh(d).
-
-    Returns deflections (M, B), and a mask (M,) of those that were asked for.
-    """
-    x = np.arcsinh(d.T)
-    start = np.minimum(np.arcsinh(FIRST), x[:1])
-    before = np.concatenate([start, x[:-1]])
-    gap = x - before
-    steps = np.maximum(np.ceil(np.max(gap, axis=1) / stride), 1).astype(int)
-    lead = bool(np.any(gap[0] > 0))
-    if not lead:
-        steps[0] = 1
-    home = np.repeat(np.arange(len(x)), steps)
-    part = np.arange(home.size) - np.repeat(np.cumsum(steps) - steps, steps) + 1
-    keep = part == steps[home]
-    grid = d.T[home]
-    grid[~keep] = np.sinh(before[home] + gap[home] * (part / steps[home])[:, None])[~keep]
-    if lead:
-        return np.concatenate([np.sinh(start), grid]), np.concatenate([[False], keep])
-    return grid, keep
-
-
-def follow(
-    request: Request, d: Array, level: int, wishes: tuple[bool, bool, bool] = (False, False, False)
-) -> tuple[Array, Array]:
-    """Continue B films from the flat film through ascending scaled deflections d (B, N).
-
-    wishes : sensitivities, unknowns everywhere, unknowns of unresolved states
-    Returns results (B, rows, N) and unknowns (B, 2 functions, N), or (B, 2 functions, 0) if not wished for, see
-    `ritz_kernels.follow`.
-    """
-    grid, keep = _path(d, STRIDE / 2**level)
-    start = np.zeros((d.shape[0], 2 * basis(request.ratio, *LEVELS[level]).functions))
-    return _run(request, grid, keep, start, level, wishes)
-
-
-def _run(
-    request: Request, grid: Array, keep: NDArray[np.bool_], start: Array, level: int, wishes: tuple[bool, bool, bool]
-) -> tuple[Array, Array]:
-    """`kernels.follow` over deflections grid (M, B) from unknowns start (B, 2n)."""
-    shape, count, fields = basis(request.ratio, *LEVELS[level]), grid.shape[1], request.parameters.shape[1]
-    blocks, n = -(-count // LANES), int(np.count_nonzero(keep))
-    pad = np.minimum(np.arange(blocks * LANES), count - 1)
-
-    def blocked(rows: Array) -> Array:
-        """(R, B) -> (blocks, R, LANES), the last film repeated."""
-        return np.ascontiguousarray(rows[:, pad].reshape(len(rows), blocks, LANES).transpose(1, 0, 2))
-
-    gd = np.broadcast_to(_shear_modulus(request), (1, count))
-    result = np.empty((blocks, LANES, kernels.RESULTS + (fields if wishes[0] else 0), n))
-    unknowns = np.empty((blocks, LANES, 2 * shape.functions, n if any(wishes[1:]) else 0))
-    rows = (blocked(v) for v in (request.parameters.T, gd, request.prestretch[None], grid, start.T))
-    compiled(request.material).follow(*rows, shape.tables, LIMITS, keep, wishes, result, unknowns)
-    padded = blocks * LANES
-    return (
-        result.reshape(padded, *result.shape[2:])[:count],
-        unknowns.reshape(padded, *unknowns.shape[2:])[:count],
-    )
-
-
-def _shear_modulus(request: Request) -> Array:
-    return np.asarray(request.material.shear_modulus(request.parameters.T), dtype=float)
-
-
-def _films(request: Request, films: NDArray[np.intp]) -> Request:
-    return replace(request, parameters=request.parameters[films], prestretch=request.prestretch[films])
+    search = _Search(one, d, np.ones((1, 1), np.bool_))
+    for level in range(1, len(LEVELS)):
+        if not search.improve(level):
+            break
+    if search.status[0, 0] != Status.OK:
+        gap = np.full(t.shape, np.nan)
+        return gap, gap, gap, gap
+    found, span, l0 = search.last, np.log(request.ratio), request.prestretch[0]
+    (a, b), (a_slope, b_slope) = evaluate(found.unknowns[0], found.ends[0], found.bubbles, t)
+    l2 = l0 + a
+    return l2, l2 + a_slope, np.exp(-t) * (d[0, 0] / span + b_slope), d[0, 0] * t / span + b
 
 
 def solve(request: Request) -> Curves:
@@ -243,9 +54,9 @@ def solve(request: Request) -> Curves:
     physically, and is given its reason; what is left is flagged.
 
     Of a film that is spared (a prior rules it out whatever its other forces are) what is not resolved at first stays
-    flagged. Beyond the deflection ``exact_up_to`` states only show whether the film stays stable and convex.
+    flagged. States whose forces are not ``read`` only show whether the film stays stable and convex.
     """
-    d, back = _ascending(np.where(request.deflection == 0, SMALLEST, request.scaled))
+    d, order, back = _ascending(np.where(request.deflection == 0, SMALLEST, request.scaled))
     bound = extensibility(request)
     locked = np.zeros(d.shape, np.bool_)
     if np.any(bound < np.inf):
@@ -253,8 +64,7 @@ def solve(request: Request) -> Curves:
         # A locked deflection is replaced by the last one that can be reached; its answer is not used.
         reach = np.max(np.where(locked, 0.0, d), axis=1, keepdims=True)
         d = np.where(locked, np.where(reach > 0, reach, 1e-3), d)
-    loose = d > request.exact_up_to * (1 + 1e-9) * request.prestretch[:, None] / request.inner_radius
-    search = _Search(request, d, ~locked, loose)
+    search = _Search(request, d, ~locked, order >= d.shape[1] if request.read is None else order >= request.read)
     if np.any(search.status) or np.any(locked):
         for level in range(1, len(LEVELS)):
             if not search.improve(level):
@@ -264,21 +74,12 @@ def solve(request: Request) -> Curves:
     return _curves(request, search, back)
 
 
-def _nearly_resolved(result: Array, d: Array) -> NDArray[np.bool_]:
-    """(B, N) True where the next bubbles would change the force by less than 1e-3 or so."""
-    even = result[:, kernels.VARIATION] < LOOSE_VARIATION
-    return np.asarray(even & (result[:, kernels.GAIN] < LOOSE_GAIN * np.abs(result[:, kernels.FORCE] * d)))
-
-
-def _ruled_out(result: Array, status: NDArray[np.int8], spare: Spared) -> NDArray[np.bool_]:
-    """(B,) True for films with a resolved state that shows them to be such as are spared."""
+def _shown(result: Array, status: NDArray[np.int8], near: NDArray[np.bool_], spare: Spared) -> NDArray[np.bool_]:
+    """(B, N) True for states for which their films are spared: resolved ones, or clearly so if nearly resolved."""
     if spare is Spared.NONE:
-        return np.zeros(len(result), np.bool_)
+        return np.zeros(near.shape, np.bool_)
     margin = result[:, kernels.CONVEX if spare is Spared.NOT_CONVEX else kernels.ELLIPTIC]
-    return np.asarray(np.any((status == Status.OK) & (margin < -RULED_OUT), axis=1))
-
-
-_Rough = tuple[NDArray[np.intp], NDArray[np.intp], Array]
+    return np.asarray(((status == Status.OK) & (margin < -RULED_OUT)) | (near & (margin < -RULED_OUT_ON_THE_WAY)))
 
 
 class _Search:
@@ -286,171 +87,124 @@ class _Search:
 
     Attributes
     ----------
-    wanted : (B, N) True where an answer is wanted
+    wanted, loose : (B, N) True where an answer is wanted, and where nobody reads the force
     result, status : (B, rows, N) and (B, N) `Status` codes
-    rough : (film, column, unknowns) of the states to be refined: (K,), (K,), and (K, 2 functions) of the last basis
-    ends : (B,) scaled deflection at which the path was lost with the last basis, nan if it was not
+    shown : (B, N) True where a state shows that the film is spared, whatever its status: its margins can be read
+    film, column, shapes : (K,), (K,) and `Shapes` of the states that are to be refined
+    last : what was solved last
+    walks : where the lost paths stand, and the shapes of all films to begin them from
     """
 
     def __init__(
-        self,
-        request: Request,
-        d: Array,
-        wanted: NDArray[np.bool_],
-        loose: NDArray[np.bool_] | None = None,
+        self, request: Request, d: Array, wanted: NDArray[np.bool_], loose: NDArray[np.bool_] | None = None
     ) -> None:
         self.request, self.d = request, d
-        self.wishes = request.sensitivities, False, True
-        self.result, unknowns = follow(request, d, 0, self.wishes)
+        self.result, trace = follow(request, d, 0, request.sensitivities)
         self.status = self.result[:, kernels.STATUS].astype(np.int8)
-        if loose is not None:
-            self.status[loose & (self.status == Status.UNRESOLVED) & _nearly_resolved(self.result, d)] = Status.OK
-        self.wanted = wanted & ~_ruled_out(self.result, self.status, request.spare)[:, None]
-        self.ends = np.full(len(d), np.nan)
-        self.rough: _Rough = self._nothing(0)
-        if np.any(self.status):
-            films = np.flatnonzero(np.any(self.wanted, axis=1))
-            verdict = self.status[films]
-            self._explain(films, verdict, 0)
-            self.status[films] = verdict
-            film, column = np.nonzero((self.status == Status.UNRESOLVED) & self.wanted)
-            self.rough = film, column, unknowns[film, :, column]
+        self.loose = np.zeros(d.shape, np.bool_) if loose is None else loose
+        near = (self.status == Status.UNRESOLVED) & nearly_resolved(self.result, d)
+        self.shown = _shown(self.result, self.status, near, request.spare)
+        self.wanted = wanted & ~np.any(self.shown, axis=1)[:, None]
+        self.status[near & self.loose] = Status.OK
+        self.film, self.column = np.nonzero((self.status == Status.UNRESOLVED) & self.wanted)
+        ends = Shapes.flat(request.ratio, len(d), 0).ends
+        self.last = Shapes.from_trace(trace[..., -1], ends, 0)
+        self.shapes = Shapes.from_trace(trace[self.film, :, self.column], ends[self.film], 0)
+        self.walks = Walks(request, d, trace)
 
     def improve(self, level: int) -> bool:
-        """One level up: refine the rough states, and follow again the films whose path was lost. False if none is."""
+        """One level up: refine the rough states, and walk on where a path was lost. False if nothing is left to do."""
         if level == 1:
             # The loss of stability is believed when a finer basis confirms it.
-            lost = (self.status == Status.NOT_ELLIPTIC) | (self.status == Status.INDEFINITE)
-            self.status[lost & self.wanted] = Status.ITERATION_LIMIT
-        rough = self._refine(level)
-        doubtful = (self.status == Status.ITERATION_LIMIT) & self.wanted
-        films = np.flatnonzero(np.any(doubtful, axis=1))
-        if not films.size and not rough[0].size:
-            return False
-        parts = zip(rough, self._follow(level, films, doubtful[films]), strict=True)
-        film, column, unknowns = (np.concatenate(v) for v in parts)
-        self.rough = film, column, unknowns
-        return True
+            self.status[_named(self.status) & self.wanted] = Status.ITERATION_LIMIT
+        if self.film.size:
+            self._refine(level)
+        _pass_on(self.status)
+        lost = (self.status == Status.ITERATION_LIMIT) & self.wanted
+        if np.any(lost):
+            self._walk(level, lost)
+        return bool(self.film.size or np.any((self.status == Status.ITERATION_LIMIT) & self.wanted))
 
-    def _refine(self, level: int) -> _Rough:
-        """Each rough state from its own solution, all side by side; returns those that are still rough."""
-        film, column, unknowns = self.rough
-        if not film.size:
-            return self._nothing(level)
-        ratio, d = self.request.ratio, self.d[film, column]
-        start = (_prolongation(ratio, level - 1) @ unknowns.reshape(film.size, -1, 2)).reshape(film.size, -1)
-        result, unknowns = _run(_films(self.request, film), d[None], np.ones(1, np.bool_), start, level, self.wishes)
-        verdict = result[:, kernels.STATUS, 0].astype(np.int8)
+    def _refine(self, level: int) -> None:
+        """Each rough state from its own solution, all side by side, on new elements; those still rough remain."""
+        film, column = self.film, self.column
+        d = self.d[film, column]
+        start, once = self.shapes.placed(d, level), np.ones(1, np.bool_)
+        result, trace = run(films(self.request, film), d[None], once, start, level, self.request.sensitivities)
+        found, trace = result[..., 0], trace[..., 0]
+        verdict, before = self._verdict(found, film, column), self.result[film, :, column]
+        # A rough state that leads to no stable one lay astray, unless it was nearly resolved: the film is walked there.
+        astray = _named(verdict) & ~nearly_resolved(before[..., None], d[:, None])[:, 0]
+        verdict[astray] = Status.ITERATION_LIMIT
+        self.result[film, :, column], self.status[film, column] = found, verdict
         still = verdict == Status.UNRESOLVED
-        # A rough state that leads to no stable one lay astray: its film is followed again.
-        verdict[(verdict != Status.OK) & ~still] = Status.ITERATION_LIMIT
-        self.result[film, :, column], self.status[film, column] = result[..., 0], verdict
-        return film[still], column[still], unknowns[still, :, 0]
+        self.film, self.column = film[still], column[still]
+        self.last = Shapes.from_trace(trace, start.ends, level)
+        self.shapes = self.last.of(still)
 
-    def _follow(self, level: int, films: NDArray[np.intp], doubtful: NDArray[np.bool_]) -> _Rough:
-        """Whole films from the start, for the sake of their doubtful columns; returns those that are rough now."""
-        if not films.size:
-            return self._nothing(level)
-        result, unknowns = follow(_films(self.request, films), self.d[films], level, self.wishes)
-        verdict = result[:, kernels.STATUS].astype(np.int8)
-        self._explain(films, verdict, level)
-        at, column = np.nonzero(doubtful)
-        self.result[films[at], :, column] = result[at, :, column]
-        self.status[films[at], column] = verdict[at, column]
-        at, column = np.nonzero(doubtful & (verdict == Status.UNRESOLVED))
-        return films[at], column, unknowns[at, :, column]
+    def _verdict(self, found: Array, film: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.int8]:
+        """Statuses (K,) of results (K, rows): a rough state is good enough where nobody reads its force."""
+        verdict = found[:, kernels.STATUS].astype(np.int8)
+        enough = (verdict == Status.UNRESOLVED) & self.loose[film, column]
+        verdict[enough & nearly_resolved(found[..., None], self.d[film, column][:, None])[:, 0]] = Status.OK
+        return verdict
 
-    def _nothing(self, level: int) -> _Rough:
-        none = np.empty(0, np.intp)
-        return none, none, np.empty((0, 2 * basis(self.request.ratio, *LEVELS[level]).functions))
+    def _walk(self, level: int, lost: NDArray[np.bool_]) -> None:
+        """On from the last states of the films with ``lost`` (B, N) deflections; rough states that are met join."""
+        met = self.walks.on(lost, level)
+        verdict = self._verdict(met.found, met.film, met.column)
+        self.result[met.film, :, met.column], self.status[met.film, met.column] = met.found, verdict
+        rough, self.last = verdict == Status.UNRESOLVED, met.shapes
+        if np.any(rough):
+            more = met.shapes.of(rough)
+            self.shapes = Shapes.joined([self.shapes, more]) if self.film.size else more
+            self.film, self.column = np.append(self.film, met.film[rough]), np.append(self.column, met.column[rough])
+        row, reason = self.walks.reasons(level)
+        still = lost[row] & (self.status[row] == Status.ITERATION_LIMIT)
+        self.status[row] = np.where(still, reason[:, None], self.status[row])
 
-    def _explain(self, films: NDArray[np.intp], verdict: NDArray[np.int8], level: int) -> None:
-        """Name the reason, in ``verdict`` (K, N) of K films, of paths that end where they did with the basis before."""
-        lost = verdict == Status.ITERATION_LIMIT
-        some = np.flatnonzero(np.any(lost, axis=1))
-        before = self.ends[films[some]]
-        self.ends[films] = np.nan
-        if not some.size:
-            return
-        if self.request.spare is not Spared.NONE and level > 1:
-            # Lost by several bases: such a film is worth no more effort where a prior is about to judge it.
-            verdict[lost] = Status.INDEFINITE
-            return
-        request, d = _films(self.request, films[some]), self.d[films[some]]
-        first, rows = np.argmax(lost[some], axis=1), np.arange(some.size)
-        high = d[rows, first]
-        low = np.where(first > 0, d[rows, np.maximum(first - 1, 0)], high * 0.01)
-        ends, bent, convex, elliptic = _path_end(request, low, high, level)
-        self.ends[films[some]] = ends
-        # Chains that lock end the path by stiffening: that is no loss of stability.
-        same = (np.abs(ends - before) < SAME_END * ends) & np.isinf(extensibility(request))
-        reason = np.where(bent, Status.NOT_ELLIPTIC, Status.INDEFINITE).astype(np.int8)
-        if self.request.spare is not Spared.NONE and level > 0:
-            # What lies beyond is reached, if at all, through states that rule the film out.
-            passed = (convex if self.request.spare is Spared.NOT_CONVEX else elliptic) < -RULED_OUT_ON_THE_WAY
-            same, reason = same | passed, np.where(passed, Status.NOT_ELLIPTIC, reason)
-        for i in np.flatnonzero(same):
-            verdict[some[i], lost[some[i]]] = reason[i]
+
+def _named(status: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """True where the loss of stability is the reason."""
+    return np.asarray((status == Status.NOT_ELLIPTIC) | (status == Status.INDEFINITE))
 
 
 def _pass_on(status: NDArray[np.int8]) -> None:
     """What has no state beyond a loss of stability, in ascending deflection (B, N), is given the first such reason."""
-    named = (status == Status.NOT_ELLIPTIC) | (status == Status.INDEFINITE)
-    films = np.flatnonzero(np.any(named, axis=1))
-    first = status[films, np.argmax(named[films], axis=1)]
-    passed = np.logical_or.accumulate(named[films], axis=1) & (status[films] != Status.OK)
-    status[films] = np.where(passed, first[:, None], status[films])
+    named = _named(status)
+    rows = np.flatnonzero(np.any(named, axis=1))
+    first = status[rows, np.argmax(named[rows], axis=1)]
+    passed = np.logical_or.accumulate(named[rows], axis=1) & (status[rows] != Status.OK)
+    status[rows] = np.where(passed, first[:, None], status[rows])
 
 
-def _path_end(request: Request, low: Array, high: Array, level: int) -> tuple[Array, NDArray[np.bool_], Array, Array]:
-    """Where between the scaled deflections low and high (B,) the path ends, and whether P11 falls to zero there.
-
-    P11 then goes like the root of the distance: over the last sweep it falls by more than half, or is small already.
-    Returned as well: the least margins of convexity and ellipticity of the states met, whether resolved or not.
-    """
-    rows, bent = np.arange(low.size), np.zeros(low.size, np.bool_)
-    margins = np.full((2, low.size), np.inf)
-    for _ in range(2):
-        fine = low[:, None] + (high - low)[:, None] * np.arange(SEARCH) / (SEARCH - 1)
-        result, _ = follow(request, fine, level)
-        found = result[:, kernels.STATUS] != Status.ITERATION_LIMIT
-        last = np.sum(np.logical_and.accumulate(found, axis=1), axis=1) - 1
-        good, at = last >= 0, np.maximum(last, 0)
-        met = np.where(found[:, None], result[:, (kernels.CONVEX, kernels.ELLIPTIC)], np.inf)
-        margins = np.minimum(margins, np.min(met, axis=2).T)
-        p11 = result[rows, kernels.LEAST_P11, at]
-        bent |= good & ((p11 < NEARLY_BENT * _shear_modulus(request)) | (p11 < 0.5 * result[:, kernels.LEAST_P11, 0]))
-        high = np.where(good, fine[rows, np.minimum(last + 1, SEARCH - 1)], high)
-        low = np.where(good, fine[rows, at], low)
-    return low, bent, margins[0], margins[1]
-
-
-def _ascending(d: Array) -> tuple[Array, NDArray[np.intp] | None]:
-    """d (B, N) sorted film by film, and the place (B, N) of each original value; None if they were sorted."""
+def _ascending(d: Array) -> tuple[Array, NDArray[np.intp], NDArray[np.intp] | None]:
+    """d (B, N) sorted film by film, where each value came from (B, N), and where each went; None if none moved."""
     if np.all(d[:, 1:] >= d[:, :-1]):
-        return d, None
+        return d, np.broadcast_to(np.arange(d.shape[1]), d.shape), None
     order = np.argsort(d, axis=1, kind="stable")
-    return np.take_along_axis(d, order, axis=1), np.argsort(order, axis=1)
+    return np.take_along_axis(d, order, axis=1), order, np.argsort(order, axis=1)
 
 
 def _curves(request: Request, search: _Search, back: NDArray[np.intp] | None) -> Curves:
     """Undo the scaling and the sorting."""
-    k, result, status = kernels, search.result, search.status
+    k, result, status, shown = kernels, search.result, search.status, search.shown
     if back is not None:
         result = np.take_along_axis(result, back[:, None], axis=2)
         status = np.take_along_axis(status, back, axis=1)
+        shown = np.take_along_axis(shown, back, axis=1)
     ok, sign = status == Status.OK, np.sign(request.deflection)
     length = request.inner_radius / request.prestretch[:, None]
     note = np.where(result[:, k.LEAST_P2] < 0, Note.WRINKLED, 0) | np.where(result[:, k.SLACK] <= 0, Note.SLACK, 0)
     factor = 2 * np.pi * length
 
-    def row(index: int | slice, scale: Any = 1.0) -> Array:
+    def row(index: int | slice, scale: Any = 1.0, there: NDArray[np.bool_] = ok) -> Array:
         # Where it is not ok anything may stand, infinity too.
         with np.errstate(invalid="ignore", over="ignore"):
-            return np.where(ok if isinstance(index, int) else ok[:, None], result[:, index] * scale, np.nan)
+            return np.where(there if isinstance(index, int) else there[:, None], result[:, index] * scale, np.nan)
 
     sensitivity = None
-    if search.wishes[0]:
+    if request.sensitivities:
         rows = row(slice(k.RESULTS, None), (factor * sign)[:, None])
         sensitivity = np.ascontiguousarray(np.moveaxis(rows, 1, 2))
     return Curves(
@@ -462,7 +216,7 @@ def _curves(request: Request, search: _Search, back: NDArray[np.intp] | None) ->
         sensitivity=sensitivity,
         variation=row(k.VARIATION),
         max_stretch=row(k.STRETCH),
-        ellipticity=row(k.ELLIPTIC),
-        convexity=row(k.CONVEX),
+        ellipticity=row(k.ELLIPTIC, there=ok | shown),
+        convexity=row(k.CONVEX, there=ok | shown),
         energy=row(k.STORED, factor * length),
     )
