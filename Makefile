@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-import study-scale study-seeds study-sbc clean
+.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-import study-scale study-kill study-damage study-seeds study-sbc clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -23,6 +23,8 @@ help:
 	@echo "make study-second  the same on the second generator, once and at the end; SECOND='--count 60' asks for less"
 	@echo "make study-fuzz  500 calls at random, each judged, an hour or so; goes on where it was; FUZZ='--only fit' asks for less"
 	@echo "make study-scale  ten thousand tiny runs in a campaign, some minutes: what it costs beside the work itself"
+	@echo "make study-kill  runs killed at random moments and while they write, some minutes; KILL='--kills 20' asks for less"
+	@echo "make study-damage  every stored file damaged 500 times, an hour or less; DAMAGE='--times 50' asks for less"
 	@echo "make study-import 10 000 damaged exports, what becomes of them, some minutes; IMPORT='--count 1000' asks for less"
 	@echo "make study-seeds 50 seeds for the statistical tests, lanes on and off, hours; goes on where it was; SEEDS='--group quick' asks for less"
 	@echo "make study-sbc  simulation-based calibration of every material, hours; goes on where it was; SBC='--only gent --limit 20' asks for less"
@@ -80,6 +82,12 @@ study-fuzz: $(STAMP)
 
 study-scale: $(STAMP)
 	$(PY) -m tests.studies.scale --table docs/studies/scale.md $(SCALE)
+
+study-kill: $(STAMP)
+	$(PY) -m tests.studies.kill --table docs/studies/kill.md $(KILL)
+
+study-damage: $(STAMP)
+	$(PY) -m tests.studies.damage --table docs/studies/damage.md $(DAMAGE)
 
 study-import: $(STAMP)
 	$(PY) -m tests.studies.imports --table docs/studies/import.md $(IMPORT)

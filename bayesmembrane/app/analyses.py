@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.app.answers import Answer, Asked, asked, kept
+from bayesmembrane.app.answers import Answer, Asked, asked, held, kept
 from bayesmembrane.app.documents import document
 from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.calibration.fingerprint import fingerprint
@@ -31,6 +31,7 @@ from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.loop import Loop, LoopSettings
 from bayesmembrane.diagnosis.loop import loop as run_loop
 from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.ground.interrupts import Stop, never
 from bayesmembrane.ground.jobs import Tell, silent
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components, materials
@@ -57,6 +58,8 @@ class Work:
     ess : effective sample size of posteriors
     tell : is told (label, what is being done for it: a text, or the `Progress` of sampling)
     walk : how `sample` walks, instead of the usual way to ``ess``
+    fork : folder of the run at whose end a new one begins
+    stop : ends the walk of a run after its step, once true
     """
 
     seed: int = 0
@@ -64,6 +67,8 @@ class Work:
     ess: float = 1000.0
     tell: Tell = silent
     walk: Settings | None = None
+    fork: Path | None = None
+    stop: Stop = never
 
     @property
     def solve(self) -> Solve:
@@ -73,9 +78,11 @@ class Work:
 
 def reconstruct(work: Work) -> Answer[Reconstruction]:
     """The measured curve behind the published losses of the paper."""
-    found = run_reconstruct(read_published_table())
     mark = fingerprint(run_reconstruct.__module__, (), (), {}, work.seed)
     what = Asked("reconstruct", "published losses", "", float("nan"), mark)
+    if (stored := held("reconstruction", what, work.out)) is not None:
+        return stored
+    found = run_reconstruct(read_published_table())
     return kept("reconstruction", found, document(found), what, work.out)
 
 
@@ -116,8 +123,8 @@ def sample(
         work.tell(claim.label(), progress)
 
     solve = work.solve
-    how = RunSettings(work.seed, work.out, name, work.ess, settings=work.walk, predictions=False)
-    run = run_sample(measurement, claim, how, progress=tell, solve=solve)
+    how = RunSettings(work.seed, work.out, name, work.ess, settings=work.walk, predictions=False, fork=work.fork)
+    run = run_sample(measurement, claim, how, progress=tell, solve=solve, stop=work.stop)
     rest = rest_of(measurement, whole)
     if run.path is not None:  # of an interrupted run, too: a report shows what there is, and solves nothing
         predictions_of(run, Wanted(rest=rest, breaks=tuple(breaks)) if breaks or rest is not None else None, solve)
@@ -136,12 +143,14 @@ def compare(
     ranges: Mapping[str, Range], claims: Sequence[Hypothesis], work: Work, *, workers: int | None = None
 ) -> Answer[dict[str, Comparison]]:
     """The evidence for each hypothesis on each range; the result is by the names of the ranges."""
-    judging = Judging(work.seed, work.ess, out=work.out, processes=workers)
-    found = compare_ranges(ranges, claims, judging, progress=work.tell)
     parts = [r.measurement for r in ranges.values()]
     wholes = [None if r.whole is None else r.whole.data_hash for r in ranges.values()]
     settings = {"seed": work.seed, "ess": work.ess, "names": list(ranges), "wholes": wholes}
     what = asked("compare", compare_ranges, parts, claims, settings)
+    if (stored := held("comparison", what, work.out)) is not None:
+        return stored
+    judging = Judging(work.seed, work.ess, out=work.out, processes=workers)
+    found = compare_ranges(ranges, claims, judging, progress=work.tell)
     return kept("comparison", found, document(found), what, work.out)
 
 
@@ -150,9 +159,11 @@ def valleys(
 ) -> Answer[Valleys | Beside]:
     """The valleys of the loss over ranges that end at ``ends`` (m), with effects also those without."""
     how = valleys_beside if claim.effects else run_valleys
-    found: Valleys | Beside = how(measurement, claim, ends, rise=rise, seed=work.seed)
     settings = {"seed": work.seed, "ends": list(ends), "rise": rise}
     what = asked("valleys", how, [measurement], [claim], settings)
+    if (stored := held("valleys", what, work.out)) is not None:
+        return stored
+    found: Valleys | Beside = how(measurement, claim, ends, rise=rise, seed=work.seed)
     return kept("valleys", found, document(found), what, work.out)
 
 
@@ -160,9 +171,11 @@ def valleys_with_draws(
     measurements: Sequence[Measurement], claim: Hypothesis, work: Work, draws: Sequence[Array]
 ) -> Answer[Valleys]:
     """`valleys` over measurements of one film, with posterior draws (B, k) of each."""
-    found = valleys_of(measurements, claim, seed=work.seed, draws=draws)
     settings = {"seed": work.seed, "draws": [_mark(d) for d in draws]}
     what = asked("valleys", valleys_of, measurements, [claim], settings)
+    if (stored := held("valleys", what, work.out)) is not None:
+        return stored
+    found = valleys_of(measurements, claim, seed=work.seed, draws=draws)
     return kept("valleys", found, document(found), what, work.out)
 
 
@@ -170,9 +183,11 @@ def diagnose(measurement: Measurement, claim: Hypothesis | Question, work: Work)
     """Whether the hypothesis misses something, and what; a `Question` may leave the energy open."""
     question = claim if isinstance(claim, Question) else Question(claim)
     label = question.hypothesis.label()
-    found = run_diagnose(measurement, question, seed=work.seed, tell=lambda text: work.tell(label, text))
     settings = {"seed": work.seed, "declared": question.declared, "quick": question.quick}
     what = asked("diagnose", run_diagnose, [measurement], [question.hypothesis], settings, library())
+    if (stored := held("diagnosis", what, work.out)) is not None:
+        return stored
+    found = run_diagnose(measurement, question, seed=work.seed, tell=lambda text: work.tell(label, text))
     return kept("diagnosis", found, document(found), what, work.out)
 
 
@@ -188,9 +203,11 @@ def loop(
     how = LoopSettings(work.seed, runs or work.out, work.ess, adapt_noise)
     question = claim if isinstance(claim, Question) else Question(claim)
     label = question.hypothesis.label()
-    found = run_loop(measurement, question, how, tell=lambda text: work.tell(label, text))
     settings = {"seed": work.seed, "ess": work.ess, "adapt_noise": adapt_noise, "declared": question.declared}
     what = asked("loop", run_loop, [measurement], [question.hypothesis], settings, library())
+    if (stored := held("loop", what, work.out)) is not None:
+        return stored
+    found = run_loop(measurement, question, how, tell=lambda text: work.tell(label, text))
     return kept("loop", found, document(found), what, work.out)
 
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from bayesmembrane.calibration.fingerprint import fingerprint
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.ground.stored import store
+from bayesmembrane.ground.errors import BayesmembraneError
+from bayesmembrane.ground.stored import answer, read, store
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 Result = TypeVar("Result")
@@ -83,6 +84,20 @@ def asked(
     found = fingerprint(by.__module__, hypotheses, measurements, options, settings["seed"], also)
     models = "-".join(h.label() for h in hypotheses)
     return Asked(verb, last.specimen.name, models, float(np.max(last.deflection)), found)
+
+
+def held(kind: str, what: Asked, out: str | Path | None) -> Answer[Any] | None:
+    """The answer that `kept` stored when the same was asked; None if there is none, or it cannot be read any more."""
+    if out is None:
+        return None
+    folder = Path(out) / what.name
+    try:
+        document = answer(folder, kind)
+        if document is not None:
+            return Answer(read(folder, kind), {**document, "stored": str(folder)})
+    except BayesmembraneError:
+        return None  # damaged, or made of runs that were sampled anew: it is made again
+    return None
 
 
 def kept(kind: str, result: Result, document: Mapping[str, Any], what: Asked, out: str | Path | None) -> Answer[Result]:

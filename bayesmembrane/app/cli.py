@@ -11,8 +11,9 @@ import typer
 
 from bayesmembrane.app import verbs
 from bayesmembrane.app.options import spread
-from bayesmembrane.app.terminal import INTERRUPTED, note
+from bayesmembrane.app.terminal import INTERRUPTED, note, ready
 from bayesmembrane.ground.errors import BayesmembraneError
+from bayesmembrane.ground.interrupts import raised
 
 # The matrices are small: threads inside BLAS only get into each other's way. Set before NumPy is imported.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -37,8 +38,10 @@ def assembled() -> typer.Typer:
 
 def main() -> None:
     """Run a verb. Exit status: 0 done; 1 wrong data or settings, in one sentence; 2 wrong usage; 130 interrupted."""
+    ready()
     try:
-        assembled()(standalone_mode=True)
+        with raised():  # the signal by which clusters and shutdowns end programs, as Ctrl-C
+            assembled()(standalone_mode=True)
     except BayesmembraneError as error:
         note(str(error))
         sys.exit(1)

@@ -206,6 +206,16 @@ class SamplingOptions(OptionGroup):
     ess: Annotated[float, typer.Option("--ess", help="Wanted effective sample size of the worst parameter.")] = 1000.0
 
 
+@dataclass(frozen=True)
+class ForkOption(OptionGroup):
+    """Where a run begins that does not begin on its own."""
+
+    fork: Annotated[
+        Path | None,
+        typer.Option("--fork", help="Begin a new run at the end of the one in this folder, whatever made that."),
+    ] = None
+
+
 def spread(verb: Callable[..., None]) -> Callable[..., None]:
     """``verb`` with the fields of every group among its arguments as arguments of their own, as Typer wants them."""
     hints = get_type_hints(verb, include_extras=True)

@@ -7,17 +7,19 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.errors import SettingsError, StorageError
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -34,9 +36,39 @@ def _console(stderr: bool) -> Console:
     return Console(stderr=stderr, highlight=False, soft_wrap=True)
 
 
+def ready() -> None:
+    """Let signs that the terminal cannot show, and bytes of file names that are no text, be written in other words."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+@contextmanager
+def _written() -> Iterator[None]:
+    """Turn a stdout that cannot be written to into a sentence; raises `StorageError`."""
+    try:
+        if sys.stdout is None:
+            raise OSError("it is closed")
+        yield
+        sys.stdout.flush()
+    except OSError as error:
+        _forget_stdout()
+        raise StorageError(
+            f"the answer cannot be printed ({error.strerror or error})", "stdout", "what was stored is stored"
+        ) from None
+
+
+def _forget_stdout() -> None:
+    """Have nothing tried again when the program ends."""
+    if sys.stdout is not None:
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def say(text: str) -> None:
-    """A sentence on stdout."""
-    _console(False).print(text)
+    """A sentence on stdout, as it is."""
+    with _written():
+        _console(False).print(text, markup=False)
 
 
 def note(text: str) -> None:
@@ -49,7 +81,8 @@ def answer(document: dict[str, Any], as_json: bool, show: Callable[[], None]) ->
     from bayesmembrane.ground.plain import plain
 
     if as_json:
-        sys.stdout.write(json.dumps(plain(document), allow_nan=False) + "\n")
+        with _written():
+            sys.stdout.write(json.dumps(plain(document), allow_nan=False) + "\n")
     else:
         show()
 
@@ -57,13 +90,16 @@ def answer(document: dict[str, Any], as_json: bool, show: Callable[[], None]) ->
 def table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print a table on stdout; the first column to the left, numbers to the right."""
     from rich.table import Table
+    from rich.text import Text
 
-    grid = Table(title=title, title_justify="left")
+    # As texts: brackets in a name are no markup.
+    grid = Table(title=Text(title, style="italic"), title_justify="left")
     for i, name in enumerate(header):
-        grid.add_column(name, justify="left" if i == 0 else "right", overflow="fold")
+        grid.add_column(Text(name), justify="left" if i == 0 else "right", overflow="fold")
     for row in rows:
-        grid.add_row(*row)
-    _console(False).print(grid)
+        grid.add_row(*map(Text, row))
+    with _written():
+        _console(False).print(grid)
 
 
 # ---- what is typed ---------------------------------------------------------------------------------------------------
@@ -98,8 +134,10 @@ def command() -> str:
 @contextmanager
 def status(text: str) -> Iterator[Callable[[str], None]]:
     """A line on stderr that says what is being done; give it another text by calling what this yields."""
-    with _console(True).status(text) as shown:
-        yield shown.update
+    from rich.text import Text
+
+    with _console(True).status(Text(text)) as shown:
+        yield lambda now: shown.update(Text(now))
 
 
 @contextmanager
@@ -107,7 +145,11 @@ def lines() -> Iterator[Callable[[str, str], None]]:
     """A line on stderr for each label, with what is being done for it and for how long."""
     from rich.progress import Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TextColumn("{task.fields[text]}"))
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        TextColumn("{task.fields[text]}", markup=False),
+    )
     with Progress(*columns, TimeElapsedColumn(), console=_console(True)) as shown:
         tasks: dict[str, TaskID] = {}
 
@@ -125,7 +167,11 @@ def bars() -> Iterator[Callable[[str, Progress | str], None]]:
     from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
 
-    columns = (TextColumn("{task.description:<22}"), BarColumn(), TextColumn("{task.fields[text]}"))
+    columns = (
+        TextColumn("{task.description:<22}", markup=False),
+        BarColumn(),
+        TextColumn("{task.fields[text]}", markup=False),
+    )
     with Bars(*columns, TimeElapsedColumn(), console=_console(True)) as shown:
         tasks: dict[str, TaskID] = {}
 

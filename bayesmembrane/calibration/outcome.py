@@ -10,7 +10,8 @@ from bayesmembrane.calibration.checks import alike
 from bayesmembrane.calibration.crosscheck import crosscheck
 from bayesmembrane.calibration.goodness import dominates, goodness
 from bayesmembrane.calibration.layout import inference_data
-from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.posterior import FAILURES, Posterior
+from bayesmembrane.calibration.quality import NOTEWORTHY
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.walk import Sampled
 from bayesmembrane.data.measurement import Measurement
@@ -113,6 +114,18 @@ def _answer(hypothesis: Hypothesis, data: Any, sampled: Sampled, wanted: float) 
         "evaluations": sampled.chains.evaluations,
         "seconds": sampled.chains.seconds,
         "tally": dict(sampled.chains.counts),
+        "failures": _failures(hypothesis, sampled.chains),
+    }
+
+
+def _failures(hypothesis: Hypothesis, chains: Chains) -> dict[str, Any]:
+    """What part of all draws could not be solved, whether that is worth a word, and an example of every outcome."""
+    failed = sum(chains.counts.get(o.label, 0) for o in FAILURES)
+    examples = getattr(chains.counts, "examples", {})
+    return {
+        "share": failed / max(1, chains.evaluations),
+        "noteworthy": failed > NOTEWORTHY * chains.evaluations,
+        "examples": {o: dict(zip(hypothesis.names, x, strict=True)) for o, x in examples.items()},
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -168,10 +169,22 @@ def _outcome(status: NDArray[np.int8], inside: NDArray[np.bool_]) -> NDArray[np.
     return np.where(np.any(physical, axis=1), first, outcome).astype(np.int8)
 
 
-def tally(outcome: NDArray[np.int8]) -> Counter[str]:
-    """How many draws met each outcome, by label."""
-    counts = np.bincount(outcome, minlength=len(Outcome))
-    return Counter({o.label: int(counts[o]) for o in Outcome if counts[o]})
+class Outcomes(Counter[str]):
+    """How many draws met each outcome, by label; ``examples`` has the first (k,) coordinates that met one but `OK`."""
+
+    def __init__(self, counts: Mapping[str, int] | None = None) -> None:
+        super().__init__(counts or {})
+        self.examples: dict[str, tuple[float, ...]] = dict(getattr(counts, "examples", {}))
+
+    def note(self, x: Array, outcome: NDArray[np.int8]) -> None:
+        """Count draws x (B, k) with their `Outcome` codes (B,)."""
+        counts = np.bincount(outcome, minlength=len(Outcome))
+        for o in Outcome:
+            if not counts[o]:
+                continue
+            self[o.label] += int(counts[o])
+            if o != Outcome.OK and o.label not in self.examples:
+                self.examples[o.label] = tuple(map(float, x[int(np.argmax(outcome == o))]))
 
 
 def enough_points(hypothesis: Hypothesis, measurement: Measurement) -> None:

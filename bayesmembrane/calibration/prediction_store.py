@@ -12,10 +12,11 @@ import numpy as np
 import xarray
 
 from bayesmembrane.calibration.predictions import Predictions, Wanted
-from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.files import write_whole
+from bayesmembrane.ground.netcdf import packed
+from bayesmembrane.ground.sealed import checked, damaged, sealed
 
-FILE = "predictions.nc"
+FILE, AGAIN = "predictions.nc", "remove the file and report again"
 
 # Dimensions of the stored arrays, so that other programs read them with names.
 _DIMS = {
@@ -40,7 +41,8 @@ def write_predictions(found: Predictions, folder: Path, draws_of: str, wanted: W
         {name: (dims.split(), np.asarray(values[name])) for name, dims in _DIMS.items()},
         attrs={"values": json.dumps(single), "made": json.dumps(made)},
     )
-    write_whole(folder / FILE, lambda part: dataset.to_netcdf(part, engine="h5netcdf"), "the predictions")
+    content, _ = sealed(packed({"/": dataset}))
+    write_whole(folder / FILE, lambda part: part.write_bytes(content), "the predictions")
 
 
 def read_predictions(folder: Path, draws_of: str, wanted: Wanted | None = None) -> Predictions | None:
@@ -51,6 +53,7 @@ def read_predictions(folder: Path, draws_of: str, wanted: Wanted | None = None) 
     path = folder / FILE
     if not path.is_file():
         return None
+    checked(path, "the predictions", AGAIN)
     try:
         dataset = xarray.load_dataset(path, engine="h5netcdf")
         made: Mapping[str, Any] = json.loads(dataset.attrs["made"])
@@ -61,11 +64,8 @@ def read_predictions(folder: Path, draws_of: str, wanted: Wanted | None = None) 
         for name in ("reasons", "specimens"):
             values[name] = tuple(values[name])
         return Predictions(**values)
-    except (OSError, KeyError, ValueError, TypeError) as error:
-        reason = type(error).__name__
-        raise StorageError(
-            f"the predictions are damaged ({reason})", str(path), "remove the file and report again"
-        ) from None
+    except (OSError, KeyError, ValueError, TypeError, AttributeError, RuntimeError) as error:
+        raise damaged(path, "the predictions", type(error).__name__, AGAIN) from None
 
 
 def _plain(wanted: Wanted) -> dict[str, Any]:

@@ -1,14 +1,17 @@
 """A run: a posterior sampled, judged and stored under ``chains/<name>/``, and read back.
 
 run.toml         what was asked: data, hypothesis, settings, seed, versions, fingerprint
+segments/        the whole walk, written while it is made: what is needed to go on as if it had never stopped
 posterior.nc     draws and what belongs to them, as arviz InferenceData (`calibration.layout`)
 status.json      what came out in numbers, written last
 predictions.nc   what the draws predict, made for every finished run
-chains.npz       only where a run was interrupted: everything needed to go on as if it had not been
+
+However a run ends, the next call with the same folder goes on after its last segment, and finishes it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,27 +25,40 @@ from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.prediction_store import read_predictions, write_predictions
 from bayesmembrane.calibration.predictions import Predictions, Wanted, predict_draws
 from bayesmembrane.calibration.quality import Quality, quality_of
-from bayesmembrane.calibration.sampling.chains import read_chains
-from bayesmembrane.calibration.sampling.walk import Callback, Settings, run_ensembles
+from bayesmembrane.calibration.resume import Origin, check_same, ends, origin
+from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.segments import Segments
+from bayesmembrane.calibration.sampling.walk import (
+    Beside,
+    Callback,
+    Sampled,
+    Settings,
+    begun,
+    run_ensembles,
+    walkers_of,
+)
 from bayesmembrane.calibration.store import (
     ASKED,
-    CHAINS,
     STATUS,
-    claim,
+    claimed,
     describe,
-    is_finished,
     read_run,
     run_name,
+    serves,
+    shorter,
     write_run,
 )
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.interrupts import Stop, never
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.cache import CachedSolver, Tally
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis, from_settings
 from bayesmembrane.physics.mechanics import api
+
+_FAULTS = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError, OSError, RuntimeError)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -79,9 +95,26 @@ class Run(Showable):
         """True if the run was stopped from outside; the same call goes on with it."""
         return bool(self.status["status"] == "interrupted")
 
+    @property
+    def finished(self) -> bool:
+        """True if it came to its own end: enough draws, or the limit of steps."""
+        return not self.interrupted
+
     def draws(self) -> Array:
         """Coordinates of all draws, all ensembles together, shape (B, k)."""
         return np.stack([self.data.posterior[n].values.ravel() for n in self.hypothesis.names], axis=1)
+
+    def walk(self, every: int | None = None) -> Iterator[Array]:
+        """The walk after burn-in, (E, n, walkers, k) at a time: every ``every``-th step, None for the largest tau.
+
+        One segment is held at a time, so that a chain of any length can be looked at. Raises `StorageError` if the walk
+        is not stored, or damaged.
+        """
+        if self.path is None or not Segments(self.path).paths:
+            raise StorageError("the walk is not stored", self.name, "sample again with out=")
+        taus = [tau for tau in self.status["tau"].values() if tau is not None]
+        every = every or max(1, int(np.ceil(max(taus, default=1.0))))
+        return Segments(self.path).thinned(every, int(self.status["burn"]))
 
     def curves(self) -> Array:
         """Force curves of all draws without noise, shape (B, N), N."""
@@ -130,6 +163,7 @@ class RunSettings:
     settings : how to walk, instead of the usual way to ``ess``
     predictions : make them at once; else `predictions_of` does when they are asked for
     rest : points that were left out, to be predicted as well
+    fork : folder of another run, at whose end this one begins, whatever made that; None begins at starts of its own
     """
 
     seed: int = 0
@@ -139,6 +173,7 @@ class RunSettings:
     settings: Settings | None = None
     predictions: bool = True
     rest: Measurement | None = None
+    fork: str | Path | None = None
 
     @property
     def sampling(self) -> Settings:
@@ -153,42 +188,101 @@ def sample(
     *,
     progress: Callback | None = None,
     solve: Solve = api.solve,
+    stop: Stop = never,
 ) -> Run:
     """Sample p(parameters | measurement) until every coordinate is worth enough independent draws, and store it.
 
-    A finished run with the same fingerprint is read back, an interrupted one continued. Ctrl-C stores what is there,
-    with the status "interrupted". A run that is stored and finished gets its predictions.
+    What lies in the folder decides what is done: a finished run of the same question is read back; one that was
+    stopped or killed goes on after its last complete segment, and ends with the same draws as if it had not been; a
+    finished one of fewer draws goes on to more. SIGINT, SIGTERM, or ``stop()`` being true after a step end the walk
+    there: everything is stored, and the run that is returned is ``interrupted`` and not ``finished``. A run that is
+    stored and finished gets its predictions.
 
-    Raises `SettingsError` for hypotheses that the data cannot reach, `StorageError` if the folder cannot be written
-    or belongs to something else.
+    Raises `SettingsError` for hypotheses that the data cannot reach, `StorageError` if the folder cannot be written,
+    is worked on by another process, belongs to something else, or holds a walk that would not go on alike.
     """
     how = how or RunSettings()
-    settings, seed = how.sampling, how.seed
-    asked = describe(measurement, hypothesis, settings, seed)
+    start = None if how.fork is None else origin(how.fork, hypothesis)
+    asked = describe(measurement, hypothesis, how.sampling, how.seed, None if start is None else start.described)
+    work = _Work(how, asked, Posterior(hypothesis, measurement, solve), start, progress, stop)
     name = how.name or run_name(measurement, hypothesis, asked)
-    folder = None if how.out is None else claim(Path(how.out) / name, asked)
-    if folder is not None and is_finished(folder):
+    folder = None if how.out is None else Path(how.out) / name
+    if folder is None:
+        run = work.done(name, None)
+    elif serves(folder, asked):
         run = load_run(folder)
     else:
-        posterior, counted = Posterior(hypothesis, measurement, solve), _tally(solve)
-        before = None if folder is None else read_chains(folder / CHAINS)
-        sampled = run_ensembles(posterior, settings, seed, progress, before)
-        data, status = outcome(posterior, sampled, settings.ess, seed)
-        if counted is not None and (now := _tally(solve)) is not None:
-            status["cache"] = now.since(counted).summary()
-        run = Run(name, folder, asked, status, data)
-        if folder is not None:
-            write_run(folder, asked, data, status, sampled.chains if run.interrupted else None)
-    if how.predictions and folder is not None and not run.interrupted:
+        with claimed(folder, asked) as segments:
+            run = work.done(name, segments)
+    if how.predictions and folder is not None and run.finished:
         predictions_of(run, None if how.rest is None else Wanted(rest=how.rest), solve)
     return run
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """One run while it is made; ``origin`` is the run at whose end it begins, if that is another."""
+
+    how: RunSettings
+    asked: dict[str, Any]
+    posterior: Posterior
+    origin: Origin | None
+    progress: Callback | None
+    stop: Stop
+
+    def done(self, name: str, segments: Segments | None) -> Run:
+        """The run, with what was walked already in ``segments``, and stored there (None: nowhere)."""
+        counted = _tally(self.posterior.solve)
+        sampled = self._walked(segments)
+        data, status = outcome(self.posterior, sampled, self.how.sampling.ess, self.how.seed)
+        if counted is not None and (now := _tally(self.posterior.solve)) is not None:
+            status["cache"] = now.since(counted).summary()
+        if segments is None:
+            return Run(name, None, self.asked, status, data)
+        write_run(segments.run, data, status)
+        return Run(name, segments.run, self.asked, status, data)
+
+    def _walked(self, segments: Segments | None) -> Sampled:
+        settings, seed = self.how.sampling, self.how.seed
+        if segments is None:
+            begin, beside = self._at_the_end_of_another(), Beside(stop=self.stop)
+        else:
+            begin, beside = self._continued(segments), Beside(segments.write, self.stop)
+        return run_ensembles(self.posterior, settings, seed, self.progress, begin, beside)
+
+    def _continued(self, segments: Segments) -> Chains | None:
+        """The walk to go on with: what lies there, or a shorter one that lies beside it, or the end of another."""
+        stored = segments.read()
+        if stored is not None:
+            check_same(self.posterior, stored, segments.run)
+            return stored
+        beside = None if self.how.name else shorter(segments.run, self.asked)
+        begin = self._at_the_end_of_another() if beside is None else Segments(beside).read()
+        if begin is not None:
+            check_same(self.posterior, begin, segments.run if beside is None else beside)
+            segments.write(begin)
+        return begin
+
+    def _at_the_end_of_another(self) -> Chains | None:
+        if self.origin is None:
+            return None
+        settings, seed = self.how.sampling, self.how.seed
+        wanted = settings.ensembles, walkers_of(self.posterior, settings)
+        return begun(self.posterior, ends(self.posterior, self.origin.chains, wanted, seed), seed)
 
 
 def load_run(path: str | Path) -> Run:
     """The run stored in the folder ``path``; raises `StorageError` if there is none, or it is damaged."""
     path = Path(path)
-    settings, status, data = read_run(path)
-    return Run(path.name, path, settings, status, data)
+    run = Run(path.name, path, *read_run(path))
+    try:
+        # What an earlier version or another hand wrote is looked at before anybody relies on it.
+        run.quality, run.draws(), run.measurement, run.draws_name
+    except _FAULTS as error:
+        raise StorageError(
+            f"another version wrote the run ({type(error).__name__}: {error})", str(path), "sample again"
+        ) from None
+    return run
 
 
 def predictions_of(run: Run, wanted: Wanted | None = None, solve: Solve = api.solve) -> Predictions:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 
 from bayesmembrane.calibration.descent import descend
 from bayesmembrane.calibration.objective import Objective, separated
-from bayesmembrane.calibration.posterior import Posterior, tally
+from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.numbers import bisected
@@ -23,7 +21,7 @@ SPARE = 1.5  # effective number of candidates for each walker
 
 
 def starting_points(
-    posterior: Posterior, rng: np.random.Generator, ensembles: int, walkers: int, counts: Counter[str]
+    posterior: Posterior, rng: np.random.Generator, ensembles: int, walkers: int, counts: Outcomes
 ) -> Array:
     """Starting points (E, W, k), all possible and all different, drawn without replacement from p(x | y)^b.
 
@@ -58,9 +56,9 @@ def starting_points(
     return np.asarray(x[rng.permutation(chosen)].reshape(ensembles, walkers, -1))
 
 
-def _evaluate(posterior: Posterior, x: Array, counts: Counter[str]) -> Array:
+def _evaluate(posterior: Posterior, x: Array, counts: Outcomes) -> Array:
     e = posterior.evaluate(x)
-    counts.update(tally(e.outcome))
+    counts.note(x, e.outcome)
     return e.log_posterior
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
@@ -83,7 +82,7 @@ def by_convexity(
     free = replace(posterior, hypothesis=replace(posterior.hypothesis, convexity=FREE))
     first = draws[rng.choice(len(draws), min(KNOWN, len(draws)), replace=False)]
     try:
-        starts = starting_points(free, rng, 2, STARTS, Counter()).reshape(-1, free.size)
+        starts = starting_points(free, rng, 2, STARTS, Outcomes()).reshape(-1, free.size)
     except SettingsError:
         starts = first[:0]
     target = _Target(free, posterior.hypothesis.convexity if WITHIN in masses else None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesmembrane.calibration.fingerprint import code_of
-from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.predictions import Wanted, rest_of
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.run import Run, RunSettings, load_run, predictions_of, sample, stored_predictions
@@ -161,7 +160,7 @@ def _no_mass(hypothesis: Hypothesis) -> str:
 def _nested(posterior: Posterior, draws: Array, seed: int, tell: Callable[[str], None]) -> EvidenceEstimate:
     """Nested sampling that begins around the draws, and around every valley that a descent from prior draws finds."""
     rng = np.random.default_rng([seed, 7])
-    starts = starting_points(posterior, rng, 2, STARTS, Counter()).reshape(-1, posterior.size)
+    starts = starting_points(posterior, rng, 2, STARTS, Outcomes()).reshape(-1, posterior.size)
     tolerance = NESTED_SD if posterior.size <= FEW else NESTED_SD_MANY
     return nested(PosteriorTarget(posterior), seed, tolerance, tell, (draws, starts))
 

@@ -6,14 +6,13 @@ bridge, nested, again, loo, widths, range and modes, each with the key of what i
 from __future__ import annotations
 
 import hashlib
-import json
-import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from bayesmembrane.calibration.store import ASKED, STATUS, claim, is_finished
+from bayesmembrane.calibration.store import ASKED, STATUS, is_finished, read_asked
 from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.sealed import read_json
 from bayesmembrane.ground.stored import answer, read, store
 
 FOLDER = "comparison"
@@ -22,24 +21,23 @@ Part = TypeVar("Part")
 
 
 def run_folder(out: Path, name: str, asked: dict[str, Any]) -> Path:
-    """The folder in ``out`` of the run that was ``asked`` for: one that serves, or a new one called ``name``."""
+    """The folder in ``out`` of the run that was ``asked`` for: one that serves, or else the one called ``name``."""
     for path in sorted(out.glob(f"*/{ASKED}")):
         if serves(path.parent, asked):
             return path.parent
-    return claim(out / name, asked)
+    return out / name
 
 
 def serves(folder: Path, asked: Mapping[str, Any]) -> bool:
     """Whether a folder holds a finished run with the same data, hypothesis, seed and code, and no fewer draws."""
     try:
-        held = tomllib.loads((folder / ASKED).read_text(encoding="utf-8"))
+        held = read_asked(folder)
         same = all(held[part] == asked[part] for part in ("seed", "hypothesis", "code"))
         same = same and held["data"]["sha256"] == asked["data"]["sha256"]
         if not same or not is_finished(folder):
             return False
-        status = json.loads((folder / STATUS).read_text(encoding="utf-8"))
-        return bool(status["ess_bulk"] >= asked["sampling"]["ess"])
-    except (OSError, ValueError, KeyError):
+        return bool(read_json(folder / STATUS, STATUS)["ess_bulk"] >= asked["sampling"]["ess"])
+    except (StorageError, KeyError, TypeError):
         return False
 
 

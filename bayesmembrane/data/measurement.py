@@ -15,16 +15,21 @@ from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.motion import Motion, first_loading, holds
 from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.text import file_name, showable
 
 
 @dataclass(frozen=True)
 class Specimen:
-    """The film: its name and its thickness at rest in m; raises `DataError` unless that is positive."""
+    """The film: its name and its thickness at rest in m; raises `DataError` unless that is positive.
+
+    What cannot be shown of a name is replaced by a sign.
+    """
 
     name: str
     thickness: float
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "name", showable(self.name))
         if not (math.isfinite(self.thickness) and self.thickness > 0):
             raise DataError(
                 f"the thickness must be positive, and {1e6 * self.thickness:g} um is not", f'specimen "{self.name}"'
@@ -40,6 +45,12 @@ class Provenance:
     covariance: str = ""
     origin: str = ""
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("curve", "specimen", "covariance"):
+            object.__setattr__(self, name, file_name(getattr(self, name)))
+        object.__setattr__(self, "origin", showable(self.origin))
+        object.__setattr__(self, "notes", tuple(map(showable, self.notes)))
 
 
 @dataclass(frozen=True, eq=False)

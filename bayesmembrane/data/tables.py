@@ -19,13 +19,14 @@ _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d{1,4})?", re.ASCII)
 _NOT_FINITE = {"nan", "na", "n/a", "inf", "+inf", "-inf", "infinity", "-infinity", "null", "none"}
 _LARGEST = 1e15
 _IMPORT = "use `bayesmembrane import`"
+MOST_BYTES = 2**28
 _DELIMITERS = {";": "semicolons", "\t": "tabs"}
 
 
 def read_text(path: Path) -> str:
     """The text of a UTF-8 file, whatever ends its lines; raises `DataError` if there is none, or it is not text."""
     try:
-        data = path.read_bytes()
+        data = read_bytes(path)
     except FileNotFoundError:
         raise DataError("there is no such file", str(path), "check the path") from None
     except IsADirectoryError:
@@ -34,6 +35,17 @@ def read_text(path: Path) -> str:
         reason = getattr(error, "strerror", None) or error
         raise DataError(f"the file cannot be read ({reason})", repr(str(path))[1:-1]) from None
     return decode(data, str(path))
+
+
+def read_bytes(path: Path) -> bytes:
+    """All of a file; raises OSError, and `DataError` for one that is larger than any measurement, or has no end."""
+    with path.open("rb") as file:
+        data = file.read(MOST_BYTES + 1)
+    if len(data) > MOST_BYTES:
+        raise DataError(
+            f"the file is larger than {MOST_BYTES // 2**20} MiB", str(path), "name a file that holds one measurement"
+        )
+    return data
 
 
 def decode(data: bytes, file: str) -> str:

@@ -11,6 +11,8 @@ from typing import Any
 
 from bayesmembrane.ground.errors import StorageError
 
+REMEDY = "free some space, make the folder writable, or name another one"
+
 
 def write_whole(path: Path, writer: Callable[[Path], Any], what: str = "the file") -> Path:
     """Let ``writer`` fill a temporary file beside ``path``; sync it, rename it over ``path``, sync the folder.
@@ -22,7 +24,7 @@ def write_whole(path: Path, writer: Callable[[Path], Any], what: str = "the file
     """
     path = Path(path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
         os.close(handle)
         part = Path(name)
@@ -35,17 +37,40 @@ def write_whole(path: Path, writer: Callable[[Path], Any], what: str = "the file
         finally:
             part.unlink(missing_ok=True)
     except OSError as error:
-        raise StorageError(
-            f"{what} cannot be written ({error.strerror or error})",
-            where=str(path),
-            remedy="free some space, make the folder writable, or name another one",
-        ) from None
+        raise unwritable(what, path, error) from None
     return path
 
 
 def write_text(path: Path, text: str, what: str = "the file") -> Path:
     """`write_whole` of a text in UTF-8, its lines ending alike on every machine."""
     return write_whole(path, lambda part: part.write_text(text, encoding="utf-8", newline="\n"), what)
+
+
+def make_folder(path: Path) -> Path:
+    """Make a folder and those above it, each synced into the one that holds it; returns it. Raises OSError.
+
+    A new folder whose entry is not on the disk takes all that is synced inside it along when the power goes.
+    """
+    path = Path(path)
+    if not path.is_dir():
+        make_folder(path.parent)
+        path.mkdir(exist_ok=True)
+        _sync(path.parent)
+    return path
+
+
+def remove_parts(folder: Path, name: str) -> None:
+    """Remove what a process that was killed left of files called ``name`` (a pattern) while it wrote them.
+
+    Only for who knows that nobody else is writing there.
+    """
+    for part in Path(folder).glob(f".{name}.????????"):
+        part.unlink(missing_ok=True)
+
+
+def unwritable(what: str, path: Path, error: OSError) -> StorageError:
+    """The error that says ``what`` cannot be written, where, why, and what to do."""
+    return StorageError(f"{what} cannot be written ({error.strerror or error})", str(path), REMEDY)
 
 
 def _sync(path: Path) -> None:

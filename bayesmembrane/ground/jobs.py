@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing.managers import SyncManager
 from queue import Empty
 from threading import Thread
 from typing import Any, Protocol, TypeVar
@@ -37,21 +39,27 @@ def workers(tell: Tell = silent, count: int | None = None) -> Iterator[Submit]:
     """Something that takes work, in ``count`` processes (None: one for each core); 1 works at once, in this one.
 
     What the work tells arrives at ``tell``, in a thread of this process. Any exception in the body, Ctrl-C among them,
-    cancels what has not begun and waits for what has: at the terminal the processes are interrupted, too, and store
-    what they have. Scripts that use more than one process need the usual ``if __name__ == "__main__"``.
+    cancels what has not begun and asks what has to end: KeyboardInterrupt is raised in it, or deferred where it stores
+    what it has (`interrupts.deferred`). Workers end with this process, even if it is killed. Scripts that use more than
+    one process need the usual ``if __name__ == "__main__"``.
     """
     count = cores() if count is None else count
     if count == 1:
         yield lambda work, *given: _at_once(work, given, tell)
         return
     context = multiprocessing.get_context("spawn")
-    with context.Manager() as manager, ProcessPoolExecutor(count, mp_context=context) as pool:
+    manager = SyncManager(ctx=context)
+    manager.start(_follow_parent)
+    others = set(multiprocessing.active_children())
+    with manager, ProcessPoolExecutor(count, mp_context=context, initializer=_prepare) as pool:
         queue, stop = manager.Queue(), list[bool]()
         listener = Thread(target=_listen, args=(queue, tell, stop), daemon=True)
         listener.start()
         try:
             yield lambda work, *given: pool.submit(_in_worker, work, given, queue)
         except BaseException:
+            for worker in set(multiprocessing.active_children()) - others:
+                worker.terminate()
             pool.shutdown(wait=True, cancel_futures=True)
             raise
         finally:
@@ -65,8 +73,48 @@ def _at_once(work: Callable[..., Result], given: tuple[Any, ...], tell: Tell) ->
     return done
 
 
+class _Worker:
+    """This process, if it is a worker: whether it is at something, and whether it was asked to end."""
+
+    busy, ended = False, False
+
+
 def _in_worker(work: Callable[..., Result], given: tuple[Any, ...], queue: Any) -> Result:
-    return work(*given, lambda label, message: queue.put((label, message)))
+    if _Worker.ended:  # the pool hands out one piece of work more than there are workers
+        raise KeyboardInterrupt
+    _Worker.busy = True
+    try:
+        return work(*given, lambda label, message: queue.put((label, message)))
+    except KeyboardInterrupt:
+        _Worker.ended = True
+        raise
+    finally:
+        _Worker.busy = False
+
+
+def _prepare() -> None:
+    """Leave Ctrl-C to the parent, which tells its workers once; and end when it ends."""
+
+    def end(number: int, frame: Any) -> None:
+        _Worker.ended = True
+        if _Worker.busy:
+            raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, end)
+    _follow_parent()
+
+
+def _follow_parent() -> None:
+    """End this process with the one that started it, however that ends: nobody waits for what it does any more."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        Thread(target=_end_after, args=(parent,), daemon=True).start()
+
+
+def _end_after(parent: Any) -> None:
+    parent.join()
+    os._exit(1)
 
 
 def _listen(queue: Any, tell: Tell, stop: list[bool]) -> None:

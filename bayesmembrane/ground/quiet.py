@@ -2,18 +2,29 @@
 
 Once a day its import warns of a coming rewrite, which is no user's concern: that warning alone is kept silent, and the
 user's own filters stay as they are. It notes the day in a file; of two processes that do so at the same moment one
-finds its file gone, and its import fails: by then the day is noted, and a second try passes.
+finds its file gone, and its import fails: by then the day is noted, and a second try passes. Where it cannot write at
+all, as in a home that is closed or full, it notes the day in a folder that is removed again.
 """
 
 from __future__ import annotations
 
+import os
+import tempfile
 import warnings
+from unittest.mock import patch
 
 with warnings.catch_warnings():
     warnings.filterwarnings("ignore", r"\s*ArviZ is undergoing a major refactor", FutureWarning)
     try:
         import arviz
-    except FileNotFoundError:
-        import arviz
+    except OSError:
+        try:
+            import arviz
+        except OSError:
+            with (
+                tempfile.TemporaryDirectory() as place,
+                patch.dict(os.environ, {"HOME": place, "XDG_CACHE_HOME": place, "LOCALAPPDATA": place}),
+            ):
+                import arviz
 
 __all__ = ["arviz"]

@@ -109,8 +109,12 @@ class CachedSolver:
         return curves
 
     def _solve(self, asked: Request, film: int, gd: Array, key: bytes) -> Entry:
-        one = asked.of(slice(film, film + 1))
-        entry = _scaled(api.solve(one), one, float(gd[film]))
+        one, unit = asked.of(slice(film, film + 1)), float(gd[film])
+        if len(asked.material.field_names()) == 1:
+            # Such films are all one: solved at the modulus one, it does not tell who asked first, and runs that share a
+            # folder answer alike, whichever of them came first. Others repeat only as they were.
+            one, unit = replace(one, parameters=_over_modulus(one, gd[film : film + 1])), 1.0
+        entry = _scaled(api.solve(one), one, unit)
         self._keep(key, entry)
         self._write(key, entry)
         return entry
@@ -155,14 +159,19 @@ _FIELDS = {f.name for f in fields(Curves)} - {"deflection", "sensitivity"}
 
 def _keys(asked: Request, gd: Array) -> list[bytes]:
     """One key per film: a header, then the scaled numbers rounded to 40 bits."""
-    scales = np.asarray(asked.material.scales) == 1
-    scaled = np.where(scales, asked.parameters / gd[:, None], asked.parameters)
+    scaled = _over_modulus(asked, gd)
     ratio = np.full((gd.size, 1), asked.ratio)
     numbers = np.hstack([ratio, asked.prestretch[:, None], scaled, asked.deflection / asked.inner_radius])
     mantissa, exponent = np.frexp(numbers)
     numbers = np.ascontiguousarray(np.ldexp(np.round(mantissa * 2.0**40), exponent - 40) + 0.0)
     header = f"{_source(asked.material)} {asked.solver} {asked.sensitivities} ".encode()
     return [header + row.tobytes() for row in numbers]
+
+
+def _over_modulus(asked: Request, gd: Array) -> Array:
+    """(B, n) parameters over G d, those that are pure numbers as they are."""
+    scales = np.asarray(asked.material.scales) == 1
+    return np.where(scales, asked.parameters / gd[:, None], asked.parameters)
 
 
 @cache

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from bayesmembrane.calibration.posterior import Outcome, Posterior, tally
+from bayesmembrane.calibration.posterior import Outcome, Outcomes, Posterior
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -46,7 +46,10 @@ def test_what_cannot_be_has_a_reason(film) -> None:  # type: ignore[no-untyped-d
     assert bent.log_prior[0] == -np.inf
     free = Posterior(hypothesis("mooney_rivlin", convexity="none"), curve).evaluate(films)
     assert np.all(np.isfinite(free.log_posterior))
-    assert tally(bent.outcome) == {"not convex": 1, "ok": 1}
+    counted = Outcomes({"ok": 2})
+    counted.note(films, bent.outcome)
+    assert counted == {"not convex": 1, "ok": 3}
+    assert counted.examples == {"not convex": tuple(films[0])}
 
 
 def test_a_numerical_failure_is_counted_and_not_taken_for_physics(film) -> None:  # type: ignore[no-untyped-def]

@@ -53,3 +53,12 @@ def test_a_full_disk_is_a_sentence(tmp_path, monkeypatch):
         write_text(path, "new", "the answer")
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["b.txt"]
+
+
+def test_new_folders_are_synced_into_those_that_hold_them(tmp_path, monkeypatch):
+    """Else a power cut takes all of a new folder along, whatever was synced in it."""
+    seen = []
+    monkeypatch.setattr(files, "_sync", seen.append)
+    files.make_folder(tmp_path / "a" / "b")
+    assert (tmp_path / "a" / "b").is_dir()
+    assert seen == [tmp_path, tmp_path / "a"]

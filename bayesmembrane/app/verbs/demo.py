@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from bayesmembrane.app.options import CHAINS, OutputOptions, SamplingOptions
-from bayesmembrane.app.terminal import answer, bars, note, say
+from bayesmembrane.app.terminal import answer, bars, note, resumable, say
 
 place = 12
 
@@ -24,6 +24,6 @@ def verb(
     from bayesmembrane.app.demo import demo
 
     note("Five materials on two ranges; the first run compiles the solvers, which takes about a minute.")
-    with bars() as tell:
+    with resumable(chains), bars() as tell:
         document = demo(page_folder, Work(output.seed, chains, sampling.ess, tell))
     answer(document, output.as_json, lambda: say(f"The report lies in {document['report']}"))

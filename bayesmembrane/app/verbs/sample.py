@@ -8,6 +8,7 @@ import typer
 
 from bayesmembrane.app.options import (
     CurveOptions,
+    ForkOption,
     HypothesisOptions,
     MaterialOption,
     OutputOptions,
@@ -15,7 +16,7 @@ from bayesmembrane.app.options import (
     SamplingOptions,
     StoredOption,
 )
-from bayesmembrane.app.terminal import INTERRUPTED, answer, bars, command, note, say, table
+from bayesmembrane.app.terminal import INTERRUPTED, answer, bars, command, note, resumable, say, table
 
 place = 6
 
@@ -26,16 +27,17 @@ def verb(
     beside: HypothesisOptions,
     used: RangeOption,
     sampling: SamplingOptions,
+    forked: ForkOption,
     stored: StoredOption,
     output: OutputOptions,
 ) -> None:
-    """The posterior, stored as a run; the same command continues a run that was interrupted."""
+    """The posterior, stored as a run; the same command continues one that was stopped, or goes on to a higher --ess."""
     from bayesmembrane.app import analyses
 
     claim, whole = beside.with_material(material.material), curve.read()
-    with bars() as tell:
+    with resumable(stored.folder), bars() as tell:
         tell(claim.label(), "finding starts")
-        work = analyses.Work(output.seed, stored.folder, sampling.ess, tell)
+        work = analyses.Work(output.seed, stored.folder, sampling.ess, tell, forked.fork)
         found = analyses.sample(used.of(whole), claim, work, whole=whole)
     if found.result.interrupted:
         note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")

@@ -1,33 +1,30 @@
-"""What the ensembles walked and where they stand; stored, so that an interrupted run goes on as if it had not been."""
+"""What the ensembles walked and where they stand: what a run needs to go on as if it had never stopped."""
 
 from __future__ import annotations
 
-import json
-import zipfile
 from collections import Counter
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from bayesmembrane.ground.errors import StorageError
-from bayesmembrane.ground.files import write_whole
 from bayesmembrane.ground.parameters import Array
 
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """Everything that the ensembles walked, and where they stand: what resuming needs.
+    """Everything that the ensembles walked, and where they stand; or a part of it that follows on what was before.
 
     Attributes
     ----------
     x : (E, steps, walkers, k) coordinates, in order
     log_posterior : (E, steps, walkers)
-    random_states : state of each ensemble's generator, as NumPy gives it
-    counts : outcomes of all evaluations, by label
-    seconds : time spent
+    random_states : state of each ensemble's generator at the end, as NumPy gives it
+    counts : outcomes of all evaluations until then, by label
+    seconds : time spent until then
     lessons : steps after which the proposal was learned
+    look : steps at which it is to be judged next whether all is there; 0 if that was not said yet
     """
 
     x: Array
@@ -36,6 +33,7 @@ class Chains:
     counts: Counter[str]
     seconds: float
     lessons: tuple[int, ...] = ()
+    look: int = 0
 
     @property
     def steps(self) -> int:
@@ -46,41 +44,10 @@ class Chains:
         return sum(self.counts.values())
 
 
-def write_chains(path: Path, chains: Chains) -> None:
-    """Store a walk as ``path`` (npz), whole; raises `StorageError` if that cannot be."""
-    states: dict[str, Any] = {}
-    for e, (_, key, position, has_gauss, gauss) in enumerate(chains.random_states):
-        states |= {f"key{e}": key, f"rest{e}": np.array([position, has_gauss, gauss])}
-
-    def save(part: Path) -> None:
-        with part.open("wb") as file:
-            np.savez(
-                file,
-                x=chains.x,
-                log_posterior=chains.log_posterior,
-                counts=np.array(json.dumps(chains.counts)),
-                seconds=np.array(chains.seconds),
-                lessons=np.array(chains.lessons, dtype=int),
-                **states,
-            )
-
-    write_whole(path, save, "the walk of the run")
-
-
-def read_chains(path: Path) -> Chains | None:
-    """The walk stored as ``path``, None if there is none; raises `StorageError` if the file is damaged."""
-    if not path.exists():
-        return None
-    try:
-        with np.load(path) as f:
-            states = tuple(
-                ("MT19937", f[f"key{e}"], int(rest[0]), int(rest[1]), float(rest[2]))
-                for e, rest in ((e, f[f"rest{e}"]) for e in range(len(f["x"])))
-            )
-            counts = Counter(json.loads(str(f["counts"])))
-            lessons = tuple(int(s) for s in f["lessons"])
-            return Chains(f["x"], f["log_posterior"], states, counts, float(f["seconds"]), lessons)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise StorageError(
-            f"the chains are damaged ({error})", str(path), "remove the folder and sample again"
-        ) from None
+def joined(parts: Sequence[Chains]) -> Chains:
+    """One walk made of its parts, in order."""
+    return replace(
+        parts[-1],
+        x=np.concatenate([p.x for p in parts], axis=1),
+        log_posterior=np.concatenate([p.log_posterior for p in parts], axis=1),
+    )

@@ -18,6 +18,7 @@ LEAST_TAUS = 50
 BURN_TAUS = 10
 LEAST_STEPS = 20  # fewer say nothing
 R_HAT = 1.01
+R_HAT_DRAWS = 2**18  # of each ensemble, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,8 @@ def convergence(chains: Chains) -> Convergence:
     burn = max(learned, min(steps // 2, int(np.ceil(BURN_TAUS * np.max(tau)))))
     kept = chains.x[:, burn:]
     tau = autocorrelation_times(kept)
-    flat = kept[:, :: max(1, int(np.max(tau) / 4))].reshape(kept.shape[0], -1, kept.shape[-1])
+    enough = -(-kept.shape[1] * walkers // R_HAT_DRAWS)  # ranking more takes memory, and says no more
+    flat = kept[:, :: max(1, int(np.max(tau) / 4), enough)].reshape(kept.shape[0], -1, kept.shape[-1])
     moved = np.any(kept[:, 1:] != kept[:, :-1], axis=-1)
     return Convergence(
         tau=np.max(tau, axis=0),

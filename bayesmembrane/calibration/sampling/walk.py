@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import emcee
 import numpy as np
 
-from bayesmembrane.calibration.posterior import Posterior, tally
-from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.posterior import Outcomes, Posterior
+from bayesmembrane.calibration.sampling.chains import Chains, joined
 from bayesmembrane.calibration.sampling.convergence import LEAST_TAUS, Convergence, convergence
-from bayesmembrane.calibration.sampling.proposals.learned import Learned, learn, next_lesson
+from bayesmembrane.calibration.sampling.proposals.learned import learn, next_lesson
 from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.interrupts import Asked, Stop, deferred, never
 from bayesmembrane.ground.parameters import Array
 
+SAVE_AFTER = 10.0  # s: what a run that is killed loses at most, beside the step that it was at
 GROWTH = 1.25  # a look costs little, but nothing is learned from looking at every step
 
 
@@ -39,9 +41,9 @@ class Settings:
     most_steps: int = 20000
 
     def __post_init__(self) -> None:
-        if not self.ess > 0 or self.ensembles < 2 or self.chunk < 10 or self.most_steps < self.chunk:
+        if not 0 < self.ess < np.inf or self.ensembles < 2 or self.chunk < 10 or self.most_steps < self.chunk:
             raise SettingsError(
-                "sampling needs a positive ESS, two ensembles, and a limit of at least one chunk of steps"
+                "sampling needs a positive, finite ESS, two ensembles, and a limit of at least one chunk of steps"
             )
 
 
@@ -82,47 +84,59 @@ class Sampled:
 Callback = Callable[[Progress], None]
 
 
+@dataclass(frozen=True)
+class Beside:
+    """What is done while the ensembles walk.
+
+    keep : takes what was walked since it was last called: the starts, what `SAVE_AFTER` seconds brought, and the end
+    stop : asked after every step whether to end there
+    """
+
+    keep: Callable[[Chains], None] = lambda part: None
+    stop: Stop = never
+
+
+NOTHING = Beside()
+
+
 def run_ensembles(
     posterior: Posterior,
     settings: Settings,
     seed: int,
     progress: Callback | None = None,
     chains: Chains | None = None,
+    beside: Beside = NOTHING,
 ) -> Sampled:
     """Walk until tau is known (at least 50 tau steps), ESS = steps x walkers / tau is reached for the worst
     coordinate and R-hat between ensembles is at most 1.01, or until the limit of steps.
 
-    ``chains`` continues an earlier run as if it had never stopped. Ctrl-C ends the walk, not the program: what was
-    walked is returned with the status "interrupted".
+    ``chains`` continues an earlier run as if it had never stopped, wherever that was. SIGINT and SIGTERM end the walk
+    after the step that is being made, not the program, as ``beside.stop`` does: what was walked is kept, and returned
+    with the status "interrupted". A second signal ends the step, too.
     """
-    counts: Counter[str] = Counter() if chains is None else Counter(chains.counts)
-    walkers = _walkers(posterior, settings) if chains is None else chains.x.shape[2]
-    began = time.perf_counter() - (0.0 if chains is None else chains.seconds)
     if chains is None:
-        chains = _start(posterior, settings, seed, counts)
-    sampler = _sampler(posterior, walkers, counts, learn(posterior, chains))
-    target, status = max(settings.chunk, chains.steps), "interrupted"
-    try:
-        while True:
-            lesson = next_lesson(chains)
-            stop = target if lesson <= chains.steps else min(target, lesson)
-            chains = _walk(sampler, chains, stop, counts, began)
-            found = convergence(chains)
+        chains = _start(posterior, settings, seed)
+        beside.keep(chains)
+    walk = _Walk(posterior, beside, chains)
+    target, status = chains.look or max(settings.chunk, chains.steps), "interrupted"
+    with deferred(beside.stop) as asked, suppress(KeyboardInterrupt):
+        while walk.on_to(target, asked):
+            found = convergence(walk.chains)
             if progress is not None:
-                progress(_progress(chains, found, settings))
+                progress(_progress(walk.chains, found, settings))
             if found.enough(settings.ess):
                 status = "converged"
                 break
-            if chains.steps >= settings.most_steps:
+            if walk.chains.steps >= settings.most_steps:
                 status = "step limit"
                 break
-            if chains.steps >= next_lesson(chains):
-                chains = replace(chains, lessons=(*chains.lessons, chains.steps))
-                sampler = _sampler(posterior, walkers, counts, learn(posterior, chains))
-            target = min(settings.most_steps, _next_look(chains.steps, found, settings))
-    except KeyboardInterrupt:
-        found = convergence(chains)
-    return Sampled(chains, found, status)
+            if walk.chains.steps >= next_lesson(walk.chains):
+                walk.learn()
+            target = min(settings.most_steps, _next_look(walk.chains.steps, found, settings))
+        if asked.signalled:  # a signal that came at the very end still ends what follows
+            status = "interrupted"
+    walk.save()
+    return Sampled(walk.chains, convergence(walk.chains), status)
 
 
 def _next_look(steps: int, found: Convergence, settings: Settings) -> int:
@@ -143,50 +157,128 @@ def _progress(chains: Chains, found: Convergence, settings: Settings) -> Progres
     return Progress(chains.steps, least, settings.ess, float(np.max(found.r_hat)), tau, rate, left)
 
 
-def _walkers(posterior: Posterior, settings: Settings) -> int:
+def walkers_of(posterior: Posterior, settings: Settings) -> int:
+    """Walkers in each ensemble."""
     # Half an ensemble moves at a time, and the solver takes films by eights; tau grows when there are fewer.
     return settings.walkers or 16 * -(-4 * posterior.size // 16)
 
 
-def _sampler(posterior: Posterior, walkers: int, counts: Counter[str], known: Learned) -> Any:
-    """An ensemble that proposes by differential evolution, snooker and stretch, and from what was ``known`` by then."""
-
-    def log_probability(x: Array) -> Array:
-        e = posterior.evaluate(x)
-        counts.update(tally(e.outcome))
-        return e.log_posterior
-
-    sampler = emcee.EnsembleSampler(walkers, posterior.size, log_probability, moves=known.moves(), vectorize=True)
-    # emcee's own wrapper prints a traceback of whatever is raised, Ctrl-C among it.
-    sampler.log_prob_fn = log_probability
-    return sampler
+def _start(posterior: Posterior, settings: Settings, seed: int) -> Chains:
+    """Ensembles at different overdispersed starts."""
+    began, counts = time.perf_counter(), Outcomes()
+    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(settings.ensembles + 1)[-1])
+    x = starting_points(posterior, rng, settings.ensembles, walkers_of(posterior, settings), counts)
+    return replace(begun(posterior, x, seed), counts=counts, seconds=time.perf_counter() - began)
 
 
-def _start(posterior: Posterior, settings: Settings, seed: int, counts: Counter[str]) -> Chains:
-    """Ensembles at different overdispersed starts, with generators of their own."""
-    walkers = _walkers(posterior, settings)
-    seeds = np.random.SeedSequence(seed).spawn(settings.ensembles + 1)
-    x = starting_points(posterior, np.random.default_rng(seeds[-1]), settings.ensembles, walkers, counts)
+def begun(posterior: Posterior, x: Array, seed: int) -> Chains:
+    """Ensembles that stand at x (E, W, k), with generators of their own."""
+    seeds = np.random.SeedSequence(seed).spawn(len(x) + 1)
     states = tuple(np.random.RandomState(np.random.MT19937(s)).get_state() for s in seeds[:-1])
     lp = np.stack([posterior.evaluate(e).log_posterior for e in x])
-    return Chains(x[:, None], lp[:, None], states, counts, 0.0)
+    return Chains(x[:, None], lp[:, None], states, Outcomes(), 0.0)
 
 
-def _walk(sampler: Any, chains: Chains, target: int, counts: Counter[str], began: float) -> Chains:
-    """Advance every ensemble to ``target`` steps; what an interruption cuts is dropped: all stay equally long."""
-    more = target - chains.steps
-    if more <= 0:
-        return chains
-    x, lp, states = [], [], []
-    for e in range(len(chains.x)):
-        sampler.reset()
-        start = emcee.State(chains.x[e, -1], chains.log_posterior[e, -1], random_state=chains.random_states[e])
-        xs, lps = np.empty((more, *chains.x.shape[2:])), np.empty((more, chains.x.shape[2]))
-        state = start
-        for i, state in enumerate(sampler.sample(start, iterations=more, store=False, skip_initial_state_check=True)):
-            xs[i], lps[i] = state.coords, state.log_prob
-        x.append(np.concatenate([chains.x[e], xs]))
-        lp.append(np.concatenate([chains.log_posterior[e], lps]))
-        states.append(state.random_state)
-    seconds = time.perf_counter() - began
-    return Chains(np.stack(x), np.stack(lp), tuple(states), Counter(counts), seconds, chains.lessons)
+@dataclass
+class _Pile:
+    """The steps after ``first``, (E, walkers, k) and (E, walkers) each, until they are put together."""
+
+    first: int
+    steps: list[tuple[Array, Array]] = field(default_factory=list)
+
+    def taken(self, end: int, standing: Chains) -> Chains | None:
+        """What was walked until ``end``, as one part that stands where ``standing`` does; None if that is nothing."""
+        steps, self.steps = self.steps[: end - self.first], []
+        self.first = end
+        if not steps:
+            return None
+        x, lp = (np.stack(values, axis=1) for values in zip(*steps, strict=True))
+        return replace(standing, x=x, log_posterior=lp)
+
+
+@dataclass
+class _Walk:
+    """A walk that is being made: all ensembles step by step, so that they are equally long wherever it ends.
+
+    chains : what was walked until the last look
+    standing : (steps, state) after the last step that all ensembles made
+    ahead, unsaved : what was walked since the last look, and since something was last kept
+    """
+
+    posterior: Posterior
+    beside: Beside
+    chains: Chains
+
+    def __post_init__(self) -> None:
+        self.counts = Outcomes(self.chains.counts)
+        self.began = time.perf_counter() - self.chains.seconds
+        self.saved = time.perf_counter()
+        self.standing = (self.chains.steps, self.chains)
+        self.ahead, self.unsaved = _Pile(self.chains.steps), _Pile(self.chains.steps)
+        self.known = learn(self.posterior, self.chains)
+
+    def learn(self) -> None:
+        """Propose from now on what can be known by now."""
+        self.chains = replace(self.chains, lessons=(*self.chains.lessons, self.chains.steps))
+        self.known = learn(self.posterior, self.chains)
+
+    def on_to(self, look: int, asked: Asked) -> bool:
+        """Walk to the next lesson, or to the ``look`` if that comes first; False if asked to stop before."""
+        # A walk that goes on may stand at its lesson, or beyond the look of one that wanted less: it is judged first.
+        end = max(self.chains.steps, min(look, next_lesson(self.chains)))
+        try:
+            self._walk(end - self.chains.steps, look, asked)
+        finally:
+            if (part := self.ahead.taken(*self.standing)) is not None:
+                self.chains = joined([self.chains, part])
+                self.standing = (self.chains.steps, self.chains)
+        return self.chains.steps >= end and not asked.signalled
+
+    def save(self) -> None:
+        """Have what was walked kept."""
+        if (part := self.unsaved.taken(*self.standing)) is not None:
+            self.beside.keep(part)
+        self.saved = time.perf_counter()
+
+    def _walk(self, steps: int, look: int, asked: Asked) -> None:
+        """At most ``steps`` more; what an interruption cuts is dropped."""
+        if steps <= 0:
+            return
+        samplers = [self._sampler(steps, e) for e in range(len(self.chains.x))]
+        for _ in range(steps):
+            if asked():
+                break
+            states = [next(s) for s in samplers]
+            # Copies, for emcee changes its state in place.
+            made = np.stack([s.coords for s in states]), np.stack([s.log_prob for s in states])
+            self.ahead.steps.append(made)
+            self.unsaved.steps.append(made)
+            # In one go: an interruption must not part the steps from the state after them.
+            self.standing = (
+                self.standing[0] + 1,
+                replace(
+                    self.chains,
+                    random_states=tuple(s.random_state for s in states),
+                    counts=Outcomes(self.counts),
+                    seconds=time.perf_counter() - self.began,
+                    look=look,
+                ),
+            )
+            if time.perf_counter() - self.saved >= SAVE_AFTER:
+                self.save()
+
+    def _sampler(self, steps: int, ensemble: int) -> Any:
+        """The steps of an ensemble that moves by differential evolution, snooker and stretch, and by what is known."""
+
+        def log_probability(x: Array) -> Array:
+            e = self.posterior.evaluate(x)
+            self.counts.note(x, e.outcome)
+            return e.log_posterior
+
+        x, lp = self.chains.x[ensemble, -1], self.chains.log_posterior[ensemble, -1]
+        moves = self.known.moves()
+        sampler = emcee.EnsembleSampler(*x.shape, log_probability, moves=moves, vectorize=True)
+        # emcee's own wrapper prints a traceback of whatever is raised, Ctrl-C among it.
+        sampler.log_prob_fn = log_probability
+        start = emcee.State(x, lp, random_state=self.chains.random_states[ensemble])
+        return sampler.sample(start, iterations=steps, store=False, skip_initial_state_check=True)

@@ -21,6 +21,7 @@ from bayesmembrane.data.exports.sheets import Sheet, is_workbook, text_sheet, wo
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.settings import TomlSection, load_toml
+from bayesmembrane.data.tables import read_bytes
 from bayesmembrane.data.writing import csv_text, write_new
 from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.parameters import Array
@@ -247,7 +248,7 @@ def _files(export: Path, hints: Hints, specimen: str | Path | None) -> _Files:
 
 def _bytes(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_bytes(path)
     except FileNotFoundError:
         raise DataError("there is no such file", str(path), "check the path") from None
     except (OSError, ValueError) as error:

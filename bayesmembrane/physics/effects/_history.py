@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from bayesmembrane.data.motion import Motion
+from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.physics.effects.base import EffectParameter, running_max
 
@@ -53,7 +53,7 @@ def follow(values: Array, gap: Array, start: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _follow(values, gap, start, out):  # type: ignore[no-untyped-def]
     for b in range(values.shape[0]):
         h, before = start[b], 0.0

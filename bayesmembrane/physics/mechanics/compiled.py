@@ -17,11 +17,10 @@ from pathlib import Path
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
-import numba
-
+from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.physics.materials.base import Material
 
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"contract", "arcp"}}
+OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "arcp"}}
 # numba watches the file of a kernel, not those it borrows from: their texts go into its name.
 BORROWED = ("ritz/simd.py",)
 
@@ -43,14 +42,14 @@ def bind(kernels: tuple[Callable[..., Any], ...], material: type[Material], **co
         namespace.update(vars(sys.modules[kernel.__module__]))
     # The material's module may use its own imports (np, math): its functions keep their own globals.
     namespace.update({f.__name__: _compile(f, f.__globals__, tag) for f in physics}, **constants)
-    compiled = {}
+    made = {}
     for kernel in kernels:
-        compiled[kernel.__name__] = namespace[kernel.__name__] = _compile(kernel, namespace, tag)
-    return SimpleNamespace(**compiled)
+        made[kernel.__name__] = namespace[kernel.__name__] = _compile(kernel, namespace, tag)
+    return SimpleNamespace(**made)
 
 
 def _compile(function: Any, namespace: dict[str, Any], tag: str) -> Any:
     copy = FunctionType(function.__code__, namespace, f"{function.__name__}_{tag}", function.__defaults__)
     copy.__qualname__ = copy.__name__
     copy.__module__ = function.__module__
-    return numba.njit(copy, **OPTIONS)
+    return compiled(**OPTIONS)(copy)

@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.neo_hookean import NeoHookean
 from bayesmembrane.physics.mechanics.api import Request, Solve, request, solve
@@ -283,7 +283,7 @@ def _strip(gap: Gap, l0: Array, x: Array) -> tuple[Array, Array]:
     return kappa * x, kappa + 4.0 * ratio / reach**3 * (x / gap.length) ** 2
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _evaluate(pieces, step, last, prestretch, length, tautness, deflection, excess, force, slope):  # type: ignore[no-untyped-def]
     rows, points = deflection.shape
     longer = excess.size > 1

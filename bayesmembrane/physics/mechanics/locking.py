@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
+from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array
 
 STEPS = 60  # per factor 3.5 of R2/R1
@@ -16,7 +16,7 @@ TABLE = np.linspace(np.log(1e-3), np.log(1e6), 400)
 TABULATED = 200  # films of one pre-stretch, from which on a table costs less than they do; one without any is kept
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _rates(l2, th, jm):  # type: ignore[no-untyped-def]
     s = l2 * l2
     b = jm + 3.0 - s
@@ -29,7 +29,7 @@ def _rates(l2, th, jm):  # type: ignore[no-untyped-def]
     return l1 * np.cos(th) - l2, -np.sin(th) * pull, l1 * np.sin(th)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _shoot(th, jm, l0, span):  # type: ignore[no-untyped-def]
     """(l2(T), d) of the fully stretched film that leaves the disc at angle th: Runge-Kutta 4 in t.
 
@@ -54,7 +54,7 @@ def _shoot(th, jm, l0, span):  # type: ignore[no-untyped-def]
     return l2, h
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _lock(jm, l0, span):  # type: ignore[no-untyped-def]
     """Find th with l2(T) = l0: it falls from inf (too flat) to -inf (too steep). Bisection, then false position."""
     if l0 * l0 * 2.0 + 1.0 / (l0 * l0 * l0 * l0) - 3.0 >= jm:
@@ -81,7 +81,7 @@ def _lock(jm, l0, span):  # type: ignore[no-untyped-def]
     return deflection
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _lock_all(jm, l0, span):  # type: ignore[no-untyped-def]
     out = np.full(jm.size, np.inf)
     for i in range(jm.size):

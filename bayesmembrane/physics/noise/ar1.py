@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numba
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array, Natural, Normal, Parameter
 from bayesmembrane.physics.noise.base import LN_SD, SD, Noise, NoiseLikelihood, conditional, force_scale
 
@@ -110,7 +110,7 @@ class AR1Likelihood(NoiseLikelihood):
         return np.asarray(given + tau**2 * np.exp(-np.exp(-x[1]) * self.distance))
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _filter(residual, power, rate, gap, own):  # type: ignore[no-untyped-def]
     """State u with variance ``power`` and u_i = phi_i u_(i-1) + ..., observed as r_i = u_i + own noise."""
     out = np.empty(len(residual))

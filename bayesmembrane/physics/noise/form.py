@@ -7,11 +7,11 @@ from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
-import numba
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array, Natural, Parameter
 from bayesmembrane.physics.form_error import ENERGY, LAW, FormFactors, form_factors, joint_factors, mixed
 from bayesmembrane.physics.noise.base import LN_SD, SD, Elsewhere, Noise, NoiseLikelihood, conditional, force_scale
@@ -232,7 +232,7 @@ def _mean(u: Array, variance: Array, root: Array, r: Array) -> Array:
     return np.asarray(solve_triangular(root, half, lower=True, trans="T", check_finite=False))
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _root(w):  # type: ignore[no-untyped-def]
     """Lower triangular root of 1 + w^T w, whose pivots are at least 1 however large w is."""
     size = w.shape[1]
@@ -251,7 +251,7 @@ def _root(w):  # type: ignore[no-untyped-def]
     return m
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _squares(residual, force, traces, variance, eta, law, state, progress, axes):  # type: ignore[no-untyped-def]
     """(r^T Sigma^-1 r (B,), ln |Sigma| (B,)); residual and variance on the axes, if there are any."""
     draws, n = residual.shape

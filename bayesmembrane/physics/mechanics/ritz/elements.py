@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.polynomial import legendre
 
+from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array
 
 POINTS = 3  # Gauss points of an element beyond the number of its bubbles
@@ -72,7 +72,7 @@ def evaluate(q: Array, ends: Array, bubbles: int, t: Array) -> tuple[Array, Arra
     return np.sum(local * value, axis=1), np.sum(local * rate, axis=1) / half
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _home(t, ends):  # type: ignore[no-untyped-def]
     """The element in which t lies."""
     e = 0
@@ -81,7 +81,7 @@ def _home(t, ends):  # type: ignore[no-untyped-def]
     return e
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _end(q, k, per, elements):  # type: ignore[no-untyped-def]
     """The two sums at end k of the elements: zero at the edges."""
     if k == 0 or k == elements:
@@ -89,7 +89,7 @@ def _end(q, k, per, elements):  # type: ignore[no-untyped-def]
     return q[2 * (k * per - 1)], q[2 * (k * per - 1) + 1]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _slopes(t, e, q, ends, bubbles):  # type: ignore[no-untyped-def]
     """Slopes of the two sums at t in element e, from the unknowns q (2n,)."""
     per, elements = bubbles + 1, ends.size - 1
@@ -105,7 +105,7 @@ def _slopes(t, e, q, ends, bubbles):  # type: ignore[no-untyped-def]
     return a / half, b / half
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _values(t, e, q, ends, bubbles):  # type: ignore[no-untyped-def]
     """The two sums at t in element e."""
     per, elements = bubbles + 1, ends.size - 1
@@ -122,7 +122,7 @@ def _values(t, e, q, ends, bubbles):  # type: ignore[no-untyped-def]
     return a, b
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _density(q, ends, gain, d, bubbles, share, widest):  # type: ignore[no-untyped-def]
     """How much of the new elements belongs in each of `SAMPLES` pieces of every old one, summed up from 0."""
     # Loops, here and below: numba takes seconds to compile what is said of whole arrays.
@@ -153,7 +153,7 @@ def _density(q, ends, gain, d, bubbles, share, widest):  # type: ignore[no-untyp
     return level
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _place(ends, level, new):  # type: ignore[no-untyped-def]
     """New ends between which the ``level`` rises by the same amount."""
     wanted, i = new.size - 1, 0
@@ -167,7 +167,7 @@ def _place(ends, level, new):  # type: ignore[no-untyped-def]
         new[k] = ends[e] + width * (i - e * SAMPLES + (goal - level[i]) / (level[i + 1] - level[i]))
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _move(q, ends, bubbles, new, other, nodes, weights, rates, out):  # type: ignore[no-untyped-def]
     """The nearest in slope, element by element, of the solution q on ``new`` elements with ``other`` bubbles."""
     per = other + 1
@@ -186,7 +186,7 @@ def _move(q, ends, bubbles, new, other, nodes, weights, rates, out):  # type: ig
                 out[start + 2 * i + 1] += w * b
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _replace(q, ends, gains, d, bubbles, new, other, tables, share, widest, out):  # type: ignore[no-untyped-def]
     nodes, weights, _, rates = tables
     for k in range(q.shape[0]):

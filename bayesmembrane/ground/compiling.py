@@ -1,0 +1,67 @@
+"""numba's compiled code on the disk, so that no state of the disk harms a computation.
+
+numba notes a function in its index before the code itself is there. A full disk, or a process killed between the two,
+leaves an index that points to code of another version, which the next process runs; and what cannot be written or read
+ends in a traceback. Here the code comes first, under a name that nothing has, and what fails costs time only.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+
+def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """A decorator as `numba.njit` with ``options``, whose code is kept on the disk where that is possible."""
+
+    def wrap(function: Callable[..., Any]) -> Any:
+        made = numba.njit(function, **options)
+        # Where nothing can be written numba finds no place: then each process compiles for itself.
+        with suppress(RuntimeError, OSError):
+            made._cache = _Cache(made.py_func)
+        return made
+
+    return wrap
+
+
+class _File(IndexDataCacheFile):  # type: ignore[misc]
+    """The index of a function, and the files with its code."""
+
+    def save(self, key: Any, data: Any) -> None:
+        overloads = self._load_index()
+        if key in overloads and Path(self._data_path(overloads[key])).exists():
+            self._save_data(overloads[key], data)
+            return
+        names = map(self._data_name, itertools.count(1))
+        name = next(n for n in names if not Path(self._data_path(n)).exists())
+        self._save_data(name, data)
+        self._save_index({**overloads, key: name})
+
+    def load(self, key: Any) -> Any:
+        try:
+            return super().load(key)
+        except Exception:  # whatever a pickle that is cut or damaged raises
+            with suppress(OSError):
+                Path(self._index_path).unlink(missing_ok=True)
+            return None
+
+
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """Code that is kept; what cannot be kept is compiled again by the next process."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = _File(self._cache_path, self._impl.filename_base, stamp)
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except OSError:
+            self.disable()

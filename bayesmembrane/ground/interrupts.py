@@ -1,0 +1,76 @@
+"""Being asked to stop: by Ctrl-C, by a signal to end, or by whoever called."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+Stop = Callable[[], bool]
+"""Asked again and again: whether to stop now."""
+
+
+def never() -> bool:
+    """A `Stop` that goes on."""
+    return False
+
+
+class Asked:
+    """Whether somebody asked to stop; once true it stays so."""
+
+    def __init__(self, stop: Stop) -> None:
+        self.signalled, self._stopped, self._stop = False, False, stop
+
+    def __call__(self) -> bool:
+        self._stopped = self._stopped or self.signalled or self._stop()
+        return self._stopped
+
+
+@contextmanager
+def deferred(stop: Stop = never) -> Iterator[Asked]:
+    """While the body runs, SIGINT and SIGTERM only make what this yields true, as ``stop`` does; a second one raises.
+
+    For a body that looks every now and then and ends at a good place. In threads, where signals do not arrive, only
+    ``stop`` counts.
+    """
+    asked = Asked(stop)
+    if threading.current_thread() is not threading.main_thread():
+        yield asked
+        return
+
+    def note(number: int, frame: FrameType | None) -> None:
+        if asked.signalled:
+            raise KeyboardInterrupt
+        asked.signalled = True
+
+    with _handled(note):
+        yield asked
+
+
+@contextmanager
+def raised() -> Iterator[None]:
+    """While the body runs, SIGTERM raises KeyboardInterrupt, as SIGINT does; in threads nothing changes."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with _handled(signal.default_int_handler):
+        yield
+
+
+@contextmanager
+def _handled(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    # What is ignored stays so: a worker leaves Ctrl-C to the process that it works for.
+    before = {number: old for number, old in before.items() if old is not signal.SIG_IGN}
+    try:
+        for number in before:
+            signal.signal(number, handler)
+        yield
+    finally:
+        for number, old in before.items():
+            # None stands for a handler that Python did not set, and cannot set again.
+            signal.signal(number, signal.SIG_DFL if old is None else old)

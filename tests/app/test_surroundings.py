@@ -1,0 +1,88 @@
+"""Odd machines, odd names and odd files: each ends in a sentence or in the answer, and none in a traceback."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bayesmembrane.data.measurement import Provenance, Specimen
+from bayesmembrane.ground.text import file_name, showable
+from tests.comparison.test_interrupted import strip
+
+ROOT = Path(__file__).resolve().parents[2]
+NOWHERE = "/proc/none"  # not even root can write there
+UNWRITABLE = {name: NOWHERE for name in ("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "NUMBA_CACHE_DIR")}
+
+# name -> (what follows the verb fit, what the shell adds, exit status, what stderr says)
+TABLE: dict[str, tuple[str, str, int, str]] = {
+    "full": ("", "> /dev/full", 1, "stdout: the answer cannot be printed (No space left on device)"),
+    "full, json": ("--json", "> /dev/full", 1, "stdout: the answer cannot be printed (No space left on device)"),
+    "closed, json": ("--json", ">&-", 1, "stdout: the answer cannot be printed (it is closed)"),
+    "all closed": ("--json", ">&- 2>&-", 1, ""),
+    "no letters": ("", "> out.txt", 0, ""),
+    "no home": ("", "> out.txt", 0, ""),
+    "no folder": ("--out /dev/null/x", "> out.txt", 1, "/dev/null/x"),
+    "seed": ("--seed -1", "> out.txt", 2, "--seed"),
+}
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_surroundings(name: str, tmp_path: Path) -> None:
+    more, shell, status, says = TABLE[name]
+    strip(tmp_path)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+    environment |= UNWRITABLE if name == "no home" else {}
+    environment |= {"PYTHONIOENCODING": "ascii"} if name == "no letters" else {}
+    command = f"'{sys.executable}' -m bayesmembrane fit strip.csv --specimen strip.toml --material neo_hookean {more}"
+    done = subprocess.run(
+        ["sh", "-c", f"{command} {shell}"], cwd=tmp_path, env=environment, capture_output=True, timeout=300, check=False
+    )
+    err = done.stderr.decode(errors="replace")
+    assert done.returncode == status, err
+    assert "Traceback" not in err
+    assert says in err
+
+
+def test_brackets_and_bytes_in_names_are_shown_as_they_are(tmp_path: Path) -> None:
+    """No markup, and no text: in the folder, in the specimen's name and in the curve's."""
+    folder = tmp_path / "a[bold]b[/red]"
+    folder.mkdir(parents=True)
+    strip(folder)
+    curve = os.fsencode(folder) + b"/\xff[b].csv"
+    os.rename(os.fsencode(folder / "strip.csv"), curve)
+    specimen = folder / "strip.toml"
+    specimen.write_text(specimen.read_text().replace("[specimen]", '[specimen]\nname = "film [bold]A[/red]"'))
+    words = [sys.executable, "-m", "bayesmembrane", "fit", os.fsdecode(curve), "--specimen", str(specimen)]
+    words += ["--material", "neo_hookean", "--out", str(folder / "out")]
+    environment = {**os.environ, "COLUMNS": "200"}
+    done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr.decode(errors="replace")
+    assert "\ufffd[b].csv" in done.stdout.decode()
+    report = [sys.executable, "-m", "bayesmembrane", "report", str(folder / "out"), "--out", str(folder / "page")]
+    done = subprocess.run(report, cwd=ROOT, env=environment, capture_output=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr.decode(errors="replace")
+    assert "film [bold]A[/red]" in (folder / "page" / "index.html").read_text(encoding="utf-8")
+
+
+def test_what_cannot_be_shown_of_a_name_is_replaced() -> None:
+    """Controls, signs that turn the direction of a line, and bytes that are no text."""
+    assert showable("a\x1b[31mb\u202ec\u2066d\x00\x85") == "a\ufffd[31mb\ufffdc\ufffdd\ufffd\ufffd"
+    assert showable("µ 膜 \U0001f9ea é\n\tä") == "µ 膜 \U0001f9ea é  ä"
+    assert file_name("x\udcff.csv") == "x\ufffd.csv"
+    assert Specimen("a\u202eb", 1e-5).name == "a\ufffdb"
+    p = Provenance("c\udcff", origin="\x07", notes=("\x1b",))
+    assert (p.curve, p.origin, p.notes) == ("c\ufffd", "\ufffd", ("\ufffd",))
+
+
+@pytest.mark.parametrize("verb", ["fit", "import"])
+def test_a_file_without_end_is_told(verb: str, tmp_path: Path) -> None:
+    strip(tmp_path)
+    words = [sys.executable, "-m", "bayesmembrane", verb, "/dev/zero"]
+    words += ["--specimen", str(tmp_path / "strip.toml"), "--material", "gent"] if verb == "fit" else []
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("/dev/zero: the file is larger than 256 MiB")
