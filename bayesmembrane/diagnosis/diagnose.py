@@ -12,7 +12,7 @@ from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
 from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, Tell, opened
 from bayesmembrane.diagnosis.explanation.growth import grown
-from bayesmembrane.diagnosis.explanation.total import Judged, summed
+from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, summed
 from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, decided
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
 from bayesmembrane.diagnosis.left.remaining import remaining
@@ -51,9 +51,11 @@ def diagnose(
 def _diagnosed(case: OpenCase) -> Diagnosis:
     # A declared energy may follow the curve by parameters that nobody would expect: then all are weighed none the less.
     if case.detection.adequate and (case.null is case.best_plain or case.tested(case.best_plain).adequate):
-        return _concluded(case, case.search, adequate(case))
-    found = grown(case)
-    return _concluded(case, found.search, decided(case, summed(found)))
+        found = adequate(case)
+        if found.probabilities.effects[NOTHING] > VERDICT.doubted:
+            return _concluded(case, case.search, found)
+    every = grown(case)
+    return _concluded(case, every.search, decided(case, summed(every)))
 
 
 def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:

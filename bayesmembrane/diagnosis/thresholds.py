@@ -238,6 +238,8 @@ class VerdictThresholds:
 
     sure: float = 0.95
     """From which an answer is given; sets of an ambiguous one hold as much together."""
+    doubted: float = 0.5
+    """Of no effect, to first order: where it is less probable, all are weighed although no test sees a misfit."""
     most_members: int = 6
     """Of an ambiguous answer; if more are needed and no effect is sure to be among them, nothing can be told."""
     carried: float = 0.05

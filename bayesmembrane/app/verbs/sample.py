@@ -37,7 +37,7 @@ def verb(
     claim, whole = beside.with_material(material.material), curve.read()
     with resumable(stored.folder), bars() as tell:
         tell(claim.label(), "finding starts")
-        work = analyses.Work(output.seed, stored.folder, sampling.ess, tell, forked.fork)
+        work = analyses.Work(output.seed, stored.folder, sampling.ess, tell, fork=forked.fork)
         found = analyses.sample(used.of(whole), claim, work, whole=whole)
     if found.result.interrupted:
         note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")
