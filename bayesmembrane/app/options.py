@@ -170,7 +170,9 @@ class HypothesisOptions(OptionGroup):
     convexity: Annotated[str, typer.Option("--convexity", help="Convexity prior: reached, box, elliptic or none.")] = (
         "reached"
     )
-    noise: Annotated[str, typer.Option("--noise", help="Noise model: white, ar1, ar1_readings or form.")] = "white"
+    noise: Annotated[str, typer.Option("--noise", help="Noise model: white, ar1, ar1_readings, form or form_ar1.")] = (
+        "white"
+    )
 
     def with_material(self, material: str, noise: str = "") -> Hypothesis:
         """The hypothesis; ``noise`` instead of the one asked for, unless it is ""."""

@@ -31,7 +31,10 @@ from bayesmembrane.physics.form_error import mixed
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.noise import form
+from bayesmembrane.physics.noise.ar1 import LN_LENGTH
 from bayesmembrane.physics.noise.base import Elsewhere, force_scale
+from bayesmembrane.physics.noise.form import innovations, log_scale
+from bayesmembrane.physics.noise.form_ar1 import FormAR1Likelihood
 from tests.generator.datasets import Dataset, generate
 from tests.generator.distortions import LIBRARY
 from tests.generator.film import NoSolutionError
@@ -146,14 +149,15 @@ def _line(posterior: Posterior, objective: Objective, x: Array) -> Line:
     residual, slopes, force = -r[0], j[0], m.force + r
     noise, scale = posterior.noise_at(x, force), force_scale(m)
     columns, sizes = _columns(noise)
-    gram = np.concatenate([columns, slopes, residual[:, None]], axis=1)
-    gram = gram.T @ gram
+    every = np.concatenate([columns, slopes, residual[:, None]], axis=1)
     c = columns.shape[1]
     nodes, prior = _nodes(h, residual / scale)
+    grams = {length: _gram(noise, every, length) for length in np.unique(nodes[:, -1])}
     pull, offset = np.diag(objective.spread**-2), objective.centre - x[0]
     log_weights, means, covariances = [], [], []
     for theta, log_prior in zip(nodes, prior, strict=True):
         power = np.exp(2 * theta[0]) * scale**2
+        gram, remembered = grams[theta[-1]]
         s = np.exp(np.append(theta, 0.0)[sizes]) if c else np.empty(0)
         inner = np.eye(c) + gram[:c, :c] * s[:, None] * s / power
         across = gram[:c, c:] * s[:, None] / power
@@ -161,12 +165,21 @@ def _line(posterior: Posterior, objective: Objective, x: Array) -> Line:
         precision = white[:-1, :-1] + pull
         right = white[:-1, -1] + pull @ offset
         covariance = np.linalg.inv(precision)
-        log_det = len(m) * np.log(power) + np.linalg.slogdet(inner)[1] + np.linalg.slogdet(precision)[1]
+        log_det = len(m) * np.log(power) + remembered + np.linalg.slogdet(inner)[1] + np.linalg.slogdet(precision)[1]
         log_weights.append(log_prior + 0.5 * (right @ covariance @ right - white[-1, -1] - log_det))
         means.append(covariance @ right)
         covariances.append(0.5 * (covariance + covariance.T))
     parts = (np.array(v) for v in (log_weights, means, covariances))
     return Line(posterior, objective, x, force, residual, slopes, nodes, *parts)
+
+
+def _gram(noise: Any, values: Array, ln_length: float) -> tuple[Array, float]:
+    """(products of values (N, c) freed of noise of variance one, ln |its covariance|)."""
+    n = len(values)
+    remembers = isinstance(noise, FormAR1Likelihood)
+    stays = np.full(n, np.exp(-np.exp(-ln_length)) if remembers else 0.0)
+    white = innovations(values, 1.0, np.zeros(n), stays)
+    return white.T @ white, float(log_scale(1.0, np.zeros(n), stays))
 
 
 def _columns(noise: Any) -> tuple[Array, NDArray[np.intp]]:
@@ -182,8 +195,11 @@ def _columns(noise: Any) -> tuple[Array, NDArray[np.intp]]:
 def _nodes(h: Hypothesis, share: Array) -> tuple[Array, Array]:
     """Coordinates of the noise (M, m) on a grid, and ln of their prior (M,)."""
     own = h.parameters[h.curve_size :]
-    near = np.log(np.std(share)) + np.linspace(-8, 3, 23) / np.sqrt(2 * share.size)
-    wide = [np.linspace(float(p.prior.quantile(0.003)), float(p.prior.quantile(0.997)), NODES) for p in own[1:]]
+    remembers = own[-1] is LN_LENGTH
+    # Noise that remembers is larger than what a fit leaves, and asks for one more coordinate.
+    steps = np.linspace(-8, 24, 33) if remembers else np.linspace(-8, 3, 23)
+    near, count = np.log(np.std(share)) + steps / np.sqrt(2 * share.size), 9 if remembers else NODES
+    wide = [np.linspace(float(p.prior.quantile(0.003)), float(p.prior.quantile(0.997)), count) for p in own[1:]]
     nodes = np.stack([g.ravel() for g in np.meshgrid(near, *wide, indexing="ij")], axis=1)
     return nodes, np.sum([p.prior.log_density(nodes[:, i]) for i, p in enumerate(own)], axis=0)
 

@@ -93,25 +93,28 @@ class FormLikelihood(NoiseLikelihood):
 
     def log_likelihood(self, residual: Array, x: Array) -> Array:
         power, eta, law = self._sizes(x)
-        square, log_det = self._squares(residual, self.own + power[:, None], eta, law)
+        square, log_det = self._squares(residual, power, self._staying(x), (eta, law))
         return np.asarray(-0.5 * (square + log_det + residual.shape[1] * np.log(2 * np.pi)))
 
     def stated(self, residual: Array, x: Array) -> Array | None:
         if not np.any(self.own):
             return None
         _, eta, law = self._sizes(x)
-        return self._squares(residual, np.broadcast_to(self.own, residual.shape), eta, law)[0]
+        return self._squares(residual, np.zeros(len(x)), np.zeros(residual.shape), (eta, law))[0]
 
-    def _squares(self, residual: Array, variance: Array, eta: Array, law: Array) -> tuple[Array, Array]:
+    def _squares(self, residual: Array, power: Array, stays: Array, errors: tuple[Array, Array]) -> tuple[Array, Array]:
+        """(r^T Sigma^-1 r, ln |Sigma|), (B,) each, of tau^2 (B,), what stays of it (B, N), and eta_a and eta_e (B,)."""
         force, traces = self._curves(len(residual))
         axes = np.empty((0, 0)) if self.axes is None else self.axes
         r = residual if self.axes is None else residual @ self.axes
-        parts = (r, force, traces, np.maximum(variance, 1e-300))
-        total = np.ascontiguousarray(np.hypot(eta, mixed(force, traces)))
-        square, log_det = _squares(
-            *(np.ascontiguousarray(p, dtype=float) for p in parts), total, law, *self._roots, axes
-        )
+        eta, law = errors
+        parts = (r, force, traces, power, self.own, stays, np.hypot(eta, mixed(force, traces)), law)
+        square, log_det = _squares(*(np.ascontiguousarray(p, dtype=float) for p in parts), *self._roots, axes)
         return square, log_det
+
+    def _staying(self, x: Array) -> Array:
+        """(B, N) what part of the noise at one reading is left at the next: of white noise nothing."""
+        return np.zeros((len(x), self.own.size))
 
     def covariance(self, x: Array) -> Array:
         power, eta, law = self._sizes(x[None, :])
@@ -130,9 +133,12 @@ class FormLikelihood(NoiseLikelihood):
 
     def pointwise(self, residual: Array, x: Array) -> Array:
         out = np.empty_like(residual)
-        for b, (u, variance, root) in enumerate(self._each(x)):
-            r, w = residual[b], solve_triangular(root, (u / variance[:, None]).T, lower=True, check_finite=False)
-            a = _mean(u, variance, root, self._turned(r))
+        power, _, _ = self._sizes(x)
+        for b, u in enumerate(self._each(x)):
+            r, variance = residual[b], np.maximum(self.own + power[b], 1e-300)
+            root = _root(np.ascontiguousarray(u / np.sqrt(variance)[:, None]))
+            w = solve_triangular(root, (u / variance[:, None]).T, lower=True, check_finite=False)
+            a = _solved(root, u.T @ (self._turned(r) / variance))
             pull, share = (self._turned(r) - u @ a) / variance, np.sum(w * w, axis=0) * variance
             precision = np.maximum(1 - share, TINY) / variance
             if self.axes is not None:
@@ -173,8 +179,11 @@ class FormLikelihood(NoiseLikelihood):
         total = np.hypot(eta, mixed(*self._curves(len(x))))
         alone, size = there is not None and there.traces is None, joint.state.shape[1]
         out = np.empty(force.shape)
-        for b, (u, variance, root) in enumerate(self._each(x, here)):
-            a = _mean(u, variance, root, self._turned(residual[b]))
+        for b, u in enumerate(self._each(x, here)):
+            both = np.column_stack([u, self._turned(residual[b])])
+            white = self._whitened(both, x[b])
+            root = _root(np.ascontiguousarray(white[:, :-1]))
+            a = _solved(root, white[:, :-1].T @ white[:, -1])
             a += solve_triangular(root, rng.standard_normal(len(a)), lower=True, trans="T", check_finite=False)
             if alone:
                 own = eta[b] / total[b]
@@ -214,22 +223,61 @@ class FormLikelihood(NoiseLikelihood):
         parts = [eta * force[:, None] * factors.state]
         return np.concatenate([*parts, *(law * t[:, None] * factors.progress for t in traces)], axis=1)
 
-    def _each(self, x: Array, factors: FormFactors | None = None) -> Iterator[tuple[Array, Array, Array]]:
-        """U (N, r) and Lambda (N,) on the axes, and the root of M (r, r), draw by draw."""
+    def _whitened(self, values: Array, x: Array) -> Array:
+        """(N, c) values on the axes freed of the readings' noise, with coordinates x (k,)."""
+        power, _, _ = self._sizes(x[None, :])
+        white: Array = innovations(values, float(power[0]), self.own, self._staying(x[None, :])[0])
+        return white
+
+    def _each(self, x: Array, factors: FormFactors | None = None) -> Iterator[Array]:
+        """U (N, r) on the axes, draw by draw."""
         force, traces = self._curves(len(x))
-        power, eta, law = self._sizes(x)
+        _, eta, law = self._sizes(x)
         total = np.hypot(eta, mixed(force, traces))
         for b in range(len(x)):
             u = self._columns(factors or self.factors, force[b], traces[b], total[b], law[b])
-            u = u if self.axes is None else self.axes.T @ u
-            variance = np.maximum(self.own + power[b], 1e-300)
-            yield u, variance, _root(np.ascontiguousarray(u / np.sqrt(variance)[:, None]))
+            yield u if self.axes is None else self.axes.T @ u
 
 
-def _mean(u: Array, variance: Array, root: Array, r: Array) -> Array:
-    """a = M^-1 U^T Lambda^-1 r."""
-    half = solve_triangular(root, u.T @ (r / variance), lower=True, check_finite=False)
+def _solved(root: Array, right: Array) -> Array:
+    """M^-1 b of the root of M."""
+    half = solve_triangular(root, right, lower=True, check_finite=False)
     return np.asarray(solve_triangular(root, half, lower=True, trans="T", check_finite=False))
+
+
+@compiled(nogil=True, error_model="numpy")
+def innovations(values, power, own, stays):  # type: ignore[no-untyped-def]
+    """(N, c): L^-1 v of values v (N, c), with L L^T the covariance of ``own`` (N,) noise and of a process of variance
+    ``power`` of which the part ``stays`` (N,) is left of the reading before: R. E. Kalman's filter.
+    """
+    out = np.empty_like(values)
+    mean = np.zeros(values.shape[1])
+    variance = power
+    for i in range(values.shape[0]):
+        f = stays[i] if i > 0 else 0.0
+        variance = power + f * f * (variance - power)
+        s = max(variance + own[i], 1e-300)
+        gain, scale = variance / s, 1.0 / np.sqrt(s)
+        for j in range(values.shape[1]):
+            m = f * mean[j]
+            e = values[i, j] - m
+            out[i, j] = e * scale
+            mean[j] = m + gain * e
+        variance = variance * (1.0 - gain)
+    return out
+
+
+@compiled(nogil=True, error_model="numpy")
+def log_scale(power, own, stays):  # type: ignore[no-untyped-def]
+    """ln |L L^T| of the same."""
+    variance, total = power, 0.0
+    for i in range(own.size):
+        f = stays[i] if i > 0 else 0.0
+        variance = power + f * f * (variance - power)
+        s = max(variance + own[i], 1e-300)
+        total += np.log(s)
+        variance = variance * (1.0 - variance / s)
+    return total
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -252,13 +300,13 @@ def _root(w):  # type: ignore[no-untyped-def]
 
 
 @compiled(nogil=True, error_model="numpy")
-def _squares(residual, force, traces, variance, eta, law, state, progress, axes):  # type: ignore[no-untyped-def]
-    """(r^T Sigma^-1 r (B,), ln |Sigma| (B,)); residual and variance on the axes, if there are any."""
+def _squares(residual, force, traces, power, own, stays, eta, law, state, progress, axes):  # type: ignore[no-untyped-def]
+    """(r^T Sigma^-1 r (B,), ln |Sigma| (B,)); residual and own variance on the axes, if there are any."""
     draws, n = residual.shape
     r, q = state.shape[1], progress.shape[1]
     effects = traces.shape[1] if np.any(law > 0.0) else 0
     size = r + effects * q
-    w = np.empty((n, size))
+    w = np.empty((n, size + 1))
     square, log_det = np.empty(draws), np.empty(draws)
     a = np.empty(size)
     for b in range(draws):
@@ -269,17 +317,14 @@ def _squares(residual, force, traces, variance, eta, law, state, progress, axes)
                 for j in range(q):
                     w[i, r + e * q + j] = law[b] * traces[b, e, i] * progress[i, j]
         if axes.size:
-            w[:, :] = np.dot(np.ascontiguousarray(axes.T), w)
-        for i in range(n):
-            scale = 1.0 / np.sqrt(variance[b, i])
-            for j in range(size):
-                w[i, j] *= scale
-        root = _root(w)
+            w[:, :size] = np.dot(np.ascontiguousarray(axes.T), np.ascontiguousarray(w[:, :size]))
+        w[:, size] = residual[b]
+        white = innovations(w, power[b], own, stays[b])
+        root = _root(np.ascontiguousarray(white[:, :size]))
         a[:] = 0.0
         for i in range(n):
-            z = residual[b, i] / np.sqrt(variance[b, i])
             for j in range(size):
-                a[j] += w[i, j] * z
+                a[j] += white[i, j] * white[i, size]
         for j in range(size):
             for k in range(j):
                 a[j] -= root[j, k] * a[k]
@@ -288,13 +333,12 @@ def _squares(residual, force, traces, variance, eta, law, state, progress, axes)
             for k in range(j + 1, size):
                 a[j] -= root[k, j] * a[k]
             a[j] /= root[j, j]
-        total, logs = 0.0, 0.0
+        total, logs = 0.0, log_scale(power[b], own, stays[b])
         for i in range(n):
-            z = residual[b, i] / np.sqrt(variance[b, i])
+            left = white[i, size]
             for j in range(size):
-                z -= w[i, j] * a[j]
-            total += z * z
-            logs += np.log(variance[b, i])
+                left -= white[i, j] * a[j]
+            total += left * left
         for j in range(size):
             total += a[j] * a[j]
             logs += 2.0 * np.log(root[j, j])

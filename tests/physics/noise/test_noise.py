@@ -12,8 +12,10 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.form_error import MIXED
 from bayesmembrane.physics.noise.ar1 import AR1
+from bayesmembrane.physics.noise.ar1_readings import AR1Readings
 from bayesmembrane.physics.noise.base import SD, Elsewhere, Noise, NoiseLikelihood
 from bayesmembrane.physics.noise.form import Form
+from bayesmembrane.physics.noise.form_ar1 import FormAR1
 from bayesmembrane.physics.noise.white import White
 from bayesmembrane.physics.rigs.annulus import Annulus
 
@@ -54,7 +56,7 @@ def told(noise: Noise, bound: NoiseLikelihood, rows: int | slice = slice(None), 
     return bound.at(force[rows], traces[rows] if bound.traced else None)
 
 
-MODELS = [*(components("noise")[name]() for name in components("noise")), Form(laws=True)]
+MODELS = [*(components("noise")[name]() for name in components("noise")), Form(laws=True), FormAR1(laws=True)]
 GIVEN = ["none", "sd", "covariance"]
 
 
@@ -186,8 +188,8 @@ def test_white_noise_can_do_without_its_own() -> None:
 
 def smooth_part(bound: NoiseLikelihood, x: np.ndarray) -> np.ndarray:
     """The covariance of the form error alone."""
-    quiet = np.array([-25.0, *x[1:]])
-    return bound.covariance(quiet) - bound.at(bound.force, 0 * bound.traces).covariance(np.full(len(x), -25.0))
+    quiet, none = np.array([-25.0, *x[1:]]), np.array([-25.0, -40.0, -40.0, *x[3:]])
+    return bound.covariance(quiet) - bound.at(bound.force, 0 * bound.traces).covariance(none)
 
 
 @pytest.mark.parametrize("given", GIVEN)
@@ -200,6 +202,23 @@ def test_no_form_error_is_white_noise(given: str) -> None:
     assert form.pointwise(residual, x) == pytest.approx(white.pointwise(residual, x[:, :1]), rel=1e-9)
 
 
+@pytest.mark.parametrize("given", GIVEN)
+def test_noise_that_forgets_at_once_is_white_beside_a_form_error(given: str) -> None:
+    m, x = measurement(given), draws(Form(laws=True))
+    residual = 0.03 * np.random.default_rng(SEED).standard_normal((5, N))
+    white, forgets = (told(n, n.bind(m)) for n in (Form(laws=True), FormAR1(laws=True)))
+    at_once = np.column_stack([x, np.full(5, -8.0)])
+    assert forgets.log_likelihood(residual, at_once) == pytest.approx(white.log_likelihood(residual, x), rel=1e-9)
+
+
+@pytest.mark.parametrize("given", ["none", "sd"])
+def test_no_form_error_is_noise_that_remembers(given: str) -> None:
+    m, residual = measurement(given), 0.03 * np.random.default_rng(SEED).standard_normal((5, N))
+    x = np.column_stack([np.full(5, -3.0), np.full(5, -40.0), np.full(5, 0.4)])
+    alone, beside = AR1Readings().bind(m), FormAR1().bind(m).at(np.full((5, N), 2.0))
+    assert beside.log_likelihood(residual, x) == pytest.approx(alone.log_likelihood(residual, x[:, [0, 2]]), rel=1e-9)
+
+
 def test_effects_without_a_trace_have_no_form_error() -> None:
     bound, x = Form(laws=True).bind(measurement("sd")), draws(Form(laws=True))
     force, residual = np.full((5, N), 2.0), 0.03 * np.random.default_rng(SEED).standard_normal((5, N))
@@ -207,11 +226,12 @@ def test_effects_without_a_trace_have_no_form_error() -> None:
     assert bound.at(force, np.zeros((5, 2, N))).log_likelihood(residual, x) == pytest.approx(without, rel=1e-12)
 
 
+@pytest.mark.parametrize("noise", [Form(laws=True), FormAR1(laws=True)], ids=lambda n: n.name)
 @pytest.mark.parametrize("given", GIVEN)
-def test_what_recurs_is_the_form_error_given_the_residual(given: str) -> None:
+def test_what_recurs_is_the_form_error_given_the_residual(given: str, noise: Noise) -> None:
     """S_s S^-1 r and S_s - S_s S^-1 S_s, at the readings, and at other points where they are the same ones."""
-    m, x = measurement(given), draws(Form(laws=True), 1)[0]
-    bound = told(Form(laws=True), Form(laws=True).bind(m), 0)
+    m, x = measurement(given), draws(noise, 1)[0]
+    bound = told(noise, noise.bind(m), 0)
     sigma, smooth = bound.covariance(x), smooth_part(bound, x)
     residual = 0.3 * np.random.default_rng(SEED).standard_normal(N)
     gain = smooth @ np.linalg.inv(sigma)
