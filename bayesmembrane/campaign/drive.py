@@ -18,12 +18,12 @@ from types import FrameType
 from typing import Any
 
 from bayesmembrane.campaign.index import OWNER, Index, opened, rebuild
-from bayesmembrane.campaign.locks import held
 from bayesmembrane.campaign.plan import Plan
 from bayesmembrane.campaign.pool import Executor
 from bayesmembrane.campaign.record import ENDED, FAILED, PREEMPTED, Record, read_now, remove_now, write_record
 from bayesmembrane.campaign.work import ELSEWHERE, STOPPED, Execute, Order, Perform, execute, write_session
 from bayesmembrane.ground.errors import BayesmembraneError, StorageError
+from bayesmembrane.ground.locks import held
 
 COMMIT = 1.0  # s between two notes in the index
 GRACE = 20.0  # s for tasks to store what they have; then they are ended, and lose what came after their last checkpoint

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bayesmembrane.campaign.locks import is_held
 from bayesmembrane.campaign.plan import Plan, read_plan
 from bayesmembrane.campaign.record import RECORDS, REFUSED, WAITING, Record, read_records
 from bayesmembrane.campaign.task import Task
 from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.locks import is_held
 from bayesmembrane.ground.plain import json_text
 
 INDEX, OWNER = "index.sqlite", "owner.lock"

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from bayesmembrane.campaign.index import OWNER, Index, opened
-from bayesmembrane.campaign.locks import is_held
 from bayesmembrane.campaign.record import ENDED, PREEMPTED, RUNNING, STATES, WAITING, read_now
+from bayesmembrane.ground.locks import is_held
 
 MOST_SHOWN = 40
 

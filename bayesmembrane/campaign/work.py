@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from bayesmembrane.campaign.interrupt import until
-from bayesmembrane.campaign.locks import held
 from bayesmembrane.campaign.record import (
     DONE,
     ENDED,
@@ -30,6 +29,7 @@ from bayesmembrane.campaign.task import Task
 from bayesmembrane.ground.errors import BayesmembraneError, StorageError
 from bayesmembrane.ground.files import write_text
 from bayesmembrane.ground.jobs import Tell
+from bayesmembrane.ground.locks import held
 
 FILMS, LOCKS, SESSION = "films", "locks", "session.json"
 WAIT = 20.0  # s for another worker to let go of a task

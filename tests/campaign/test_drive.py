@@ -16,13 +16,13 @@ import pytest
 
 from bayesmembrane.campaign.drive import DEADLINE, FINISHED, INTERRUPTED, Ended, Session, drive, next_time
 from bayesmembrane.campaign.interrupt import until
-from bayesmembrane.campaign.locks import held, is_held
 from bayesmembrane.campaign.plan import Plan, write_plan
 from bayesmembrane.campaign.pool import DEATHS, LocalPool, WorkerDiedError
 from bayesmembrane.campaign.record import DONE, FAILED, PREEMPTED, REFUSED, WAITING, read_now, read_records
 from bayesmembrane.campaign.status import standing
 from bayesmembrane.campaign.work import Perform
 from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.locks import held, is_held
 from tests.campaign.doing import deadly, deadly_once, faulty, quick, slow, suicide
 from tests.campaign.films import planned
 
