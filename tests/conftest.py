@@ -1,5 +1,6 @@
 """Synthetic films, from the slow textbook solver and not from the one that calibrates."""
 
+import signal
 from collections.abc import Callable
 from functools import cache
 
@@ -14,6 +15,8 @@ from tests.seeds import move
 from tests.short_walks import shorten
 
 move()  # before any test module draws
+# Shells start what runs in the background with Ctrl-C ignored, and every process that a test starts would inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 INNER, OUTER = 0.010, 0.035
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from bayesmembrane.app.terminal import note, numbers
+from bayesmembrane.ground.text import file_name
 
 if TYPE_CHECKING:
     from bayesmembrane.data.measurement import Measurement
@@ -78,13 +79,18 @@ class CurveOptions(OptionGroup):
     ]
     specimen: Annotated[Path, typer.Option("--specimen", help="TOML with film, rig and noise.")]
 
+    @property
+    def shown(self) -> str:
+        """The name of the curve's file as people read it."""
+        return file_name(str(self.curve))
+
     def read(self) -> Measurement:
         """The whole measurement; what was left aside while reading is said on stderr."""
         from bayesmembrane.data.reading import read_measurement
 
         measurement = read_measurement(self.curve, self.specimen)
         for left_aside in measurement.provenance.notes:
-            note(f"{self.curve}: {left_aside}.")
+            note(f"{self.shown}: {left_aside}.")
         return measurement
 
 

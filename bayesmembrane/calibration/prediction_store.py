@@ -42,7 +42,7 @@ def write_predictions(found: Predictions, folder: Path, draws_of: str, wanted: W
         attrs={"values": json.dumps(single), "made": json.dumps(made)},
     )
     content, _ = sealed(packed({"/": dataset}))
-    write_whole(folder / FILE, lambda part: part.write_bytes(content), "the predictions")
+    write_whole(folder / FILE, lambda part: part.write_bytes(content), "the file of predictions")
 
 
 def read_predictions(folder: Path, draws_of: str, wanted: Wanted | None = None) -> Predictions | None:
@@ -53,7 +53,7 @@ def read_predictions(folder: Path, draws_of: str, wanted: Wanted | None = None) 
     path = folder / FILE
     if not path.is_file():
         return None
-    checked(path, "the predictions", AGAIN)
+    checked(path, "the file of predictions", AGAIN)
     try:
         dataset = xarray.load_dataset(path, engine="h5netcdf")
         made: Mapping[str, Any] = json.loads(dataset.attrs["made"])
@@ -65,7 +65,7 @@ def read_predictions(folder: Path, draws_of: str, wanted: Wanted | None = None) 
             values[name] = tuple(values[name])
         return Predictions(**values)
     except (OSError, KeyError, ValueError, TypeError, AttributeError, RuntimeError) as error:
-        raise damaged(path, "the predictions", type(error).__name__, AGAIN) from None
+        raise damaged(path, "the file of predictions", type(error).__name__, AGAIN) from None
 
 
 def _plain(wanted: Wanted) -> dict[str, Any]:

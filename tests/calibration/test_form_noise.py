@@ -11,7 +11,7 @@ from bayesmembrane.calibration.predictions import Wanted, predict_draws
 from bayesmembrane.calibration.run import Run, RunSettings, sample
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.form_error import form_factors
+from bayesmembrane.physics.form_error import MIXED, MOST_MIXED, form_factors
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 from tests.generator.datasets import Dataset, generate
@@ -31,7 +31,7 @@ def draws(count: int = 4) -> tuple[Posterior, Array]:
 
 
 def test_the_likelihood_is_the_normal_density_of_noise_energy_and_laws() -> None:
-    """Sigma = tau^2 1 + eta_a^2 D_F K_u D_F + eta_e^2 D_t K_v D_t, with t the trace of friction; an offset has none."""
+    """Sigma = tau^2 1 + (eta_a^2 + m^2) D_F K_u D_F + eta_e^2 D_t K_v D_t, t that of friction; an offset has none."""
     posterior, x = draws()
     m, k = posterior.measurement, posterior.hypothesis.curve_size
     found, factors = posterior.evaluate(x), form_factors(m)
@@ -40,8 +40,10 @@ def test_the_likelihood_is_the_normal_density_of_noise_energy_and_laws() -> None
     without = plain.forward(x[:, [0, offset]], reached=False).force
     for b in range(len(x)):
         tau, eta, law = np.exp(x[b, k:]) * [np.max(m.force), 1, 1]
-        u = eta * found.force[b, :, None] * factors.state
-        v = law * (found.force[b] - without[b])[:, None] * factors.progress
+        trace = found.force[b] - without[b]
+        mix = min(MIXED * np.linalg.norm(trace) / np.linalg.norm(found.force[b]), MOST_MIXED)
+        u = np.hypot(eta, mix) * found.force[b, :, None] * factors.state
+        v = law * trace[:, None] * factors.progress
         sigma = tau**2 * np.eye(len(m)) + u @ u.T + v @ v.T
         expected = multivariate_normal(found.force[b], sigma).logpdf(m.force)
         assert found.log_likelihood[b] == pytest.approx(expected, rel=1e-6)

@@ -171,5 +171,5 @@ def test_predictions_of_other_draws_do_not_count(run: Run) -> None:
 
 def test_damaged_predictions_are_named(run: Run, tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(b"no netCDF")
-    with pytest.raises(StorageError, match=r"the predictions are damaged"):
+    with pytest.raises(StorageError, match=r"the file of predictions is damaged"):
         stored_predictions(Run(run.name, tmp_path, run.settings, run.status, run.data))

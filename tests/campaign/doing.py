@@ -41,7 +41,7 @@ def slow(task: Task, campaign: Path, tell: Tell) -> Found:
     kept = campaign / "films" / f"{task.key}.steps"
     kept.parent.mkdir(parents=True, exist_ok=True)
     done = int(kept.read_text()) if kept.exists() else 0
-    for step in range(done, 50):
+    for step in range(done, 100):
         time.sleep(0.02)
         part = kept.with_suffix(f".{os.getpid()}")
         part.write_text(str(step + 1))

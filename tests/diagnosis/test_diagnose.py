@@ -82,7 +82,8 @@ def test_a_frame_that_stiffens_with_the_load_gets_no_other_name(tmp_path) -> Non
     data, found = answered(tmp_path, "machine_compliance", "ogden", "two_speeds", "ar1:0.3+quantised+uneven", 120074)
     assert data.truth["effects"]["machine_compliance"]["form"] == "hardening"
     assert found.verdict != "named"
-    assert set(found.effects) <= {"zero_offset", "machine_compliance", "prestretch", "force_offset"}
+    # What is as much of an energy's shape as a stiffening frame is: none of what takes history or time.
+    assert set(found.effects) <= {"zero_offset", "machine_compliance", "prestretch", "force_offset", "off_centre_disc"}
 
 
 def test_what_is_not_in_the_library_gets_no_name(tmp_path) -> None:
@@ -118,7 +119,7 @@ def test_the_moment_of_a_sudden_change_is_told_even_where_a_tear_explains_it(
 ) -> None:
     data, found = answered(tmp_path, "temperature_step", material, protocol, noise, seed)
     assert found.verdict == verdict
-    assert set(found.effects) <= (set() if verdict == "unknown" else {"tearing"})
+    assert all(j.candidate.names == () or "tearing" in j.candidate.names for j in found.members)
     assert found.probabilities.foreign["sudden_change"] > 0.05
     assert "A sudden" in sentence(found)
     moment = data.truth["effects"]["temperature_step"]["when"] * data.time_s[-1]

@@ -49,7 +49,7 @@ def read_cycle(path: Path) -> Cycle:
     name = _NAME.fullmatch(path.name)
     if name is None:
         raise DataError("the name does not tell peak and rate", str(path), "loading_1d5_unloading_0d03.xlsx means 1.5")
-    table = pd.read_excel(path, header=None).to_numpy(dtype=float)
+    table = pd.read_excel(path, header=None, engine="openpyxl").to_numpy(dtype=float)
     if table.shape[1] != 3 or not np.all(np.isfinite(table)):
         raise DataError("three columns of numbers are expected", str(path))
     time, stretch, stress = table.T

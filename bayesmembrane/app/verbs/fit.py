@@ -38,7 +38,7 @@ def verb(
     measurement = used.of(curve.read())
     with status(f"Fitting {claim.label()}"):
         found = analyses.fit(measurement, claim, analyses.Work(output.seed, stored.folder), loss=loss)
-    title = f"{claim.material.title} on {curve.curve}"
+    title = f"{claim.material.title} on {curve.shown}"
     answer(found.document, output.as_json, lambda: show(found.result, title))
 
 

@@ -42,7 +42,7 @@ def verb(
     if found.result.interrupted:
         note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")
         raise typer.Exit(INTERRUPTED)
-    title = f"{claim.material.title} on {curve.curve}"
+    title = f"{claim.material.title} on {curve.shown}"
     answer(found.document, output.as_json, lambda: show(found.document, title))
 
 

@@ -54,7 +54,7 @@ def verb(
     document = found.document
     if folder is not None:
         document |= {"files": [str(f) for f in write_valleys(found.result, folder)]}
-    title = f"Valleys of {claim.material.title} on {curve.curve}"
+    title = f"Valleys of {claim.material.title} on {curve.shown}"
     answer(document, output.as_json, lambda: show(found.result, title))
 
 

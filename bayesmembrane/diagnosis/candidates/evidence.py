@@ -117,10 +117,14 @@ class Linear:
         if not np.all(np.isfinite(c)):
             return None
         # LAPACK by itself, without SciPy's checks: this is done thousands of times.
-        factor, fault = lapack.dpotrf(c.T, lower=1, overwrite_a=1)
-        if fault:
-            raise np.linalg.LinAlgError("the covariance of a linear model is not positive definite")
-        own, _ = lapack.dpotrs(factor, scale * np.exp(-theta[0]) * along, lower=1)
+        factor, fault = lapack.dpotrf(c.T, lower=1)
+        right = scale * np.exp(-theta[0]) * along
+        if fault:  # no eigenvalue is below 1: what is, is round-off
+            value, vector = np.linalg.eigh(c)
+            value = np.maximum(value, 1.0)
+            inverse = (vector / value) @ vector.T
+            return root, inverse, inverse @ right, float(np.sum(np.log(value)))
+        own, _ = lapack.dpotrs(factor, right, lower=1)
         log_det = 2 * float(np.sum(np.log(np.diag(factor))))
         half, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
         inverse = np.tril(half)

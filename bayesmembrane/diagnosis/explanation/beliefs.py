@@ -19,6 +19,9 @@ class Beliefs:
     """ln of the Bayes factor of the best explanation over none, from which on factors count much less than they say:
     real laws differ from the library's in more ways than the form error knows, which matters the more the larger the
     effects are. Chosen by the log score of the calibration half of `make study-reliability`."""
+    least_counts: float = 0.3
+    """However large that is: the part at the largest gain of the calibration half, 1000. A film that no plain energy
+    comes near has a gain of a hundred times that, which says nothing of the laws."""
     foreign: float = 0.15
     """Of something that no effect of the library describes, on top of whatever else is at work."""
     supported: float = 1.0
@@ -37,7 +40,7 @@ class Beliefs:
 
     def counts(self, gain: float) -> float:
         """What part of every ln Bayes factor counts where the best explanation has ln K = ``gain`` over none."""
-        return 1.0 / sqrt(1.0 + max(gain, 0.0) / self.plain_gain)
+        return max(1.0 / sqrt(1.0 + max(gain, 0.0) / self.plain_gain), self.least_counts)
 
     def log_set(self, size: int, visible: int) -> float:
         """ln of the probability of one set of ``size`` of the ``visible`` effects."""

@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import components
-from bayesmembrane.physics.form_error import MIXED
+from bayesmembrane.physics.form_error import MIXED, MOST_MIXED
 from bayesmembrane.physics.noise.ar1 import AR1
 from bayesmembrane.physics.noise.ar1_readings import AR1Readings
 from bayesmembrane.physics.noise.base import SD, Elsewhere, Noise, NoiseLikelihood
@@ -247,8 +247,11 @@ def test_what_recurs_is_the_form_error_given_the_residual(given: str, noise: Noi
 
 def test_what_film_and_effects_mix_is_as_large_as_the_traces() -> None:
     bound, x = told(Form(laws=True), Form(laws=True).bind(measurement("none")), 0), np.array([-25.0, -40.0, -40.0])
-    of_traces = np.sum(bound.traces[0] ** 2)
-    assert np.trace(bound.covariance(x)) == pytest.approx(MIXED**2 * of_traces, rel=1e-6)
+    small = bound.at(bound.force, 0.1 * bound.traces)
+    assert np.trace(small.covariance(x)) == pytest.approx(MIXED**2 * np.sum(small.traces[0] ** 2), rel=1e-6)
+    # However large they are, it stays a small part of the force.
+    large = bound.at(bound.force, 10 * bound.traces)
+    assert np.trace(large.covariance(x)) == pytest.approx(MOST_MIXED**2 * np.sum(bound.force[0] ** 2), rel=1e-6)
 
 
 def test_the_film_alone_has_no_part_in_what_effects_mix() -> None:
