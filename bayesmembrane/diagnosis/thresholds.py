@@ -306,7 +306,7 @@ class LoopThresholds:
 
     most_rounds: int = 3
     """Two added effects are as many as a curve can carry; the third round says that nothing more is missing."""
-    leaders: int = 3
+    leaders: int = 2
     """Members of an ambiguous answer that are sampled."""
     band: float = 0.9
     """Part of new readings that a predictive band is to cover."""
