@@ -144,6 +144,25 @@ def test_a_signal_ends_the_walk_after_its_step_and_everything_is_stored(
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_as_soon_as_the_starts_are_kept_leaves_a_stored_run(
+    whole: Run, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = Segments.write
+
+    def signalled(segments: Segments, part: Chains) -> None:
+        write(segments, part)
+        os.kill(os.getpid(), number)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Segments, "write", signalled)
+        partial = sample(strip(), CLAIM, how(tmp_path))
+    assert partial.interrupted
+    assert partial.path is not None
+    assert load_run(partial.path).status["steps"] == 1  # the starts
+    alike(sample(strip(), CLAIM, how(tmp_path)), whole)
+
+
 def test_in_a_thread_only_the_callable_stops(tmp_path: Path) -> None:
     found: list[Run] = []
     thread = threading.Thread(target=lambda: found.append(sample(strip(), CLAIM, how(tmp_path), stop=lambda: True)))

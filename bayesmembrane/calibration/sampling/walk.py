@@ -114,12 +114,13 @@ def run_ensembles(
     after the step that is being made, not the program, as ``beside.stop`` does: what was walked is kept, and returned
     with the status "interrupted". A second signal ends the step, too.
     """
-    if chains is None:
-        chains = _start(posterior, settings, seed)
-        beside.keep(chains)
+    fresh = chains is None
+    chains = _start(posterior, settings, seed) if chains is None else chains
     walk = _Walk(posterior, beside, chains)
     target, status = chains.look or max(settings.chunk, chains.steps), "interrupted"
     with deferred(beside.stop) as asked, suppress(KeyboardInterrupt):
+        if fresh:  # from here on whoever sees that something is kept may stop the walk
+            beside.keep(chains)
         while walk.on_to(target, asked):
             found = convergence(walk.chains)
             if progress is not None:
