@@ -31,13 +31,13 @@ def alone(path: Path, what: str) -> Iterator[None]:
     """
     handle = _opened(path, what)
     try:
-        _take(handle, path, what)
+        _claim(handle, path, what)
         yield
     finally:
         os.close(handle)
 
 
-def _take(handle: int, path: Path, what: str) -> None:
+def _claim(handle: int, path: Path, what: str) -> None:
     if not _locked(handle):
         owner = os.read(handle, 200).decode(errors="replace").strip() or "unknown"
         raise StorageError(
@@ -76,7 +76,7 @@ def held(path: Path, wait: float = 0.0) -> Iterator[bool]:
 
     The file is there while somebody has the lock, or died with it. Raises `StorageError` where it cannot be made.
     """
-    handle = _taken(path, time.monotonic() + wait)
+    handle = _waited_for(path, time.monotonic() + wait)
     try:
         yield handle is not None
     finally:
@@ -85,7 +85,7 @@ def held(path: Path, wait: float = 0.0) -> Iterator[bool]:
             os.close(handle)
 
 
-def _taken(path: Path, latest: float) -> int | None:
+def _waited_for(path: Path, latest: float) -> int | None:
     """An open file that we have locked; None if another owner has it at the time ``latest``."""
     while True:
         handle = _opened(path, "the lock")

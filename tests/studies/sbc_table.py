@@ -45,9 +45,10 @@ def report(rows: list[dict[str, Any]], made_by: str, table: Path | None = None) 
     lines = [
         "# Simulation-based calibration",
         "",
-        f"{made_by}: {len(rows)} replicates. A truth from the prior, readings of it with forces of the other solver, "
-        f"and its rank among {RANKED} independent draws of the posterior: of every coordinate, of the force at the end "
-        "and of the log likelihood. Coverage is of all these together; p is the least of Kolmogorov's tests of a "
+        f"{made_by}: {len(rows)} replicates. A truth from the prior, readings of it with forces of the other solver "
+        f"(of the same one where there are effects), and its rank among {RANKED} independent draws of the posterior: "
+        "of every coordinate, of the force at the end and of the log likelihood. Coverage is of all these together; "
+        "p is the least of Kolmogorov's tests of a "
         f"design, times their number; below {SURE:g} the ranks are not uniform.",
         "",
         "| design | replicates | " + " | ".join(f"{lv:.0%}" for lv in LEVELS) + " | p | worst | failed | s (median) |",

@@ -207,7 +207,9 @@ def weighed(model: Linear, start: Array | None = None) -> Weighed:
     if start is not None and start.size == len(model.priors):
         starts.append(np.clip(start, *model.ends))
     theta, top = _climbed(model, starts)
-    log_det = float(np.linalg.slogdet(_precision(model, top.bend, FORM.least_curvature))[1])
+    curvature, _ = _bent(model, top)
+    sizes = np.log(np.maximum(curvature, FORM.least_curvature)) - 2 * np.log(model.priors[:, 1])
+    log_det = float(np.sum(sizes))
     return Weighed(top.value + 0.5 * theta.size * float(np.log(2 * np.pi)) - 0.5 * log_det, theta)
 
 
@@ -221,9 +223,10 @@ def _climbed(model: Linear, starts: Sequence[Array]) -> tuple[Array, Density]:
     theta, now = max(((t, model.log_density(t)) for t in starts), key=lambda pair: pair[1].value)
     for _ in range(FORM.iterations):
         free = ~(((theta <= low) & (now.slope < 0)) | ((theta >= high) & (now.slope > 0)))
-        precision = _precision(model, now.bend, 0.0)[np.ix_(free, free)]
+        curvature, axes = _bent(model, now)
+        precision = (axes * np.maximum(np.abs(curvature), FORM.least_curvature)) @ axes.T
         step = np.zeros(theta.size)
-        step[free] = np.linalg.solve(precision, now.slope[free])
+        step[free] = np.linalg.solve(precision[np.ix_(free, free)], now.slope[free])
         step *= min(1.0, FORM.largest_step / max(float(np.max(np.abs(step))), 1e-300))
         if float(step @ now.slope) < FORM.tolerance:
             break
@@ -239,12 +242,11 @@ def _climbed(model: Linear, starts: Sequence[Array]) -> tuple[Array, Density]:
     return theta, now
 
 
-def _precision(model: Linear, bend: Array, least: float) -> Array:
-    """(h, h) positive definite: -``bend`` with curvatures, of the prior's, by size and no less than ``least``."""
+def _bent(model: Linear, at: Density) -> tuple[Array, Array]:
+    """(curvatures (h,) of -ln p in those of the prior, axes (h, h)): -bend = axes diag(curvatures) axes^T."""
     sd = model.priors[:, 1]
-    value, vector = np.linalg.eigh(-bend * np.outer(sd, sd))
-    value = np.maximum(value, least) if least > 0 else np.maximum(np.abs(value), FORM.least_curvature)
-    return np.asarray((vector * value) @ vector.T / np.outer(sd, sd))
+    value, vector = np.linalg.eigh(-at.bend * np.outer(sd, sd))
+    return value, vector / sd[:, None]
 
 
 def log_inside(mean: Array, covariance: Array, low: Array, high: Array) -> float:

@@ -124,9 +124,8 @@ def _predicted(part: Search, fit: Candidate, search: Search, mask: NDArray[np.bo
     forms = form_columns(search.factors, force, fit.hypothesis.effects, trace)
     here = np.column_stack([own, *(columns for _, columns in forms)])[mask]
     mean, covariance = part.linear(fit).coefficients(fit.theta)
-    mean[: fit.x.size] -= part.coefficients_at(
-        fit
-    )  # the curve is that at the fit; the linear model knows the last bit of the way
+    # The curve is that at the fit; the linear model knows the last bit of the way.
+    mean[: fit.x.size] -= part.coefficients_at(fit)
     residual = (whole.force - force)[mask] - here @ mean
     band = HELD_OUT.band * np.sqrt(np.einsum("ni,ij,nj->n", here, covariance, here) + sd**2)
     return misfit_of(residual, search.noise.each[mask]), float(np.mean(np.abs(residual) <= band))

@@ -108,7 +108,7 @@ class FormLikelihood(NoiseLikelihood):
         axes = np.empty((0, 0)) if self.axes is None else self.axes
         r = residual if self.axes is None else residual @ self.axes
         eta, law = errors
-        parts = (r, force, traces, power, self.own, stays, np.hypot(eta, mixed(force, traces)), law)
+        parts = (r, force, traces, power, self.own, stays, self._on_film(eta), law)
         square, log_det = _squares(*(np.ascontiguousarray(p, dtype=float) for p in parts), *self._roots, axes)
         return square, log_det
 
@@ -118,7 +118,7 @@ class FormLikelihood(NoiseLikelihood):
 
     def covariance(self, x: Array) -> Array:
         power, eta, law = self._sizes(x[None, :])
-        total = float(np.hypot(eta[0], mixed(self.force[0], self.traces[0])))
+        total = float(self._on_film(eta)[0])
         u = self._columns(self.factors, self.force[0], self.traces[0], total, float(law[0]))
         own = np.diag(self.own) if self.axes is None else (self.axes * self.own) @ self.axes.T
         return np.asarray(own + power[0] * np.eye(len(own)) + u @ u.T)
@@ -127,7 +127,7 @@ class FormLikelihood(NoiseLikelihood):
         power, eta, law = self._sizes(x)
         force, traces = self._curves(len(x))
         own = self.own if self.axes is None else (self.axes**2) @ self.own
-        total = np.hypot(eta, mixed(force, traces))
+        total = self._on_film(eta)
         smooth = (total[:, None] * force) ** 2 + law[:, None] ** 2 * np.sum(traces**2, axis=1)
         return np.asarray(np.sqrt(own + power[:, None] + smooth))
 
@@ -151,7 +151,7 @@ class FormLikelihood(NoiseLikelihood):
     def draw(self, x: Array, rng: np.random.Generator) -> Array:
         force, traces = self._curves(len(x))
         _, eta, law = self._sizes(x)
-        total = np.hypot(eta, mixed(force, traces))
+        total = self._on_film(eta)
         out = self.fresh(x, rng)
         for b in range(len(x)):
             u = self._columns(self.factors, force[b], traces[b], total[b], law[b])
@@ -176,7 +176,7 @@ class FormLikelihood(NoiseLikelihood):
         beyond = slice(0, n) if there is None else slice(n, None)
         away = FormFactors(joint.state[beyond], joint.progress[beyond])
         _, eta, law = self._sizes(x)
-        total = np.hypot(eta, mixed(*self._curves(len(x))))
+        total = self._on_film(eta)
         alone, size = there is not None and there.traces is None, joint.state.shape[1]
         out = np.empty(force.shape)
         for b, u in enumerate(self._each(x, here)):
@@ -201,6 +201,10 @@ class FormLikelihood(NoiseLikelihood):
         """tau^2 (N^2), eta_a and eta_e of x (B, k), (B,) each."""
         law = np.exp(x[:, 2]) if self.laws else np.zeros(len(x))
         return (np.exp(x[:, 0]) * self.scale) ** 2, np.exp(x[:, 1]), law
+
+    def _on_film(self, eta: Array) -> Array:
+        """(B,) the relative error along the states, of the energy (B,) and of what the film and its effects mix."""
+        return np.asarray(np.hypot(eta, mixed(*self._curves(len(eta)))))
 
     def _curves(self, count: int) -> tuple[Array, Array]:
         """Forces (B, N) and traces (B, E, N)."""
@@ -233,7 +237,7 @@ class FormLikelihood(NoiseLikelihood):
         """U (N, r) on the axes, draw by draw."""
         force, traces = self._curves(len(x))
         _, eta, law = self._sizes(x)
-        total = np.hypot(eta, mixed(force, traces))
+        total = self._on_film(eta)
         for b in range(len(x)):
             u = self._columns(factors or self.factors, force[b], traces[b], total[b], law[b])
             yield u if self.axes is None else self.axes.T @ u
