@@ -1,0 +1,1 @@
+"""Several measurements of one material: shared parameters of the energy, and for each its own effects and noise."""

@@ -1,0 +1,111 @@
+"""Where ensembles start on several tests: spread around every valley that all tests leave open, wider than it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayesmembrane.calibration.joint.objective import JointObjective
+from bayesmembrane.calibration.joint.posterior import JointPosterior
+from bayesmembrane.calibration.posterior import Outcomes
+from bayesmembrane.calibration.sampling.convergence import effective_draws
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.numbers import bisected
+from bayesmembrane.ground.parameters import Array
+
+EACH, ROUNDS = 256, 5
+LIKELY = 40.0  # of |r|^2 above the least: valleys beyond it hold nothing of the posterior
+WIDER, DEGREES = 1.5, 4.0  # than the curvature says, and degrees of freedom of the t-distribution around a valley
+SPARE = 1.5  # effective number of candidates for each walker
+HALVINGS = 40
+
+
+def joint_starts(
+    posterior: JointPosterior, rng: np.random.Generator, ensembles: int, walkers: int, counts: Outcomes
+) -> Array:
+    """Starting points (E, W, K), all possible and all different, drawn without replacement from p(x | y)^b.
+
+    Candidates are draws around the valleys that joint least squares, with the prior beside it, finds from many starts,
+    and what differential evolution makes of the better ones; b <= 1 is the largest power at which they are worth more
+    than the walkers. Raises `SettingsError` if next to no admissible parameters reach the data.
+    """
+    x = _around(posterior, rng)
+    lp = _evaluated(posterior, x, counts)
+    wanted = ensembles * walkers
+    for _ in range(ROUNDS):
+        good = np.isfinite(lp)
+        more = posterior.prior.draw(rng, EACH) if np.count_nonzero(good) < 4 else _crossed(x[good], lp[good], rng)
+        x, lp = np.concatenate([x, more]), np.concatenate([lp, _evaluated(posterior, more, counts)])
+    x, lp = x[np.isfinite(lp)], lp[np.isfinite(lp)]
+    if len(x) < wanted:
+        raise SettingsError(
+            f"next to no {posterior.joint.label()} films that meet the convexity prior "
+            f'"{posterior.joint.convexity}" fit every test',
+            remedy="use shorter ranges, another material or another convexity prior",
+        )
+    chosen = _chosen(lp, SPARE * wanted, wanted, rng)
+    return np.asarray(x[rng.permutation(chosen)].reshape(ensembles, walkers, -1))
+
+
+def _evaluated(posterior: JointPosterior, x: Array, counts: Outcomes) -> Array:
+    found = posterior.evaluate(x)
+    counts.note(x, found.outcome)
+    return found.log_posterior
+
+
+def _around(posterior: JointPosterior, rng: np.random.Generator) -> Array:
+    """Draws (M, K) from wide t-distributions around the optima of likelihood times prior, with noises that suit."""
+    joint, objective = posterior.joint, JointObjective(posterior.joint, posterior.solve)
+    found, size, noises = objective.settled(objective.starts(rng), pull=True)
+    # A stated noise that a material misses by far leaves the posterior as wide as what is inferred on top of it.
+    noises = np.maximum(noises, _misfits(objective, found[0]) * (objective.first == 1.0))
+    found, size = objective.descended(found, noises, pull=True)
+    likely = found[size**2 < np.min(size**2) + LIKELY]
+    slopes = objective.batch(likely, noises)[1]
+    precision = np.einsum("mnk,mnl->mkl", slopes, slopes) + np.diag(objective.spread**-2.0)
+    root = np.linalg.cholesky(np.linalg.inv(precision))
+    count = EACH * min(3, len(likely))
+    which, low_high = rng.integers(len(likely), size=count), objective.bounds
+    z = rng.standard_normal((count, likely.shape[1])) * np.sqrt(DEGREES / rng.chisquare(DEGREES, (count, 1)))
+    x = posterior.prior.draw(rng, count)
+    x[:, joint.curve] = np.clip(likely[which] + WIDER * np.einsum("mkl,ml->mk", root[which], z), *low_high)
+    for i, residual in enumerate(objective.each(found[0])):
+        _suited(posterior, i, x, float(np.sqrt(np.mean(residual**2))), rng)
+    return x
+
+
+def _misfits(objective: JointObjective, x: Array) -> Array:
+    """(P,) root mean square residuals, in units of the stated noise, or in N."""
+    return np.array([np.sqrt(np.mean(r * r)) for r in objective.each(x)])
+
+
+def _suited(posterior: JointPosterior, number: int, x: Array, misfit: float, rng: np.random.Generator) -> None:
+    """Put noises of one test near what its ``misfit`` shows into most of x (B, K), if a part of it is inferred."""
+    part = posterior.joint.parts[number]
+    at = posterior.joint.places[number][part.hypothesis.curve_size :]
+    if not at.size:
+        return
+    m, noise = part.measurement, part.hypothesis.noise
+    newton = misfit if m.force_sd is None else misfit * float(np.sqrt(np.mean(m.force_sd**2)))
+    fits = np.log(newton / noise.natural(np.zeros((1, at.size)), 1.0)[0, 0] / np.max(np.abs(m.force)))
+    some = rng.random(len(x)) < 0.7
+    x[some, at[0]] = fits + 0.5 * rng.standard_normal(int(np.sum(some)))
+
+
+def _crossed(x: Array, lp: Array, rng: np.random.Generator) -> Array:
+    """x_i + g (x_a - x_b) of the better candidates (EACH, K), a little jittered."""
+    parents = x[_chosen(lp, EACH / 2, EACH, rng)]
+    n, k = parents.shape
+    a, b = rng.integers(n, size=(2, n))
+    g = 1.2 / np.sqrt(2 * k) * np.exp(0.3 * rng.standard_normal((n, 1)))
+    jitter = 1e-3 * np.std(parents, axis=0) * rng.standard_normal((n, k))
+    return np.asarray(parents + g * (parents[a] - parents[b]) + jitter)
+
+
+def _chosen(lp: Array, worth: float, count: int, rng: np.random.Generator) -> Array:
+    """Indices (count,) of candidates drawn with weights exp(b lp), without replacement while they last."""
+    lp = lp - np.max(lp)
+    worth = min(worth, 0.9 * len(lp))
+    power, _ = bisected(lambda b: effective_draws(np.exp(b * lp)) >= worth, 0.0, 1.0, HALVINGS)
+    # The largest of ln w + Gumbel noise are a draw without replacement.
+    order = np.argsort(-(power * lp + rng.gumbel(size=lp.size)))
+    return np.asarray(np.resize(order, count) if len(order) < count else order[:count])
