@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +16,16 @@ from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.calibration.fingerprint import fingerprint
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.calibration.fit import fit as run_fit
+from bayesmembrane.calibration.joint.claim import Joint
+from bayesmembrane.calibration.joint.fit import JointFit, fit_jointly
+from bayesmembrane.calibration.joint.run import JointRun, sample_jointly
 from bayesmembrane.calibration.predictions import Wanted, rest_of
 from bayesmembrane.calibration.run import Run, RunSettings, predictions_of
 from bayesmembrane.calibration.run import sample as run_sample
 from bayesmembrane.calibration.sampling.walk import Progress, Settings
 from bayesmembrane.comparison.compare import Range, compare_ranges
 from bayesmembrane.comparison.jobs import Judging
+from bayesmembrane.comparison.joint import compare_jointly
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.phases import phases_of
@@ -46,6 +50,7 @@ from bayesmembrane.valleys.beside import Beside, valleys_beside
 from bayesmembrane.valleys.follow import RISE, valleys_of
 from bayesmembrane.valleys.follow import valleys as run_valleys
 from bayesmembrane.valleys.result import Valleys
+from bayesmembrane.words.language import listed
 
 CURVES = "curves"  # the folder beside the runs in which the solver keeps what it has computed
 
@@ -152,6 +157,45 @@ def compare(
     judging = Judging(work.seed, work.ess, out=work.out, processes=workers)
     found = compare_ranges(ranges, claims, judging, progress=work.tell)
     return kept("comparison", found, document(found), what, work.out)
+
+
+def fit_joint(claim: Joint, work: Work) -> Answer[JointFit]:
+    """Least squares on several tests of one material."""
+    what = _asked_jointly("fit", fit_jointly, [claim], {"seed": work.seed})
+    found = fit_jointly(claim, seed=work.seed)
+    return kept("joint_fit", found, document(found), what, work.out)
+
+
+def sample_joint(claim: Joint, work: Work) -> Answer[JointRun]:
+    """The joint posterior, with that of every test and its predictions, in a folder of its own."""
+
+    def tell(progress: Progress) -> None:
+        work.tell(claim.label(), progress)
+
+    how = RunSettings(work.seed, work.out, None, work.ess, settings=work.walk)
+    run = sample_jointly(claim, how, progress=tell, solve=work.solve, stop=work.stop)
+    return Answer(run, {**document(run), "stored": None if run.folder is None else str(run.folder)})
+
+
+def compare_joint(claims: Sequence[Joint], work: Work) -> Answer[dict[str, Comparison]]:
+    """The evidence for each energy on all tests together; the result is by the words for them."""
+    settings = {"seed": work.seed, "ess": work.ess}
+    what = _asked_jointly("compare", compare_jointly, claims, settings)
+    if (stored := held("comparison", what, work.out)) is not None:
+        return stored
+    judged = compare_jointly(claims, Judging(work.seed, work.ess, out=work.out), progress=work.tell)
+    found = {f"{listed(claims[0].labels)} together": judged}
+    return kept("comparison", found, document(found), what, work.out)
+
+
+def _asked_jointly(verb: str, by: Callable[..., Any], claims: Sequence[Joint], settings: Mapping[str, Any]) -> Asked:
+    """As `asked`, about tests: the folder is called after them."""
+    parts = [part for claim in claims for part in claim.parts]
+    labels = {"labels": [list(claim.labels) for claim in claims]}
+    measurements, hypotheses = [p.measurement for p in parts], [p.hypothesis for p in parts]
+    what = asked(verb, by, measurements, hypotheses, {**settings, **labels})
+    model = "-".join(claim.label() for claim in claims)
+    return replace(what, specimen="-".join(claims[0].labels), model=model, end=float("nan"))
 
 
 def valleys(

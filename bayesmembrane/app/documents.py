@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from bayesmembrane.calibration.fit import Fit
+from bayesmembrane.calibration.joint.fit import JointFit
+from bayesmembrane.calibration.joint.run import JointRun
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.diagnosis.loop import Loop
@@ -15,7 +17,7 @@ from bayesmembrane.ground.plain import plain
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
-from bayesmembrane.words import comparison, diagnosis, loop, reconstruction, sampling, valleys
+from bayesmembrane.words import comparison, diagnosis, joint, loop, reconstruction, sampling, valleys
 
 
 def document(result: Any) -> dict[str, Any]:
@@ -25,8 +27,10 @@ def document(result: Any) -> dict[str, Any]:
 
 def _document(result: Any) -> Mapping[str, Any]:
     match result:
-        case Fit():
+        case Fit() | JointFit():
             return result.summary()
+        case JointRun():
+            return joint.document(result)
         case Run():
             return sampling.document(result)
         case Valleys() | Beside():

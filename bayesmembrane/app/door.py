@@ -5,13 +5,17 @@ Every verb takes ``out``, a folder of answers: there the result is stored whole,
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from bayesmembrane.app import analyses, documents
 from bayesmembrane.app.folders import lying
 from bayesmembrane.calibration.fit import Fit
+from bayesmembrane.calibration.joint.claim import Joint
+from bayesmembrane.calibration.joint.claim import joint as joint_of
+from bayesmembrane.calibration.joint.fit import JointFit
+from bayesmembrane.calibration.joint.run import JointRun
 from bayesmembrane.calibration.run import Run, predictions_of
 from bayesmembrane.comparison.compare import Range
 from bayesmembrane.comparison.result import Comparison
@@ -22,6 +26,7 @@ from bayesmembrane.data.reading import read_measurement as read_files
 from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics import hypothesis as hypotheses
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -32,6 +37,8 @@ from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
 
 Folder = str | Path
+Tests = Mapping[str, Measurement] | Sequence[Measurement]
+Claims = Hypothesis | Mapping[str, Hypothesis]
 
 
 def read(curve: Folder, specimen: Folder) -> Measurement:
@@ -61,39 +68,88 @@ def hypothesis(
     return hypotheses.hypothesis(material, [n.strip() for n in names if n.strip()], noise, convexity)
 
 
+def joint(measurements: Mapping[str, Measurement] | Sequence[Measurement], hypothesis: Claims) -> Joint:
+    """Several tests of one material for `fit`, `sample` and `compare`, by label or in an order.
+
+    ``hypothesis`` is claimed of all of them, or is one for each label: effects and noise may differ, the energy may
+    not. Raises `SettingsError` where they do not go together.
+    """
+    return joint_of(measurements, hypothesis)
+
+
+@overload
 def fit(
-    measurement: Measurement,
-    hypothesis: Hypothesis,
+    measurement: Measurement, hypothesis: Hypothesis, *, loss: str = ..., seed: int = ..., out: Folder | None = ...
+) -> Fit: ...
+
+
+@overload
+def fit(measurement: Tests, hypothesis: Claims, *, seed: int = ..., out: Folder | None = ...) -> JointFit: ...
+
+
+def fit(
+    measurement: Measurement | Tests,
+    hypothesis: Claims,
     *,
     loss: str = "euclidean",
     seed: int = 0,
     out: Folder | None = None,
-) -> Fit:
+) -> Fit | JointFit:
     """The global minimum of |F(x) - y| ("euclidean", N) or of the same in standard deviations of the noise
     ("weighted"), with standard errors, with and without the convexity prior.
+
+    Of several measurements (a list, or a dict by label) of one material the joint minimum, each test weighed by the
+    noise that it states, or else by its own residual; ``loss`` plays no part.
     """
+    if not isinstance(measurement, Measurement):
+        return analyses.fit_joint(joint_of(measurement, hypothesis), _work(seed, out)).result
+    hypothesis = _single(hypothesis)
     return analyses.fit(measurement, hypothesis, _work(seed, out), loss=loss).result
 
 
+@overload
 def sample(
     measurement: Measurement,
     hypothesis: Hypothesis,
+    *,
+    ess: float = ...,
+    seed: int = ...,
+    out: Folder | None = ...,
+    whole: Measurement | None = ...,
+) -> Run: ...
+
+
+@overload
+def sample(
+    measurement: Tests, hypothesis: Claims, *, ess: float = ..., seed: int = ..., out: Folder | None = ...
+) -> JointRun: ...
+
+
+def sample(
+    measurement: Measurement | Tests,
+    hypothesis: Claims,
     *,
     ess: float = 1000.0,
     seed: int = 0,
     out: Folder | None = None,
     whole: Measurement | None = None,
-) -> Run:
+) -> Run | JointRun:
     """Draws of p(parameters | measurement) worth ``ess`` independent ones; ``.data`` is an arviz InferenceData.
 
     With ``out`` the run is stored, and read back or continued if it is there; ``whole`` is the measurement whose first
     part ``measurement`` is, so that the rest is shown beside its prediction.
+
+    Of several measurements (a list, or a dict by label) of one material the joint posterior: the energy is shared,
+    each test has its own effects and noise; ``whole`` plays no part.
     """
+    if not isinstance(measurement, Measurement):
+        return analyses.sample_joint(joint_of(measurement, hypothesis), _work(seed, out, ess)).result
+    hypothesis = _single(hypothesis)
     return analyses.sample(measurement, hypothesis, _work(seed, out, ess), whole=whole).result
 
 
 def compare(
-    measurement: Measurement,
+    measurement: Measurement | Tests,
     hypotheses: Sequence[Hypothesis],
     *,
     ess: float = 1000.0,
@@ -104,7 +160,12 @@ def compare(
     """ln Z of every hypothesis by two estimators, leave-one-out beside it, and their ranking if the estimators agree.
 
     ``workers`` processes share the work (None: one for each core; scripts then need ``if __name__ == "__main__"``).
+    Of several measurements of one material the joint evidence, hypothesis after hypothesis.
     """
+    if not isinstance(measurement, Measurement):
+        claims = [joint_of(measurement, h) for h in hypotheses]
+        (both,) = analyses.compare_joint(claims, _work(seed, out, ess)).result.values()
+        return both
     ranges = {f"up to {1e3 * float(measurement.deflection.max()):.4g} mm": Range(measurement)}
     (found,) = analyses.compare(ranges, hypotheses, _work(seed, out, ess), workers=workers).result.values()
     return found
@@ -172,7 +233,8 @@ def report(*shown: Any, out: Folder, title: str | None = None) -> Path:
     A stored answer that cannot be read is left out with a warning. Raises `SettingsError` if there is nothing to show,
     `StorageError` for a folder that holds nothing.
     """
-    return write_report([_predicted(result) for result in shown], Path(out), title)
+    every = [one for result in shown for one in _with_parts(result)]
+    return write_report([_predicted(result) for result in every], Path(out), title)
 
 
 def load(folder: Folder) -> Any:
@@ -189,9 +251,21 @@ def as_dict(result: Any) -> dict[str, Any]:
     return documents.document(result)
 
 
+def _with_parts(result: Any) -> list[Any]:
+    """A joint run and those of its tests; any other result as it is."""
+    return [result, *result.parts] if isinstance(result, JointRun) else [result]
+
+
 def _predicted(result: Any) -> Any:
     """A run with its predictions, which are made here where none are stored; any other result as it is."""
     return read_run(result, predictions_of(result)) if isinstance(result, Run) else result
+
+
+def _single(hypothesis: Claims) -> Hypothesis:
+    """The claim about one measurement."""
+    if not isinstance(hypothesis, Hypothesis):
+        raise SettingsError("one measurement has one hypothesis", remedy="give the measurements as a dict by label, too")
+    return hypothesis
 
 
 def _work(seed: int, out: Folder | None, ess: float = 1000.0) -> analyses.Work:

@@ -7,7 +7,7 @@ line has the group's fields as options, and the verb gets them as one value.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import MISSING, dataclass, fields
 from functools import wraps
 from pathlib import Path
@@ -16,10 +16,13 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from bayesmembrane.app.terminal import note, numbers
+from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.text import file_name
 
 if TYPE_CHECKING:
+    from bayesmembrane.calibration.joint.claim import Joint
     from bayesmembrane.data.measurement import Measurement
+    from bayesmembrane.data.project import Listed
     from bayesmembrane.physics.hypothesis import Hypothesis
 
 CHAINS = Path("chains")
@@ -92,6 +95,64 @@ class CurveOptions(OptionGroup):
         for left_aside in measurement.provenance.notes:
             note(f"{self.shown}: {left_aside}.")
         return measurement
+
+
+@dataclass(frozen=True)
+class TestsOptions(OptionGroup):
+    """A measured curve, or several tests of one material."""
+
+    curve: Annotated[
+        Path,
+        typer.Argument(
+            help="The measured curve (CSV whose header names carry units), or a project (TOML with [[test]] tables).",
+            metavar="CURVE",
+        ),
+    ]
+    specimen: Annotated[
+        Path | None, typer.Option("--specimen", help="TOML with film, rig and noise; left out with a project.")
+    ] = None
+    others: Annotated[
+        list[str] | None,
+        typer.Option("--with", help="Another test of the same material, CURVE:SPECIMEN; may be given again."),
+    ] = None
+
+    @property
+    def shown(self) -> str:
+        """The name of the file as people read it."""
+        return file_name(str(self.curve))
+
+    @property
+    def several(self) -> bool:
+        """Whether this is a joint calibration."""
+        return bool(self.others) or self._is_project
+
+    @property
+    def _is_project(self) -> bool:
+        return self.specimen is None and self.curve.suffix.lower() == ".toml"
+
+    def read(self) -> Measurement:
+        """The whole measurement, where there is one alone; what was left aside while reading is said on stderr."""
+        if self.specimen is None:
+            raise typer.BadParameter("the curve needs a specimen file", param_hint="'--specimen'")
+        return CurveOptions(self.curve, self.specimen).read()
+
+    def listed(self, used: RangeOption) -> list[Listed]:
+        """All tests; ``used`` is of the first one, and a project says it itself."""
+        from bayesmembrane.data.project import Listed, read_project
+
+        found = list(read_project(self.curve)) if self._is_project else [Listed("", used.of(self.read()))]
+        for words in self.others or []:
+            curve, _, specimen = words.rpartition(":")
+            if not curve:
+                raise SettingsError(
+                    f'"{words}" is no curve with its specimen file', "--with", "write --with strip.csv:strip.toml"
+                )
+            found.append(Listed("", CurveOptions(Path(curve), Path(specimen)).read()))
+        if self._is_project:
+            for test in found:
+                for left_aside in test.measurement.provenance.notes:
+                    note(f"{test.measurement.provenance.curve}: {left_aside}.")
+        return found
 
 
 @dataclass(frozen=True)
@@ -186,6 +247,12 @@ class HypothesisOptions(OptionGroup):
 
         names = [name.strip() for name in self.effects.split(",") if name.strip()]
         return hypothesis(material, names, noise or self.noise, self.convexity)
+
+    def joint(self, material: str, tests: Sequence[Listed]) -> Joint:
+        """The same claimed of several tests; an effect ``a`` of all where it can occur, ``a@strip`` of one."""
+        from bayesmembrane.calibration.joint.effects import joint_of
+
+        return joint_of(material, tests, self.effects, self.noise, self.convexity)
 
 
 @dataclass(frozen=True)

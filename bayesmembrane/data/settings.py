@@ -79,6 +79,11 @@ class TomlSection:
         self._note("", *self.table)
         return "; ".join(f"{k}: {v}" for k, v in self.table.items())
 
+    def all_known(self, *keys: str) -> None:
+        """Say of ``keys`` that they may be there: who asked looks at their values without help."""
+        for key in keys:
+            self._note(key, key)
+
     def finish(self) -> None:
         """Raise `DataError` for the first key that nobody asked for, with the nearest one that was."""
         for key in self.table:

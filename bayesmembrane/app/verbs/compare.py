@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from bayesmembrane.app.options import (
-    CurveOptions,
     HypothesisOptionsWeighed,
     MaterialsOption,
     OutputOptions,
@@ -13,12 +13,15 @@ from bayesmembrane.app.options import (
     RangesOption,
     SamplingOptions,
     StoredOption,
+    TestsOptions,
 )
 from bayesmembrane.app.terminal import answer, lines, resumable, say, table
 from bayesmembrane.ground.errors import SettingsError
 
 if TYPE_CHECKING:
+    from bayesmembrane.calibration.joint.claim import Joint
     from bayesmembrane.comparison.result import Comparison
+    from bayesmembrane.data.project import Listed
 
 place = 8
 
@@ -30,7 +33,7 @@ COLUMNS = {
 
 
 def verb(
-    curve: CurveOptions,
+    curve: TestsOptions,
     materials: MaterialsOption,
     beside: HypothesisOptionsWeighed,
     used: RangeOption,
@@ -43,6 +46,16 @@ def verb(
     from bayesmembrane.app import analyses
     from bayesmembrane.comparison.compare import claimed, ranges_of
 
+    if curve.several:
+        if several.ranges_mm:
+            raise SettingsError("several tests have no ranges in common", "--ranges-mm", "leave it out")
+        names = [name.strip() for name in materials.materials.split(",") if name.strip()]
+        tests = curve.listed(used)
+        together = [_together(name, beside, tests) for name in names]
+        with resumable(stored.folder), lines() as tell:
+            both = analyses.compare_joint(together, analyses.Work(output.seed, stored.folder, sampling.ess, tell))
+        answer(both.document, output.as_json, lambda: show(both.result))
+        return
     claims = claimed(materials.materials, beside.effects, beside.noise, beside.convexity)
     if several.ranges_mm and used.max_deflection_mm is not None:
         raise SettingsError("the range is given twice", "--ranges-mm, --max-deflection-mm", "give one of them")
@@ -52,6 +65,14 @@ def verb(
         work = analyses.Work(output.seed, stored.folder, sampling.ess, tell)
         found = analyses.compare(ranges, claims, work)
     answer(found.document, output.as_json, lambda: show(found.result))
+
+
+def _together(name: str, beside: HypothesisOptionsWeighed, tests: Sequence[Listed]) -> Joint:
+    """The claim "yeoh+prestretch" about all tests."""
+    from dataclasses import replace
+
+    material, *own = name.split("+")
+    return replace(beside, effects=",".join([*own, beside.effects])).joint(material, tests)
 
 
 def show(found: dict[str, Comparison]) -> None:

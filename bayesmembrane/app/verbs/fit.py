@@ -7,23 +7,24 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bayesmembrane.app.options import (
-    CurveOptions,
     HypothesisOptions,
     MaterialOption,
     OutputOptions,
     RangeOption,
     StoredOption,
+    TestsOptions,
 )
 from bayesmembrane.app.terminal import answer, say, status, table
 
 if TYPE_CHECKING:
     from bayesmembrane.calibration.fit import Fit
+    from bayesmembrane.calibration.joint.fit import JointFit
 
 place = 5
 
 
 def verb(
-    curve: CurveOptions,
+    curve: TestsOptions,
     material: MaterialOption,
     beside: HypothesisOptions,
     used: RangeOption,
@@ -34,12 +35,31 @@ def verb(
     """The least-squares parameters with their standard deviations."""
     from bayesmembrane.app import analyses
 
+    if curve.several:
+        together = beside.joint(material.material, curve.listed(used))
+        with status(f"Fitting {together.label()} on {len(together.parts)} tests"):
+            both = analyses.fit_joint(together, analyses.Work(output.seed, stored.folder))
+        answer(both.document, output.as_json, lambda: show_jointly(both.result))
+        return
     claim = beside.with_material(material.material)
     measurement = used.of(curve.read())
     with status(f"Fitting {claim.label()}"):
         found = analyses.fit(measurement, claim, analyses.Work(output.seed, stored.folder), loss=loss)
     title = f"{claim.material.title} on {curve.shown}"
     answer(found.document, output.as_json, lambda: show(found.result, title))
+
+
+def show_jointly(found: JointFit) -> None:
+    """Parameters, and how well every test is fitted, on the terminal."""
+    from bayesmembrane.words.joint import fit_sentence
+
+    rows = [[n, f"{v:.6g}", "-" if sd is None else f"{sd:.2g}"] for n, (v, sd) in found.parameters.items()]
+    table(f"{found.joint.material.title} on {len(found.parts)} tests", ["parameter", "value", "sd"], rows)
+    say(f"Membrane parameters are those of the thinnest film, {1e6 * found.joint.thickness:.4g} um.")
+    say(fit_sentence(found))
+    say(f"The energy is {'' if found.convex else 'not '}convex where the films go.")
+    if found.at_bound:
+        say(f"No optimum inside the bounds for {', '.join(found.at_bound)}.")
 
 
 def show(found: Fit, title: str) -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from bayesmembrane.app.options import (
-    CurveOptions,
     ForkOption,
     HypothesisOptions,
     MaterialOption,
@@ -15,14 +15,19 @@ from bayesmembrane.app.options import (
     RangeOption,
     SamplingOptions,
     StoredOption,
+    TestsOptions,
 )
 from bayesmembrane.app.terminal import INTERRUPTED, answer, bars, command, note, resumable, say, table
+from bayesmembrane.ground.errors import SettingsError
+
+if TYPE_CHECKING:
+    from bayesmembrane.data.project import Listed
 
 place = 6
 
 
 def verb(
-    curve: CurveOptions,
+    curve: TestsOptions,
     material: MaterialOption,
     beside: HypothesisOptions,
     used: RangeOption,
@@ -34,6 +39,9 @@ def verb(
     """The posterior, stored as a run; the same command continues one that was stopped, or goes on to a higher --ess."""
     from bayesmembrane.app import analyses
 
+    if curve.several:
+        jointly(curve.listed(used), material, beside, (sampling, forked, stored, output))
+        return
     claim, whole = beside.with_material(material.material), curve.read()
     with resumable(stored.folder), bars() as tell:
         tell(claim.label(), "finding starts")
@@ -43,6 +51,29 @@ def verb(
         note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")
         raise typer.Exit(INTERRUPTED)
     title = f"{claim.material.title} on {curve.shown}"
+    answer(found.document, output.as_json, lambda: show(found.document, title))
+
+
+def jointly(
+    tests: Sequence[Listed],
+    material: MaterialOption,
+    beside: HypothesisOptions,
+    how: tuple[SamplingOptions, ForkOption, StoredOption, OutputOptions],
+) -> None:
+    """The posterior of several tests."""
+    from bayesmembrane.app import analyses
+
+    sampling, forked, stored, output = how
+    if forked.fork is not None:
+        raise SettingsError("a joint run begins on its own", "--fork", "leave it out")
+    claim = beside.joint(material.material, tests)
+    with resumable(stored.folder), bars() as tell:
+        tell(claim.label(), "finding starts")
+        found = analyses.sample_joint(claim, analyses.Work(output.seed, stored.folder, sampling.ess, tell))
+    if found.result.interrupted:
+        note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")
+        raise typer.Exit(INTERRUPTED)
+    title = f"{claim.material.title} on {len(claim.parts)} tests, thinnest film {1e6 * claim.thickness:.4g} um"
     answer(found.document, output.as_json, lambda: show(found.document, title))
 
 

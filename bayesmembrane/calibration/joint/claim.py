@@ -19,6 +19,8 @@ from bayesmembrane.physics.convexity import ConvexityMode
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.base import Material
 
+WALK = "walk"
+"""The folder of the walk among those of the tests."""
 _LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
 
 
@@ -36,9 +38,9 @@ class Part:
     hypothesis: Hypothesis
 
     def __post_init__(self) -> None:
-        if not _LABEL.fullmatch(self.label):
+        if not _LABEL.fullmatch(self.label) or self.label == WALK:
             raise SettingsError(
-                f'a test cannot be called "{self.label}"', remedy="use letters, digits, - and _, as in strip-1"
+                f'a test cannot be called "{self.label}"', remedy=f"use letters, digits, - and _, as in strip-1, and not {WALK}"
             )
 
 
@@ -199,15 +201,19 @@ def joint(
 
 
 def _named(measurements: Sequence[Measurement]) -> dict[str, Measurement]:
-    """Tests by the names of their specimens, as labels allow them; those of one name get numbers."""
-    found: dict[str, Measurement] = {}
-    for m in measurements:
-        stem = called(m.specimen.name)
-        number = 2
-        label = stem
-        while label in found:
+    """Tests by the names of their specimens."""
+    return dict(zip(labelled([("", m) for m in measurements]), measurements, strict=True))
+
+
+def labelled(tests: Sequence[tuple[str, Measurement]]) -> list[str]:
+    """Labels of tests (label or "", measurement): their own, else made of their specimens' names, numbered if alike."""
+    found: list[str] = []
+    for own, m in tests:
+        stem = own or called(m.specimen.name)
+        label, number = stem, 2
+        while label in found and not own:
             label, number = f"{stem}-{number}", number + 1
-        found[label] = m
+        found.append(label)
     return found
 
 

@@ -18,7 +18,7 @@ from typing import Any, cast
 import numpy as np
 
 from bayesmembrane.calibration.fingerprint import code_of
-from bayesmembrane.calibration.joint.claim import Joint
+from bayesmembrane.calibration.joint.claim import WALK, Joint
 from bayesmembrane.calibration.joint.posterior import JointPosterior
 from bayesmembrane.calibration.joint.starts import joint_starts
 from bayesmembrane.calibration.outcome import MOST_DRAWS, outcome
@@ -49,7 +49,7 @@ from bayesmembrane.ground.stored import read, store
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.mechanics import api
 
-KIND, WALK = "joint", "walk"
+KIND = "joint"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

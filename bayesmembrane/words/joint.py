@@ -1,0 +1,45 @@
+"""What is said of several tests of one material, and the JSON answer of ``sample`` on them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bayesmembrane.calibration.joint.fit import JointFit
+from bayesmembrane.calibration.joint.run import JointRun
+from bayesmembrane.words.hypothesis import material_title
+from bayesmembrane.words.language import listed, three_digits
+from bayesmembrane.words.sampling import convergence_sentence, failure_sentence, noise_sentence, smooth_sentence
+
+
+def document(run: JointRun) -> dict[str, Any]:
+    """The JSON answer: what was stored, and what a reader must know before trusting it."""
+    return {**run.summary(), "sentences": list(sentences(run))}
+
+
+def sentences(run: JointRun) -> tuple[str, ...]:
+    """What a reader must know before trusting the numbers: of the walk once, and of each test; none if all is well."""
+    said = [told for told in dict.fromkeys(convergence_sentence(p.quality) for p in run.parts) if told][:1]
+    if failed := failure_sentence(run.parts[0].quality):
+        said.append(failed)
+    for label, part in zip(run.joint.labels, run.parts, strict=True):
+        said += [f"{label}: {told}" for told in (noise_sentence(part.quality), smooth_sentence(part.quality)) if told]
+    return tuple(said)
+
+
+def answer(run: JointRun) -> str:
+    """What all tests together say of the film's stiffness."""
+    gd = run.joint.material.shear_modulus(run.joint.films(run.draws()).T)
+    modulus = gd / run.joint.thickness * 1e-6
+    return (
+        f"{material_title(run.joint.material.name)} on {listed(run.joint.labels)} together: the shear modulus is "
+        f"{three_digits(float(modulus.mean()))} +- {three_digits(float(modulus.std()))} MPa."
+    )
+
+
+def fit_sentence(found: JointFit) -> str:
+    """How well one energy fits all tests."""
+    tests = [f"{p.label} {three_digits(1e3 * p.rmse_N)} mN" for p in found.parts]
+    return (
+        f"{material_title(found.joint.material.name)} on {listed(found.joint.labels)} together leaves root mean square "
+        f"residuals of {listed(tests)}."
+    )
