@@ -22,7 +22,7 @@ from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.exports.hints import hints_of
 from bayesmembrane.data.importers.base import read_export
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.reading import read_measurement as read_files
+from bayesmembrane.data.sequence import read_one_after_another
 from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
@@ -41,9 +41,12 @@ Tests = Mapping[str, Measurement] | Sequence[Measurement]
 Claims = Hypothesis | Mapping[str, Hypothesis]
 
 
-def read(curve: Folder, specimen: Folder) -> Measurement:
-    """The measured curve (CSV) of a specimen (TOML), in SI; raises `DataError` that says what is wrong where."""
-    return read_files(Path(curve), Path(specimen))
+def read(curve: Folder, specimen: Folder, then: Sequence[Folder] = (), rest_s: float = 0.0) -> Measurement:
+    """The measured curve (CSV) of a specimen (TOML), in SI; raises `DataError` that says what is wrong where.
+
+    ``then``: further tests of the same film, not taken out in between, each after ``rest_s`` s of rest.
+    """
+    return read_one_after_another([curve, *then], specimen, rest_s)
 
 
 def read_measurement(export: Folder, specimen: Folder | None = None, **said: Any) -> Measurement:
