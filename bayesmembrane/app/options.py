@@ -73,6 +73,15 @@ class FilmOptions(OptionGroup):
     ]
 
 
+ThenOption = Annotated[
+    list[Path] | None,
+    typer.Option("--then", help="Next test of the same film, not taken out in between; may be given again."),
+]
+RestOption = Annotated[
+    float, typer.Option("--rest-s", min=0.0, help="Rest at zero before each --then whose clock starts anew, s.")
+]
+
+
 @dataclass(frozen=True)
 class CurveOptions(OptionGroup):
     """A measured curve."""
@@ -81,13 +90,8 @@ class CurveOptions(OptionGroup):
         Path, typer.Argument(help="The measured curve: CSV whose header names carry units.", metavar="CURVE")
     ]
     specimen: Annotated[Path, typer.Option("--specimen", help="TOML with film, rig and noise.")]
-    then: Annotated[
-        list[Path] | None,
-        typer.Option("--then", help="Next test of the same film, not taken out in between; may be given again."),
-    ] = None
-    rest_s: Annotated[
-        float, typer.Option("--rest-s", min=0.0, help="Rest at zero before each --then whose clock starts anew, s.")
-    ] = 0.0
+    then: ThenOption = None
+    rest_s: RestOption = 0.0
 
     @property
     def shown(self) -> str:
@@ -122,6 +126,8 @@ class TestsOptions(OptionGroup):
         list[str] | None,
         typer.Option("--with", help="Another test of the same material, CURVE:SPECIMEN; may be given again."),
     ] = None
+    then: ThenOption = None
+    rest_s: RestOption = 0.0
 
     @property
     def shown(self) -> str:
@@ -141,12 +147,14 @@ class TestsOptions(OptionGroup):
         """The whole measurement, where there is one alone; what was left aside while reading is said on stderr."""
         if self.specimen is None:
             raise typer.BadParameter("the curve needs a specimen file", param_hint="'--specimen'")
-        return CurveOptions(self.curve, self.specimen).read()
+        return CurveOptions(self.curve, self.specimen, self.then, self.rest_s).read()
 
     def listed(self, used: RangeOption) -> list[Listed]:
         """All tests; ``used`` is of the first one, and a project says it itself."""
         from bayesmembrane.data.project import Listed, read_project
 
+        if self._is_project and self.then:
+            raise SettingsError("a project lists its tests itself", "--then", "leave it out")
         found = list(read_project(self.curve)) if self._is_project else [Listed("", used.of(self.read()))]
         for words in self.others or []:
             curve, _, specimen = words.rpartition(":")

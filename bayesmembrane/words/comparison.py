@@ -13,6 +13,7 @@ from bayesmembrane.comparison.prior_widths import Unknown, Widened
 from bayesmembrane.comparison.result import Comparison, Row
 from bayesmembrane.words import noises
 from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.language import percent
 from bayesmembrane.words.noises import best_noise
 from bayesmembrane.words.sampling import sentences as quality_sentences
 
@@ -191,6 +192,8 @@ def covered(found: Comparison) -> str:
 def preferred(found: Comparison) -> str:
     """What evidence and leave-one-out prefer, by how much, and whether they disagree."""
     both = [r for r in found.rows if r.evidence is not None and r.loo is not None]
+    if len(both) < 2 and len(found.fitted) > 1:
+        return _by_evidence(found)
     if len(both) < 2:
         return "There are not two hypotheses to choose between."
     by_loo = sorted(both, key=lambda r: -r.loo.elpd if r.loo else 0.0)
@@ -225,6 +228,17 @@ def preferred(found: Comparison) -> str:
     )
 
 
+def _by_evidence(found: Comparison) -> str:
+    """What evidence alone prefers, where no point was left out."""
+    if not found.ranking:
+        return no_ranking(found)
+    first = found.ranking[0]
+    return (
+        f"The evidence prefers {called(first)}, with a posterior probability of "
+        f"{percent(first.posterior_probability or 0.0)}; prediction of points left out was not compared."
+    )
+
+
 def survival(found: Comparison) -> str:
     """Whether the first of the ranking stays first when any one prior is half or twice as wide."""
     fitted = sorted((r for r in found.fitted if r.evidence and r.evidence.agreed), key=lambda r: -_best(r)[0])
@@ -235,6 +249,8 @@ def survival(found: Comparison) -> str:
     # The prior of the noise is the same for all: changing it for one alone would say nothing.
     changed = [(r, w) for r in fitted for w in r.widths if w.factor != 1.0 and not w.parameter.startswith("noise.")]
     known = [(r, w) for r, w in changed if w.unknown is None]
+    if not changed:
+        return ""
     unknown = len(changed) - len(known)
     if not known:
         return "What other widths of the priors would do to ln Z cannot be said from these draws."

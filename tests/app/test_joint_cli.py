@@ -1,0 +1,97 @@
+"""Several tests of one material at the command line."""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayesmembrane.app.cli import main
+
+Run = Callable[..., tuple[int, str, str]]
+
+NOISE = 0.002
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A strip and a thicker sheet of one neo-Hookean rubber, c1 = 0.2 MPa, and a project that lists them."""
+    rng = np.random.default_rng(1)
+    for name, power, thickness in (("strip", -2, 100), ("sheet", -5, 300)):
+        stretch = np.linspace(1.1, 2.0, 10)
+        stress = 0.4 * (stretch - stretch**power) + NOISE * rng.standard_normal(10)
+        lines = [f"{a:.6f},{b:.8f}" for a, b in zip(stretch, stress, strict=True)]
+        (tmp_path / f"{name}.csv").write_text("\n".join(["stretch,nominal_stress_MPa", *lines]))
+        kind = "uniaxial" if name == "strip" else "equibiaxial"
+        (tmp_path / f"{name}.toml").write_text(
+            f'[specimen]\nname = "{name}"\nthickness_um = {thickness}\n[rig]\nkind = "{kind}"\n'
+            f"[measurement]\nnominal_stress_sd_MPa = {NOISE}\n"
+        )
+    tests = (f'[[test]]\ncurve = "{n}.csv"\nspecimen = "{n}.toml"\n' for n in ("strip", "sheet"))
+    (tmp_path / "project.toml").write_text("".join(tests))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def run(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    def call(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["bayesmembrane", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stop:
+            main()
+        out, err = capsys.readouterr()
+        return int(stop.value.code or 0), out, err
+
+    return call
+
+
+def test_with_and_a_project_are_the_same_question(run: Run) -> None:
+    one = run("fit", "strip.csv", "--specimen", "strip.toml", "--with", "sheet.csv:sheet.toml", "--material", "neo_hookean", "--json")
+    other = run("fit", "project.toml", "--material", "neo_hookean", "--json")
+    assert one[0] == other[0] == 0, one[2] + other[2]
+    answer = json.loads(one[1])
+    assert answer == json.loads(other[1])
+    assert answer["thickness_um"] == pytest.approx(100)
+    assert answer["parameters"]["c1"]["value"] == pytest.approx(20.0, rel=0.02)
+    assert answer["tests"]["sheet"]["parameters"]["c1"] == pytest.approx(60.0, rel=0.02)
+    assert Path(answer["stored"]).is_dir()
+
+
+def test_an_effect_is_claimed_of_all_tests_or_of_one(run: Run) -> None:
+    for effects, own in (("zero_offset", {"strip", "sheet"}), ("zero_offset@sheet", {"sheet"})):
+        code, out, err = run("fit", "project.toml", "--material", "neo_hookean", "--effects", effects, "--json")
+        assert code == 0, err
+        assert {n.split(".")[0] for n in json.loads(out)["parameters"] if n.endswith("shift")} == own
+
+
+def test_sampling_and_comparing(run: Run, short_walks: None) -> None:
+    code, out, err = run("sample", "project.toml", "--material", "neo_hookean", "--ess", "50", "--json", "--out", "o")
+    assert code == 0, err
+    answer = json.loads(out)
+    assert answer["stored"] == answer["run"]
+    assert answer["posterior"]["c1"]["mean"] == pytest.approx(20.0, rel=0.05)
+    assert set(answer["tests"]) == {"strip", "sheet"}
+    assert answer["sentences"]
+    code, out, err = run("report", answer["stored"], "--out", "page")
+    assert code == 0, err
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "match"),
+    [
+        (("fit", "strip.csv", "--material", "gent"), 2, "--specimen"),
+        (("fit", "strip.csv", "--specimen", "strip.toml", "--with", "sheet.csv", "--material", "gent"), 1, "no curve with its"),
+        (("fit", "project.toml", "--material", "gent", "--effects", "zero_offset@disc"), 1, '"disc"'),
+        (("fit", "project.toml", "--material", "gent", "--effects", "off_centre_disc"), 1, "no test can show it"),
+        (("fit", "project.toml", "--material", "gent", "--then", "strip.csv"), 1, "lists its tests itself"),
+        (("sample", "project.toml", "--material", "gent", "--fork", "o"), 1, "begins on its own"),
+        (("compare", "project.toml", "--materials", "gent", "--ranges-mm", "3"), 1, "no ranges in common"),
+        (("compare", "project.toml", "--materials", "gent,gent"), 1, "there twice"),
+    ],
+)
+def test_what_cannot_be_is_said_in_a_sentence(run: Run, words: tuple[str, ...], code: int, match: str) -> None:
+    found, out, err = run(*words)
+    assert found == code
+    assert match in err + out
