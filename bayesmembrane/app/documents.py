@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from bayesmembrane.calibration.fit import Fit
+from bayesmembrane.calibration.hierarchy.population import Population
 from bayesmembrane.calibration.joint.fit import JointFit
 from bayesmembrane.calibration.joint.run import JointRun
 from bayesmembrane.calibration.run import Run
@@ -17,7 +18,7 @@ from bayesmembrane.ground.plain import plain
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
-from bayesmembrane.words import comparison, diagnosis, joint, loop, reconstruction, sampling, valleys
+from bayesmembrane.words import comparison, diagnosis, joint, loop, population, reconstruction, sampling, valleys
 
 
 def document(result: Any) -> dict[str, Any]:
@@ -29,6 +30,8 @@ def _document(result: Any) -> Mapping[str, Any]:
     match result:
         case Fit() | JointFit():
             return result.summary()
+        case Population():
+            return {**result.summary(), "sentences": list(population.sentences(result))}
         case JointRun():
             return joint.document(result)
         case Run():

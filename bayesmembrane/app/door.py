@@ -12,6 +12,7 @@ from typing import Any, overload
 from bayesmembrane.app import analyses, documents
 from bayesmembrane.app.folders import lying
 from bayesmembrane.calibration.fit import Fit
+from bayesmembrane.calibration.hierarchy.population import Population
 from bayesmembrane.calibration.joint.claim import Joint
 from bayesmembrane.calibration.joint.claim import joint as joint_of
 from bayesmembrane.calibration.joint.fit import JointFit
@@ -172,6 +173,15 @@ def compare(
     ranges = {f"up to {1e3 * float(measurement.deflection.max()):.4g} mm": Range(measurement)}
     (found,) = analyses.compare(ranges, hypotheses, _work(seed, out, ess), workers=workers).result.values()
     return found
+
+
+def population(runs: Sequence[Run], *, pool: Sequence[str] = (), seed: int = 0, out: Folder | None = None) -> Population:
+    """Mean and scatter of the specimens behind ``runs`` of `sample`, one run each, and what the next one will be.
+
+    ``pool`` are coordinates: ``ln_modulus`` and the others of the material unless given; of effects by full names, as
+    ``thickness.error``. What is alike is drawn together, what differs is not (partial pooling).
+    """
+    return analyses.population(runs, _work(seed, out), pool=pool).result
 
 
 def valleys(

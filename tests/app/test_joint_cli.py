@@ -95,3 +95,24 @@ def test_what_cannot_be_is_said_in_a_sentence(run: Run, words: tuple[str, ...], 
     found, out, err = run(*words)
     assert found == code
     assert match in err + out
+
+
+def test_runs_of_specimens_make_a_population(run: Run, short_walks: None) -> None:
+    runs = []
+    for name in ("strip", "sheet"):
+        words = ("sample", f"{name}.csv", "--specimen", f"{name}.toml", "--material", "neo_hookean", "--ess", "50")
+        code, out, err = run(*words, "--json", "--out", "o")
+        assert code == 0, err
+        runs.append(json.loads(out)["run"])
+    code, out, err = run("population", *runs, "--json", "--out", "p")
+    assert code == 0, err
+    answer = json.loads(out)
+    assert answer["specimens"] == ["strip", "sheet"]
+    assert answer["modulus_MPa"]["mean"]["mean"] == pytest.approx(0.4, rel=0.3)
+    assert "the prior of the scatter has a say" in " ".join(answer["sentences"])
+    assert run("population", *runs, "--out", "p")[0] == 0
+    assert run("report", answer["stored"], "--out", "page")[0] == 0
+    assert "The population of specimens" in Path("page/index.html").read_text()
+    code, out, err = run("population", runs[0], "--out", "p")
+    assert (code, out) == (1, "")
+    assert "two specimens at least" in err

@@ -18,7 +18,7 @@ from bayesmembrane.ground.showable import Showable
 WIDE = 0.25
 """Scale of the half-normal prior on the scatter of a coordinate, in standard deviations of the coordinate's prior:
 0.5 for ln(modulus), so that specimens of one rubber may well differ by half."""
-ROUNDS, TRIED, KEPT = 5, 8192, 4000
+ROUNDS, TRIED, KEPT = 5, 4096, 4000
 FROM_PRIOR, DEGREES = 0.1, 4.0  # part of the proposals that stay with the prior; degrees of freedom of the others
 ENOUGH = 400.0  # effective draws at least
 
