@@ -41,6 +41,9 @@ _WRITTEN = {
     "stretch_2": ("stretch_2", 1.0),
     "nominal_stress_1": ("nominal_stress_1_MPa", 1e-6),
     "nominal_stress_2": ("nominal_stress_2_MPa", 1e-6),
+    "nominal_stress_sd": ("nominal_stress_sd_MPa", 1e-6),
+    "nominal_stress_1_sd": ("nominal_stress_1_sd_MPa", 1e-6),
+    "nominal_stress_2_sd": ("nominal_stress_2_sd_MPa", 1e-6),
 }
 
 _TO_COMPLETE = """
