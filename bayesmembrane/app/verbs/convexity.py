@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from bayesmembrane.app.options import FilmOptions, OutputOptions, StoredOnRequestOption
 from bayesmembrane.app.terminal import answer, numbers, say
 from bayesmembrane.ground.errors import SettingsError
+
+if TYPE_CHECKING:
+    from bayesmembrane.physics.materials.base import Material
 
 place = 2
 
@@ -40,6 +43,7 @@ def verb(
         "elliptic": elliptic.elliptic,
         "elliptic_margin": elliptic.margin,
         "box": edges,
+        "stability_limits": _limits(made),
     }
     l1, l2 = found.worst
     sentence = (
@@ -51,4 +55,20 @@ def verb(
     settings = {"parameters": made.vector.tolist(), "box": edges}
     what = Asked("convexity", "", made.name, float("nan"), digest(settings))
     kept_as = kept("convexity", {**document, **settings}, document, what, stored.folder)
-    answer(kept_as.document, output.as_json, lambda: say(sentence))
+    answer(kept_as.document, output.as_json, lambda: say(f"{sentence}\n{_told(document['stability_limits'])}"))
+
+
+def _limits(film: Material) -> dict[str, dict[str, float | None]]:
+    """Stretch at which each mode loses stability, in compression and in tension; None where it does not."""
+    from bayesmembrane.physics.stability import stability
+
+    found: dict[str, dict[str, float | None]] = {}
+    for (mode, side), limit in stability(type(film), film.vector).limits.items():
+        found.setdefault(mode, {})[side] = float(limit[0]) if limit[0] == limit[0] else None
+    return found
+
+
+def _told(limits: Any) -> str:
+    """The limits in a line."""
+    said = [f"{mode} {side} {limit:.4g}" for mode, sides in limits.items() for side, limit in sides.items() if limit]
+    return f"It loses stability (Drucker) at the stretches: {', '.join(said) or 'none between 0.1 and 10'}."
