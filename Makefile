@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-import study-scale study-kill study-damage study-seeds study-sbc clean
+.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-import study-scale study-kill study-damage study-seeds study-sbc study-modes clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -28,6 +28,7 @@ help:
 	@echo "make study-import 10 000 damaged exports, what becomes of them, some minutes; IMPORT='--count 1000' asks for less"
 	@echo "make study-seeds 50 seeds for the statistical tests, lanes on and off, hours; goes on where it was; SEEDS='--group quick' asks for less"
 	@echo "make study-sbc  simulation-based calibration of every material, hours; goes on where it was; SBC='--only gent --limit 20' asks for less"
+	@echo "make study-modes four rubbers in several modes each, half an hour or so; goes on where it was; MODES='--no-evidence' asks for less"
 	@echo "make install  the set-up alone, into $(VENV)"
 	@echo "make lint     style, types and floors alone"
 	@echo "make clean    remove caches and build products; keeps $(VENV), chains and reports"
@@ -97,6 +98,9 @@ study-seeds: $(STAMP)
 
 study-sbc: $(STAMP)
 	$(PY) -m tests.studies.sbc --jobs $(PYTEST_WORKERS) --table docs/studies/sbc.md $(SBC)
+
+study-modes: $(STAMP)
+	$(PY) -m tests.studies.modes $(MODES)
 
 clean:
 	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

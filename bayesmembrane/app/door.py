@@ -175,7 +175,9 @@ def compare(
     return found
 
 
-def population(runs: Sequence[Run], *, pool: Sequence[str] = (), seed: int = 0, out: Folder | None = None) -> Population:
+def population(
+    runs: Sequence[Run], *, pool: Sequence[str] = (), seed: int = 0, out: Folder | None = None
+) -> Population:
     """Mean and scatter of the specimens behind ``runs`` of `sample`, one run each, and what the next one will be.
 
     ``pool`` are coordinates: ``ln_modulus`` and the others of the material unless given; of effects by full names, as
@@ -277,7 +279,9 @@ def _predicted(result: Any) -> Any:
 def _single(hypothesis: Claims) -> Hypothesis:
     """The claim about one measurement."""
     if not isinstance(hypothesis, Hypothesis):
-        raise SettingsError("one measurement has one hypothesis", remedy="give the measurements as a dict by label, too")
+        raise SettingsError(
+            "one measurement has one hypothesis", remedy="give the measurements as a dict by label, too"
+        )
     return hypothesis
 
 

@@ -40,7 +40,9 @@ def read_project(path: str | Path) -> tuple[Listed, ...]:
     root = load_toml(path)
     tables = root.table.get(TABLES)
     if not isinstance(tables, list) or not all(isinstance(t, dict) for t in tables) or not tables:
-        raise DataError("the project lists no tests", str(path), "write a table [[test]] with curve and specimen for each")
+        raise DataError(
+            "the project lists no tests", str(path), "write a table [[test]] with curve and specimen for each"
+        )
     if odd := sorted(set(root.table) - {TABLES}):
         raise DataError(f'the key "{odd[0]}" is unknown', str(path), "a project holds [[test]] tables and nothing else")
     return tuple(_listed(TomlSection(t, str(path), f"{TABLES} {i}"), path.parent) for i, t in enumerate(tables, 1))
@@ -55,6 +57,7 @@ def _listed(section: TomlSection, folder: Path) -> Listed:
     section.finish()
     if effects is not None and not isinstance(effects, str):
         raise DataError('effects must be a text like "zero_offset,prestretch"', section.where)
-    assert curve is not None and specimen is not None
+    assert curve is not None
+    assert specimen is not None
     measured = read_measurement(folder / curve, folder / specimen)
     return Listed(label or "", measured if end is None else measured.up_to(end), effects, noise)

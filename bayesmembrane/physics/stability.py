@@ -50,7 +50,13 @@ def stability(material: type[Material], parameters: ArrayLike) -> Stability:
     change of sign is halved down to round-off.
     """
     p = np.atleast_2d(np.asarray(parameters, dtype=float))
-    return Stability({(mode, side): _first(material, p, across, end) for mode, across in MODES.items() for side, end in SIDES.items()})
+    return Stability(
+        {
+            (mode, side): _first(material, p, across, end)
+            for mode, across in MODES.items()
+            for side, end in SIDES.items()
+        }
+    )
 
 
 def tangent(material: type[Material], parameters: Array, l1: Array, l2: Array) -> tuple[Array, Array, Array]:

@@ -32,8 +32,8 @@ def sentences(found: Population) -> tuple[str, ...]:
     if LN_MODULUS in s.names:
         m = found.modulus()
         said.append(
-            f"{len(s.labels)} specimens: the shear modulus is {three_digits(m['mean']['mean'])} MPa on average over the "
-            f"population and scatters by {three_digits(m['scatter']['mean'])} MPa "
+            f"{len(s.labels)} specimens: the shear modulus is {three_digits(m['mean']['mean'])} MPa on average over "
+            f"the population and scatters by {three_digits(m['scatter']['mean'])} MPa "
             f"({percent(m['scatter']['mean'] / m['mean']['mean'])}) between specimens; the next one lies with 94 % "
             f"between {three_digits(m['next']['hdi_94'][0])} and {three_digits(m['next']['hdi_94'][1])} MPa."
         )
@@ -41,8 +41,8 @@ def sentences(found: Population) -> tuple[str, ...]:
         said.append(f"With {len(s.labels)} specimens the prior of the scatter has a say in it.")
     if s.skewed:
         said.append(
-            f"The draws of {listed(s.skewed)} are skewed, and a normal distribution stands for them: take the intervals "
-            "for rough."
+            f"The draws of {listed(s.skewed)} are skewed, and a normal distribution stands for them: take the "
+            "intervals for rough."
         )
     return tuple(said)
 

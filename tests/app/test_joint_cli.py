@@ -48,7 +48,17 @@ def run(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFix
 
 
 def test_with_and_a_project_are_the_same_question(run: Run) -> None:
-    one = run("fit", "strip.csv", "--specimen", "strip.toml", "--with", "sheet.csv:sheet.toml", "--material", "neo_hookean", "--json")
+    one = run(
+        "fit",
+        "strip.csv",
+        "--specimen",
+        "strip.toml",
+        "--with",
+        "sheet.csv:sheet.toml",
+        "--material",
+        "neo_hookean",
+        "--json",
+    )
     other = run("fit", "project.toml", "--material", "neo_hookean", "--json")
     assert one[0] == other[0] == 0, one[2] + other[2]
     answer = json.loads(one[1])
@@ -82,7 +92,11 @@ def test_sampling_and_comparing(run: Run, short_walks: None) -> None:
     ("words", "code", "match"),
     [
         (("fit", "strip.csv", "--material", "gent"), 2, "--specimen"),
-        (("fit", "strip.csv", "--specimen", "strip.toml", "--with", "sheet.csv", "--material", "gent"), 1, "no curve with its"),
+        (
+            ("fit", "strip.csv", "--specimen", "strip.toml", "--with", "sheet.csv", "--material", "gent"),
+            1,
+            "no curve with its",
+        ),
         (("fit", "project.toml", "--material", "gent", "--effects", "zero_offset@disc"), 1, '"disc"'),
         (("fit", "project.toml", "--material", "gent", "--effects", "off_centre_disc"), 1, "no test can show it"),
         (("fit", "project.toml", "--material", "gent", "--then", "strip.csv"), 1, "lists its tests itself"),

@@ -42,7 +42,7 @@ def test_tests_are_listed_with_what_is_said_of_each(folder: Path) -> None:
         ('[[test]]\ncurve = "a.csv"\n', "specimen"),
         (TEST + "effects = 3\n", "effects must be a text"),
         (TEST + 'wieght = "2"\n', '"wieght" is unknown'),
-        ('extra = 1\n' + TEST, '"extra" is unknown'),
+        ("extra = 1\n" + TEST, '"extra" is unknown'),
         (TEST.replace("a.csv", "b.csv"), "b.csv"),
     ],
 )

@@ -30,7 +30,7 @@ def test_the_tangent_is_the_second_derivative_in_logarithms(name: str) -> None:
 
 
 def test_mooney_rivlin_with_a_negative_second_constant_has_the_limits_of_its_closed_form() -> None:
-    """Equibiaxial, l1 = l2 = l: D has the eigenvectors (1, 1) and (1, -1), and both eigenvalues are polynomials of l."""
+    """Equibiaxial, l1 = l2 = l: D has the eigenvectors (1, 1) and (1, -1), and both eigenvalues are closed forms."""
     c1, c2 = 1.0, -0.05
     found = stability(material("mooney_rivlin"), [[c1, c2]])
 

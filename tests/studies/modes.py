@@ -18,8 +18,8 @@ import numpy as np
 from bayesmembrane.calibration.joint.claim import joint
 from bayesmembrane.calibration.joint.fit import JointFit, fit_jointly
 from bayesmembrane.calibration.joint.run import JointRun
-from bayesmembrane.comparison.joint import compare_jointly
 from bayesmembrane.comparison.jobs import Judging
+from bayesmembrane.comparison.joint import compare_jointly
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
@@ -45,7 +45,7 @@ OGDEN_1972 = (0.63, 0.0012, -0.01, 1.3, 5.0, -2.0)
 """mu_i in MPa and a_i of R. W. Ogden, Proc. R. Soc. A 326 (1972) 565, for Treloar's rubber."""
 
 
-def tests_of(rubber: str, folder: Path = DATA) -> dict[str, Measurement]:
+def measured(rubber: str, folder: Path = DATA) -> dict[str, Measurement]:
     """The tests of one rubber by mode."""
     if rubber == "Kawamura_2001":
         return _kawamura(folder)
@@ -139,7 +139,9 @@ def judged(rubber: str, tests: Mapping[str, Measurement], names: list[str], out:
         found: Comparison = read(folder, "comparison")
         return found
     claims = [joint(tests, hypothesis(name, convexity="none")) for name in names]
-    done = compare_jointly(claims, Judging(seed=1, ess=300.0, out=folder / "runs"), progress=lambda *words: print(*words))
+    done = compare_jointly(
+        claims, Judging(seed=1, ess=300.0, out=folder / "runs"), progress=lambda *words: print(*words)
+    )
     store(folder, "comparison", done, {"rubber": rubber})
     return done
 
@@ -152,9 +154,9 @@ def page(rows: list[Row], compared: Mapping[str, Comparison], folder: Path = DAT
     parts = [
         "# One energy in several modes",
         "",
-        "Made by `make study-modes` (seed 1) from the measurements of L. R. G. Treloar (1944), S. Kawabata et al. (1981), "
-        "L. Meunier et al. (2008) and T. Kawamura et al. (2001). None states a noise: each mode is weighed by the one that "
-        "is inferred for it. No convexity is asked for. Residuals are root mean squares of nominal stress; foretold is "
+        "Made by `make study-modes` (seed 1) from the measurements of L. R. G. Treloar (1944), S. Kawabata et al. "
+        "(1981), L. Meunier et al. (2008) and T. Kawamura et al. (2001). None states a noise: each mode is weighed by "
+        "the one that is inferred for it. No convexity is asked for. Residuals are root mean squares of nominal stress; foretold is "
         "the residual of a mode that was left out of the fit, relative to the root mean square stress of that mode. "
         "ln Z is that of all modes together, by nested and by bridge sampling, relative to the best; a dash means that "
         "the two did not agree or that it was not computed.",
@@ -198,11 +200,16 @@ def _cells(r: Row, modes: list[str], compared: Comparison | None) -> list[str]:
 
 def _beside_published(rows: list[Row], folder: Path) -> list[str]:
     """Ogden's published constants on Treloar's curves, beside the fit of all modes."""
-    tests = tests_of("Treloar_1944", folder)
+    tests = measured("Treloar_1944", folder)
     mu, a = np.array(OGDEN_1972[:3]), np.array(OGDEN_1972[3:])
     film = materials()["ogden"].from_3d(np.concatenate([mu * MPA, a]), THICKNESS).vector[None, :]
     own = next(r for r in rows if r.rubber == "Treloar_1944" and r.material == "ogden")
-    lines = ["## Ogden's constants of 1972 beside the fit", "", "| mode | published, MPa | fit of all modes, MPa |", "|---|---|---|"]
+    lines = [
+        "## Ogden's constants of 1972 beside the fit",
+        "",
+        "| mode | published, MPa | fit of all modes, MPa |",
+        "|---|---|---|",
+    ]
     for mode, m in tests.items():
         rms = in_mpa(m, float(np.sqrt(np.mean(m.force**2))))
         lines.append(f"| {mode} | {missed(m, 'ogden', film) * rms:.3f} | {own.residual[mode]:.3f} |")
@@ -220,11 +227,11 @@ def main() -> None:
         raise SystemExit(f"{DATA} is not there")
     names = sorted(materials())
     wanted = [r for r in chosen.only.split(",") if r] or list(RUBBERS)
-    rows = [row(rubber, name, tests_of(rubber)) for rubber in wanted for name in names]
+    rows = [row(rubber, name, measured(rubber)) for rubber in wanted for name in names]
     compared: dict[str, Comparison] = {}
     TARGET.write_text(page(rows, compared), encoding="utf-8")
     for rubber in [] if chosen.no_evidence else wanted:
-        compared[rubber] = judged(rubber, tests_of(rubber), names, chosen.out)
+        compared[rubber] = judged(rubber, measured(rubber), names, chosen.out)
         TARGET.write_text(page(rows, compared), encoding="utf-8")
     print(TARGET.read_text(encoding="utf-8"))
 

@@ -24,7 +24,9 @@ def verb(
     output: OutputOptions,
     pool: Annotated[
         str,
-        typer.Option("--pool", help="Coordinates, by commas: ln_modulus, bend, thickness.error; those of the material."),
+        typer.Option(
+            "--pool", help="Coordinates, by commas: ln_modulus, bend, thickness.error; those of the material."
+        ),
     ] = "",
 ) -> None:
     """Mean and scatter of a population of specimens, each with an interval, and the next specimen."""
@@ -42,6 +44,10 @@ def show(found: Population) -> None:
     from bayesmembrane.words.population import rows, sentences
 
     head = ["", "mean", "sd", "94 % interval"]
-    table(f"{len(found.specimens.labels)} specimens", head, [[r[0], *(f"{v:.4g}" for v in r[1:3]), r[3]] for r in rows(found)])
+    table(
+        f"{len(found.specimens.labels)} specimens",
+        head,
+        [[r[0], *(f"{v:.4g}" for v in r[1:3]), r[3]] for r in rows(found)],
+    )
     for sentence in sentences(found):
         say(sentence)

@@ -19,7 +19,7 @@ WIDE = 0.25
 """Scale of the half-normal prior on the scatter of a coordinate, in standard deviations of the coordinate's prior:
 0.5 for ln(modulus), so that specimens of one rubber may well differ by half."""
 ROUNDS, TRIED, KEPT = 5, 4096, 4000
-FROM_PRIOR, DEGREES = 0.1, 4.0  # part of the proposals that stay with the prior; degrees of freedom of the others
+FROM_PRIOR, DEGREES = 0.1, 4  # part of the proposals that stay with the prior; degrees of freedom of the others
 ENOUGH = 400.0  # effective draws at least
 
 
@@ -77,7 +77,9 @@ class Population(Showable):
         middle = 1e-6 * np.exp(self.mean[:, i])
         return {
             "mean": _told(middle),
-            "scatter": _told(middle * np.sqrt(np.expm1(self.scatter[:, i] ** 2)) * np.exp(0.5 * self.scatter[:, i] ** 2)),
+            "scatter": _told(
+                middle * np.sqrt(np.expm1(self.scatter[:, i] ** 2)) * np.exp(0.5 * self.scatter[:, i] ** 2)
+            ),
             "next": _told(1e-6 * np.exp(self.following[:, i])),
         }
 
@@ -85,8 +87,8 @@ class Population(Showable):
 def population(specimens: Specimens, seed: int = 0, draws: int = KEPT) -> Population:
     """p(mu, tau | z) with z_j ~ N(mu, diag(tau)^2 + S_j), mu ~ N(centre, spread^2), tau_i ~ half-normal(spread_i / 4).
 
-    For a given tau all else is normal: mu is integrated out, and drawn afterwards, as the specimens' own values are. tau
-    is drawn by importance sampling in ln tau from a t-distribution that is fitted to the weighted draws, round by
+    For a given tau all else is normal: mu is integrated out, and drawn afterwards, as the specimens' own values are.
+    tau is drawn by importance sampling in ln tau from a t-distribution that is fitted to the weighted draws, round by
     round, beside one part of the prior; draws are then taken with their weights. No chain has to converge.
     A. Gelman, Bayesian Anal. 1 (2006) 515, on the prior of tau.
 
@@ -137,7 +139,8 @@ def _gathered(s: Specimens, tau: Array) -> tuple[Array, Array, Array]:
 def _means(s: Specimens, tau: Array, rng: np.random.Generator) -> Array:
     """Draws (B, q) of mu given tau."""
     precision, right, _ = _gathered(s, tau)
-    return _normal(np.linalg.solve(precision, right[:, :, None])[:, :, 0], np.linalg.inv(precision), rng)
+    centre = np.asarray(np.linalg.solve(precision, right[:, :, None])[:, :, 0])
+    return _normal(centre, np.asarray(np.linalg.inv(precision)), rng)
 
 
 def _own(s: Specimens, mean: Array, tau: Array, rng: np.random.Generator) -> Array:

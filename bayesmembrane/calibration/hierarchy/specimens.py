@@ -54,8 +54,8 @@ class Specimens:
 def of_runs(runs: Sequence[Run], pool: Sequence[str] = ()) -> Specimens:
     """Specimens from one run each, of the same material: what the data alone say of it.
 
-    ``pool`` names coordinates, ``ln_modulus`` (the default with all others of the material) among them; those of effects
-    by their full names, as ``thickness.error``. The draws' mean and covariance, less what the prior put into
+    ``pool`` names coordinates: ``ln_modulus`` and all others of the material, unless given; those of effects by their
+    full names, as ``thickness.error``. The draws' mean and covariance, less what the prior put into
     them, S_j^-1 = C_j^-1 - C_0^-1, make the normal likelihood: exact where it is normal, as it is of coordinates that
     the data tell well. Raises `SettingsError` for runs of different materials, or coordinates that one of them lacks.
     """

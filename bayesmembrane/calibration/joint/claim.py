@@ -40,7 +40,8 @@ class Part:
     def __post_init__(self) -> None:
         if not _LABEL.fullmatch(self.label) or self.label == WALK:
             raise SettingsError(
-                f'a test cannot be called "{self.label}"', remedy=f"use letters, digits, - and _, as in strip-1, and not {WALK}"
+                f'a test cannot be called "{self.label}"',
+                remedy=f"use letters, digits, - and _, as in strip-1, and not {WALK}",
             )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesmembrane.calibration.joint.claim import Joint
 from bayesmembrane.calibration.joint.objective import JointObjective
@@ -51,7 +52,7 @@ class JointFit(Showable):
     joint : what was fitted; noise models play no part
     coordinates : (K',) coordinates that shape the curves, at the optimum
     covariance : (K', K') of them, from the Jacobian and the residual variance; nan at a bound
-    names, values, sds : natural parameters of the thinnest film and effects of the tests; nan where nothing sets a scale
+    names, values, sds : natural parameters of the thinnest film, effects of the tests; nan where nothing sets a scale
     parts : the tests
     objective : root of the sum of squares in units of the noises
     margins : by how much each convexity mode is met in the test that meets it least
@@ -193,7 +194,7 @@ def _natural(objective: JointObjective, whole: Array, covariance: Array) -> tupl
     return tuple(names), values, sds
 
 
-def _covariance(r: Array, jacobian: Array, free: Array) -> Array:
+def _covariance(r: Array, jacobian: Array, free: NDArray[np.bool_]) -> Array:
     """s^2 (J^T J)^-1 of the ``free`` coordinates, nan for the others and without a degree of freedom."""
     k = jacobian.shape[1]
     out, at = np.full((k, k), np.nan), np.flatnonzero(free)

@@ -31,7 +31,10 @@ _TABLE_HINTS = (
 )
 _BIAXIAL = "biaxial"
 _TWO_AXES = {"stretch_1": RATIO, "stretch_2": RATIO, "nominal_stress_1": STRESS, "nominal_stress_2": STRESS}
-_NOISE = {"force_sd": FORCE, **dict.fromkeys(("nominal_stress_sd", "nominal_stress_1_sd", "nominal_stress_2_sd"), STRESS)}
+_NOISE = {
+    "force_sd": FORCE,
+    **dict.fromkeys(("nominal_stress_sd", "nominal_stress_1_sd", "nominal_stress_2_sd"), STRESS),
+}
 _BRACKETS = re.compile(r"(?P<name>[^\[\](),]+?)[\s_]*(?:\[(?P<a>[^\[\]]*)\]|\((?P<b>[^()]*)\))")
 
 

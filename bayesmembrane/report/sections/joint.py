@@ -75,7 +75,7 @@ class JointSection(Section):
         return runs + fits
 
     def subject(self, results: Sequence[Any]) -> Subject | None:
-        every = [*of_kind(results, JointRun), *of_kind(results, JointFit)]
+        every: list[JointRun | JointFit] = [*of_kind(results, JointRun), *of_kind(results, JointFit)]
         if not every:
             return None
         films = dict.fromkeys(p.measurement.specimen.name for e in every for p in e.joint.parts)

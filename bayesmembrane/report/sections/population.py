@@ -77,7 +77,10 @@ def specimens_picture(found: Population) -> Picture:
         for i, ax in enumerate(np.atleast_1d(figure.subplots(len(s.names), 1))):
             for j in range(len(s.labels)):
                 alone = s.values[j, i] + 1.645 * np.sqrt(s.covariances[j, i, i]) * np.array([-1.0, 0.0, 1.0])
-                for y, values, c in ((j - 0.12, alone, MUTED), (j + 0.12, np.quantile(found.own[:, j, i], q), RANGE_COLOURS[0])):
+                for y, values, c in (
+                    (j - 0.12, alone, MUTED),
+                    (j + 0.12, np.quantile(found.own[:, j, i], q), RANGE_COLOURS[0]),
+                ):
                     ax.plot([values[0], values[2]], [y, y], color=c, linewidth=2.2)
                     ax.plot([values[1]], [y], marker="o", color=c, markersize=4.5)
             following = np.quantile(found.following[:, i], q)

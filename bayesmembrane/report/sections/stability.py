@@ -28,8 +28,8 @@ class StabilitySection(Section):
             return ()
         text = (
             "Stretches at which the material loses stability (Drucker's criterion, as finite element programs print "
-            "it), whatever the film reaches: median and 90 % interval of the draws that lose it, and their share. A dash: "
-            f"none does between stretches of {min(SIDES.values()):g} and {max(SIDES.values()):g}."
+            "it), whatever the film reaches: median and 90 % interval of the draws that lose it, and their share. A "
+            f"dash: none does between stretches of {min(SIDES.values()):g} and {max(SIDES.values()):g}."
         )
         return [Text(text), limits_table(shown)]
 

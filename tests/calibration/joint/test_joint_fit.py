@@ -15,7 +15,10 @@ MR = (8.0, 2.0)
 
 
 def test_noiseless_tests_give_back_the_truth_in_the_thinnest_film() -> None:
-    tests = [made(STRIP, "yeoh", (9.0, -0.2, 0.02), noise=0.0, thickness=4e-4), made(SHEET, "yeoh", (9.0, -0.2, 0.02), noise=0.0)]
+    tests = [
+        made(STRIP, "yeoh", (9.0, -0.2, 0.02), noise=0.0, thickness=4e-4),
+        made(SHEET, "yeoh", (9.0, -0.2, 0.02), noise=0.0),
+    ]
     found = fit_jointly(joint(tests, hypothesis("yeoh")))
     np.testing.assert_allclose([v for v, _ in found.parameters.values()], (9.0, -0.2, 0.02), rtol=1e-4)
     thick = found.parts[0].parameters
@@ -34,7 +37,10 @@ def test_one_test_with_a_stated_noise_is_its_weighted_fit() -> None:
 
 
 def test_two_tests_are_weighed_by_their_noises_as_another_optimiser_does() -> None:
-    tests = {"a": made(STRIP, "mooney_rivlin", MR, seed=3, noise=0.002), "b": made(SHEET, "mooney_rivlin", MR, seed=4, noise=0.05)}
+    tests = {
+        "a": made(STRIP, "mooney_rivlin", MR, seed=3, noise=0.002),
+        "b": made(SHEET, "mooney_rivlin", MR, seed=4, noise=0.05),
+    }
     claim = hypothesis("mooney_rivlin")
     found = fit_jointly(joint(tests, claim))
 
