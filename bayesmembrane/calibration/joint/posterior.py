@@ -109,6 +109,6 @@ class JointPosterior:
 
     @cached_property
     def _widths(self) -> list[int]:
-        """Columns of each test in `Evaluation.curves`: readings, and traces of effects where the noise asks for them."""
+        """Columns of each test in `Evaluation.curves`: readings, and traces of effects where noise asks for them."""
         traced = [len(p.hypothesis.effects) if p.noise.traced else 0 for p in self.parts]
         return [len(p.measurement) * (1 + n) for p, n in zip(self.parts, traced, strict=True)]
