@@ -23,6 +23,7 @@ from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.threads import one_thread
 from bayesmembrane.physics import hypothesis as hypotheses
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.reconstruction.result import Reconstruction
@@ -64,6 +65,7 @@ def hypothesis(
     return hypotheses.hypothesis(material, [n.strip() for n in names if n.strip()], noise, convexity)
 
 
+@one_thread
 def fit(
     measurement: Measurement,
     hypothesis: Hypothesis,
@@ -78,6 +80,7 @@ def fit(
     return analyses.fit(measurement, hypothesis, _work(seed, out), loss=loss).result
 
 
+@one_thread
 def sample(
     measurement: Measurement,
     hypothesis: Hypothesis,
@@ -95,6 +98,7 @@ def sample(
     return analyses.sample(measurement, hypothesis, _work(seed, out, ess), whole=whole).result
 
 
+@one_thread
 def compare(
     measurement: Measurement,
     hypotheses: Sequence[Hypothesis],
@@ -113,6 +117,7 @@ def compare(
     return found
 
 
+@one_thread
 def valleys(
     measurement: Measurement,
     hypothesis: Hypothesis,
@@ -140,6 +145,7 @@ def diagnose(
     return analyses.diagnose(measurement, _asked(hypothesis), _work(seed, out)).result
 
 
+@one_thread
 def loop(
     measurement: Measurement,
     hypothesis: Hypothesis | None = None,
@@ -164,6 +170,7 @@ def _asked(hypothesis: Hypothesis | None) -> Question:
     return Question(hypotheses.hypothesis(min(materials())), declared=False)
 
 
+@one_thread
 def reconstruct(*, seed: int = 0, out: Folder | None = None) -> Reconstruction:
     """The measured curve behind the losses that the paper prints, with its covariance."""
     return analyses.reconstruct(_work(seed, out)).result
