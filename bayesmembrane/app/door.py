@@ -29,6 +29,7 @@ from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.threads import one_thread
 from bayesmembrane.physics import hypothesis as hypotheses
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.reconstruction.result import Reconstruction
@@ -91,6 +92,7 @@ def fit(
 def fit(measurement: Tests, hypothesis: Claims, *, seed: int = ..., out: Folder | None = ...) -> JointFit: ...
 
 
+@one_thread
 def fit(
     measurement: Measurement | Tests,
     hypothesis: Claims,
@@ -129,6 +131,7 @@ def sample(
 ) -> JointRun: ...
 
 
+@one_thread
 def sample(
     measurement: Measurement | Tests,
     hypothesis: Claims,
@@ -152,6 +155,7 @@ def sample(
     return analyses.sample(measurement, hypothesis, _work(seed, out, ess), whole=whole).result
 
 
+@one_thread
 def compare(
     measurement: Measurement | Tests,
     hypotheses: Sequence[Hypothesis],
@@ -213,6 +217,7 @@ def diagnose(
     return analyses.diagnose(measurement, _asked(hypothesis), _work(seed, out)).result
 
 
+@one_thread
 def loop(
     measurement: Measurement,
     hypothesis: Hypothesis | None = None,
@@ -237,6 +242,7 @@ def _asked(hypothesis: Hypothesis | None) -> Question:
     return Question(hypotheses.hypothesis(min(materials())), declared=False)
 
 
+@one_thread
 def reconstruct(*, seed: int = 0, out: Folder | None = None) -> Reconstruction:
     """The measured curve behind the losses that the paper prints, with its covariance."""
     return analyses.reconstruct(_work(seed, out)).result
