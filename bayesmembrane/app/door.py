@@ -179,6 +179,7 @@ def compare(
     return found
 
 
+@one_thread
 def population(
     runs: Sequence[Run], *, pool: Sequence[str] = (), seed: int = 0, out: Folder | None = None
 ) -> Population:
@@ -190,6 +191,7 @@ def population(
     return analyses.population(runs, _work(seed, out), pool=pool).result
 
 
+@one_thread
 def valleys(
     measurement: Measurement,
     hypothesis: Hypothesis,
@@ -207,6 +209,7 @@ def valleys(
     return analyses.valleys(measurement, hypothesis, _work(seed, out), ends=ends, rise=loss_rise).result
 
 
+@one_thread
 def diagnose(
     measurement: Measurement, hypothesis: Hypothesis | None = None, *, seed: int = 0, out: Folder | None = None
 ) -> Diagnosis:
