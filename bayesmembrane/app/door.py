@@ -209,7 +209,6 @@ def valleys(
     return analyses.valleys(measurement, hypothesis, _work(seed, out), ends=ends, rise=loss_rise).result
 
 
-@one_thread
 def diagnose(
     measurement: Measurement, hypothesis: Hypothesis | None = None, *, seed: int = 0, out: Folder | None = None
 ) -> Diagnosis:

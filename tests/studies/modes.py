@@ -158,8 +158,9 @@ def page(rows: list[Row], compared: Mapping[str, Comparison], folder: Path = DAT
         "(1981), L. Meunier et al. (2008) and T. Kawamura et al. (2001). None states a noise: each mode is weighed by "
         "the one that is inferred for it. No convexity is asked for. Residuals are root mean squares of nominal "
         "stress; foretold is the residual of a mode that was left out of the fit, relative to the root mean square "
-        "stress of that mode. ln Z is that of all modes together, by nested and by bridge sampling, relative to the best; a dash means that "
-        "the two did not agree or that it was not computed.",
+        "stress of that mode. ln Z is that of all modes together, by nested and by bridge sampling, relative to the "
+        "best, and the probability is that among these energies; a dash means that it was not computed, or that the two "
+        "estimators do not agree well enough for a ranking.",
         "",
     ]
     for rubber, title in RUBBERS.items():
