@@ -159,7 +159,7 @@ def page(rows: list[Row], compared: Mapping[str, Comparison], folder: Path = DAT
         "the one that is inferred for it. No convexity is asked for. Residuals are root mean squares of nominal "
         "stress; foretold is the residual of a mode that was left out of the fit, relative to the root mean square "
         "stress of that mode. ln Z is that of all modes together, by nested and by bridge sampling, relative to the "
-        "best, and the probability is that among these energies; a dash means that it was not computed, or that the two "
+        "best, the probability is that among these energies; a dash means that it was not computed, or that the two "
         "estimators do not agree well enough for a ranking.",
         "",
     ]
