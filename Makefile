@@ -28,7 +28,7 @@ help:
 	@echo "make study-import 10 000 damaged exports, what becomes of them, some minutes; IMPORT='--count 1000' asks for less"
 	@echo "make study-seeds 50 seeds for the statistical tests, lanes on and off, hours; goes on where it was; SEEDS='--group quick' asks for less"
 	@echo "make study-sbc  simulation-based calibration of every material, hours; goes on where it was; SBC='--only gent --limit 20' asks for less"
-	@echo "make study-modes four rubbers in several modes each, half an hour or so; goes on where it was; MODES='--no-evidence' asks for less"
+	@echo "make study-modes four rubbers in several modes each, half an hour or so; goes on where it was; MODES='--evidence-on none' asks for less"
 	@echo "make install  the set-up alone, into $(VENV)"
 	@echo "make lint     style, types and floors alone"
 	@echo "make clean    remove caches and build products; keeps $(VENV), chains and reports"

@@ -186,9 +186,9 @@ def _cells(r: Row, modes: list[str], compared: Comparison | None) -> list[str]:
     told += [f"{100 * r.foretold[m]:.3g} %" if np.isfinite(r.foretold[m]) else "-" for m in modes]
     if compared is None:
         return [*told, "-", "-", "-"]
-    judged_ = {c.hypothesis.material.name: c for c in compared.rows}[r.material]
-    e = judged_.evidence
-    if e is None or judged_.run is None:
+    judged_ = next((c for c in compared.rows if c.hypothesis.material.name == r.material), None)
+    e = None if judged_ is None else judged_.evidence
+    if judged_ is None or e is None or judged_.run is None:
         return [*told, "-", "-", "-"]
     best = max(c.evidence.best[0] for c in compared.rows if c.evidence)
     run: JointRun = read(judged_.run, "joint")
@@ -222,7 +222,10 @@ def main() -> None:
     options = argparse.ArgumentParser()
     options.add_argument("--out", type=Path, default=Path("/tmp/bayesmembrane-modes"))
     options.add_argument("--only", default="", help="rubbers by commas")
-    options.add_argument("--no-evidence", action="store_true")
+    options.add_argument("--evidence-on", default="all", help="rubbers by commas, all, or none")
+    options.add_argument(
+        "--energies", default="", help="energies whose evidence is computed, by commas; all unless given"
+    )
     chosen = options.parse_args()
     if not DATA.is_dir():
         raise SystemExit(f"{DATA} is not there")
@@ -231,8 +234,9 @@ def main() -> None:
     rows = [row(rubber, name, measured(rubber)) for rubber in wanted for name in names]
     compared: dict[str, Comparison] = {}
     TARGET.write_text(page(rows, compared), encoding="utf-8")
-    for rubber in [] if chosen.no_evidence else wanted:
-        compared[rubber] = judged(rubber, measured(rubber), names, chosen.out)
+    energies = [e for e in chosen.energies.split(",") if e] or names
+    for rubber in wanted if chosen.evidence_on == "all" else [r for r in wanted if r in chosen.evidence_on.split(",")]:
+        compared[rubber] = judged(rubber, measured(rubber), energies, chosen.out)
         TARGET.write_text(page(rows, compared), encoding="utf-8")
     print(TARGET.read_text(encoding="utf-8"))
 
