@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesmembrane.calibration.joint.objective import JointObjective
+from bayesmembrane.calibration.joint.objective import JointObjective, with_fewer_readings
 from bayesmembrane.calibration.joint.posterior import JointPosterior
 from bayesmembrane.calibration.posterior import Outcomes
 from bayesmembrane.calibration.sampling.convergence import effective_draws
@@ -54,7 +54,8 @@ def _evaluated(posterior: JointPosterior, x: Array, counts: Outcomes) -> Array:
 
 def _around(posterior: JointPosterior, rng: np.random.Generator) -> Array:
     """Draws (M, K) from wide t-distributions around the optima of likelihood times prior, with noises that suit."""
-    joint, objective = posterior.joint, JointObjective(posterior.joint, posterior.solve)
+    joint = posterior.joint
+    objective = JointObjective(with_fewer_readings(joint), posterior.solve)
     found, size, noises = objective.settled(objective.starts(rng), pull=True)
     # A stated noise that a material misses by far leaves the posterior as wide as what is inferred on top of it.
     noises = np.maximum(noises, _misfits(objective, found[0]) * (objective.first == 1.0))

@@ -85,3 +85,16 @@ def test_the_order_of_the_tests_does_not_matter() -> None:
     one, other = fit_jointly(Joint(parts)), fit_jointly(Joint(parts[::-1]))
     for name, (value, _) in one.parameters.items():
         assert other.parameters[name][0] == pytest.approx(value, rel=1e-4, abs=1e-8)
+
+
+def test_a_long_test_is_fitted_with_all_its_readings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bayesmembrane.calibration.joint.objective.MANY", 60)
+    long = made(STRIP, "mooney_rivlin", MR, seed=1, points=400, noise=0.01)
+    short = made(SHEET, "mooney_rivlin", MR, seed=2, specimen="sheet")
+    found = fit_jointly(joint([long, short], hypothesis("mooney_rivlin")))
+    assert found.parts[0].force.size == 400
+    # Standard errors of 400 readings: the values are within six of them.
+    for (value, sd), truth in zip(found.parameters.values(), MR, strict=True):
+        assert sd is not None
+        assert abs(value - truth) < 6 * sd
+        assert sd < 0.2
