@@ -9,6 +9,7 @@ from bayesmembrane.calibration.joint.run import JointRun
 from bayesmembrane.words.hypothesis import material_title
 from bayesmembrane.words.language import listed, three_digits
 from bayesmembrane.words.sampling import convergence_sentence, failure_sentence, noise_sentence, smooth_sentence
+from bayesmembrane.words.seen import seen
 
 
 def document(run: JointRun) -> dict[str, Any]:
@@ -38,7 +39,8 @@ def answer(run: JointRun) -> str:
 
 def fit_sentence(found: JointFit) -> str:
     """How well one energy fits all tests."""
-    tests = [f"{p.label} {three_digits(1e3 * p.rmse_N)} mN" for p in found.parts]
+    both = zip(found.parts, found.joint.parts, strict=True)
+    tests = [f"{fitted.label} {seen(part.measurement).error(fitted.rmse_N)}" for fitted, part in both]
     return (
         f"{material_title(found.joint.material.name)} on {listed(found.joint.labels)} together leaves root mean square "
         f"residuals of {listed(tests)}."

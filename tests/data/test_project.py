@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from bayesmembrane.data.project import read_project
+from bayesmembrane.data.shipped import shipped
 from bayesmembrane.ground.errors import DataError
 
 CURVE = "stretch,nominal_stress_MPa\n1.1,0.05\n1.2,0.09\n1.3,0.12\n"
@@ -49,3 +50,14 @@ def test_tests_are_listed_with_what_is_said_of_each(folder: Path) -> None:
 def test_faults_are_said_in_a_sentence(folder: Path, text: str, match: str) -> None:
     with pytest.raises(DataError, match=match):
         read_project(project(folder, text))
+
+
+def test_the_project_that_ships_has_three_modes_of_one_silicone() -> None:
+    found = read_project(shipped("meunier.toml"))
+    assert [(t.label, t.measurement.rig.name, len(t.measurement)) for t in found] == [
+        ("uniaxial", "uniaxial", 33),
+        ("planar", "planar", 19),
+        ("equibiaxial", "equibiaxial", 14),
+    ]
+    assert found[0].measurement.deflection.min() < 0  # compression, too
+    assert all("MIT" in t.measurement.provenance.origin for t in found)

@@ -171,11 +171,17 @@ def bands_picture(labels: Sequence[str], shown: Sequence[Shown]) -> Picture:
             ax.set_visible(False)
         for ax, label, s in zip(grid.ravel(), labels, shown, strict=False):
             d, how, c = s.digest, s.how, colour(s.look)
-            x, inside = how.along(d.deflection), ~d.beyond
-            band(ax, x, how.carried(d.repeat), inside, Shade(c, 0.18))
-            band(ax, x, how.carried(d.curve), inside, Shade(c, 0.4))
-            ax.plot(x[inside], how.carried(d.curve[1])[inside], color=c)
             errorbars(ax, s.points)
+            if s.film.rig.has_path:
+                x, inside = how.along(d.deflection), ~d.beyond
+                band(ax, x, how.carried(d.repeat), inside, Shade(c, 0.18))
+                band(ax, x, how.carried(d.curve), inside, Shade(c, 0.4))
+                ax.plot(x[inside], how.carried(d.curve[1])[inside], color=c)
+            else:  # each state is by itself, and no curve leads through them
+                low, middle, high = how.carried(d.curves_at)
+                x = how.along(d.at)
+                ax.vlines(x, low, high, color=c, linewidth=4, alpha=0.4)
+                ax.plot(x, middle, color=c, marker="_", markersize=9, linestyle="none", zorder=6)
             ax.set_title(label)
             ax.set_xlabel(how.travel_label)
             ax.set_ylabel(how.load_label)
