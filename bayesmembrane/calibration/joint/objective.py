@@ -18,6 +18,7 @@ from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.mechanics import api
 
 BEFORE = 0.01  # of the largest force: the noise of a test that states none, before residuals tell it
+FOLLOWED = 0.01  # of that, of the one test that is to be followed closely
 LEAST = 1e-6  # the same, at least: no test fits exactly
 KEPT, STARTED = 40, 12  # starts of each test that are looked at in all, and from which a descent begins
 ITERATIONS, ROUNDS, SETTLED = 60, 30, 1e-5
@@ -140,24 +141,52 @@ class JointObjective:
         """(x (M, K'), |r| (M,), noises (P,)): optima, the best first, with the noise that their best residual shows.
 
         A test that states no noise gets the root of |r_m|^2 / N_m, which maximises its likelihood, and the search goes
-        on with it until neither changes.
+        on with it until neither changes. Such likelihoods have several maxima, at each of which another test is
+        followed closely: it is begun with all noises alike, and with that of one test after the other much smaller.
+        The one of the largest likelihood counts; the optima of the others stand behind it.
         """
-        noises = self.first
+        found = [self._settled(start, noises, pull) for noises in self._beginnings()]
+        found.sort(key=lambda each: -self._log_likelihood(each[0][0], each[2]))
+        best, size, noises = found[0]
+        if len(found) == 1:
+            return best, size, noises
+        x = np.concatenate([best[:1], *(other[0][:1] for other in found[1:]), best[1:]])
+        return x, np.concatenate([size[:1], *(other[1][:1] for other in found[1:]), size[1:]]), noises
+
+    def _beginnings(self) -> list[Array]:
+        """Noises (P,) to begin with."""
+        inferred = [i for i, o in enumerate(self.parts) if o.loss != "weighted"]
+        out = [self.first]
+        for i in inferred if len(self.parts) > 1 else []:
+            out.append(self.first.copy())
+            out[-1][i] *= FOLLOWED
+        return out
+
+    def _log_likelihood(self, x: Array, noises: Array) -> float:
+        """ln p(y | x, noises) + const of one x (K',)."""
+        r = self.batch(x[None, :], noises)[0][0]
+        return float(-0.5 * np.sum(r * r) - np.sum(self.sizes * np.log(noises)))
+
+    def _settled(self, start: Array, noises: Array, pull: bool) -> tuple[Array, Array, Array]:
+        """The maximum that is reached from noises (P,)."""
         x, size = self.descended(start, noises, pull)
         for _ in range(ROUNDS):
-            order = np.argsort(size, kind="stable")
-            x, size = x[order][np.isfinite(size[order])], size[order][np.isfinite(size[order])]
-            if not len(x):
-                raise SettingsError(
-                    f"no {self.joint.label()} film was found that has forces and slopes in every test",
-                    remedy="use shorter ranges or another material",
-                )
+            x, size = self._in_order(x, size)
             before, noises = noises, self.inferred(x[0])
             if np.all(np.abs(np.log(noises / before)) < SETTLED):
                 break
             x, size = self.descended(x, noises, pull)
-        order = np.argsort(size, kind="stable")
-        return x[order], size[order], noises
+        return *self._in_order(x, size), noises
+
+    def _in_order(self, x: Array, size: Array) -> tuple[Array, Array]:
+        """The optima x (M, K') that have a curve, by size (M,); raises `SettingsError` without any."""
+        order = np.argsort(size, kind="stable")[: np.count_nonzero(np.isfinite(size))]
+        if not order.size:
+            raise SettingsError(
+                f"no {self.joint.label()} film was found that has forces and slopes in every test",
+                remedy="use shorter ranges or another material",
+            )
+        return x[order], size[order]
 
     def inferred(self, x: Array) -> Array:
         """(P,) the noises at one x (K',): 1 where a test states its own, else the root mean square residual in N."""

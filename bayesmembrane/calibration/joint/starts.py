@@ -12,7 +12,8 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array
 
-EACH, ROUNDS = 256, 5
+EACH, ROUNDS, AROUND = 256, 5, 96
+MOST = 4  # optima of the largest likelihood
 LIKELY = 40.0  # of |r|^2 above the least: valleys beyond it hold nothing of the posterior
 WIDER, DEGREES = 1.5, 4.0  # than the curvature says, and degrees of freedom of the t-distribution around a valley
 SPARE = 1.5  # effective number of candidates for each walker
@@ -53,30 +54,33 @@ def _evaluated(posterior: JointPosterior, x: Array, counts: Outcomes) -> Array:
 
 
 def _around(posterior: JointPosterior, rng: np.random.Generator) -> Array:
-    """Draws (M, K) from wide t-distributions around the optima of likelihood times prior, with noises that suit."""
-    joint = posterior.joint
-    objective = JointObjective(with_fewer_readings(joint), posterior.solve)
-    found, size, noises = objective.settled(objective.starts(rng), pull=True)
-    # A stated noise that a material misses by far leaves the posterior as wide as what is inferred on top of it.
-    noises = np.maximum(noises, _misfits(objective, found[0]) * (objective.first == 1.0))
-    found, size = objective.descended(found, noises, pull=True)
-    likely = found[size**2 < np.min(size**2) + LIKELY]
-    slopes = objective.batch(likely, noises)[1]
-    precision = np.einsum("mnk,mnl->mkl", slopes, slopes) + np.diag(objective.spread**-2.0)
-    root = np.linalg.cholesky(np.linalg.inv(precision))
-    count = EACH * min(3, len(likely))
-    which, low_high = rng.integers(len(likely), size=count), objective.bounds
-    z = rng.standard_normal((count, likely.shape[1])) * np.sqrt(DEGREES / rng.chisquare(DEGREES, (count, 1)))
-    x = posterior.prior.draw(rng, count)
-    x[:, joint.curve] = np.clip(likely[which] + WIDER * np.einsum("mkl,ml->mk", root[which], z), *low_high)
-    for i, residual in enumerate(objective.each(found[0])):
+    """Draws (M, K) from wide t-distributions around optima of likelihood times prior, with noises that suit each."""
+    objective = JointObjective(with_fewer_readings(posterior.joint), posterior.solve)
+    found, _, noises = objective.settled(objective.starts(rng), pull=True)
+    likely, size = objective.descended(found, np.maximum(noises, _noises(objective, found[0])), pull=True)
+    likely = likely[size**2 < np.min(size**2) + LIKELY]
+    # Each test may be followed closely at the cost of the others, and several energies may follow all of them.
+    modes = [*found[: len(posterior.joint.parts) + 1], *likely[:MOST]]
+    return np.concatenate([_drawn(posterior, objective, x, rng) for x in modes])
+
+
+def _noises(objective: JointObjective, x: Array) -> Array:
+    """(P,) N, or in units of the stated noise: what residuals at one x (K',) show, and what is stated at least."""
+    misfits = np.array([np.sqrt(np.mean(r * r)) for r in objective.each(x)])
+    return np.maximum(objective.inferred(x), np.where(objective.first == 1.0, misfits, 0.0))
+
+
+def _drawn(posterior: JointPosterior, objective: JointObjective, mode: Array, rng: np.random.Generator) -> Array:
+    """Draws (AROUND, K) around one optimum (K',), as wide as its curvature says, and wider."""
+    noises, (low, high) = _noises(objective, mode), objective.bounds
+    slopes = objective.batch(mode[None, :], noises)[1][0]
+    root = np.linalg.cholesky(np.linalg.inv(slopes.T @ slopes + np.diag(objective.spread**-2.0)))
+    z = rng.standard_normal((AROUND, mode.size)) * np.sqrt(DEGREES / rng.chisquare(DEGREES, (AROUND, 1)))
+    x = posterior.prior.draw(rng, AROUND)
+    x[:, posterior.joint.curve] = np.clip(mode + WIDER * z @ root.T, low, high)
+    for i, residual in enumerate(objective.each(mode)):
         _suited(posterior, i, x, float(np.sqrt(np.mean(residual**2))), rng)
     return x
-
-
-def _misfits(objective: JointObjective, x: Array) -> Array:
-    """(P,) root mean square residuals, in units of the stated noise, or in N."""
-    return np.array([np.sqrt(np.mean(r * r)) for r in objective.each(x)])
 
 
 def _suited(posterior: JointPosterior, number: int, x: Array, misfit: float, rng: np.random.Generator) -> None:

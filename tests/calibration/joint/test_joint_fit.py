@@ -7,8 +7,10 @@ from scipy.optimize import minimize
 from bayesmembrane.calibration.fit import fit
 from bayesmembrane.calibration.joint.claim import Joint, joint
 from bayesmembrane.calibration.joint.fit import fit_jointly
+from bayesmembrane.calibration.joint.objective import JointObjective
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.planar import Planar
 from tests.calibration.joint.tests_of import SHEET, STRIP, made
 
 MR = (8.0, 2.0)
@@ -98,3 +100,19 @@ def test_a_long_test_is_fitted_with_all_its_readings(monkeypatch: pytest.MonkeyP
         assert sd is not None
         assert abs(value - truth) < 6 * sd
         assert sd < 0.2
+
+
+def test_of_several_maxima_the_highest_is_found() -> None:
+    """A neo-Hookean film follows one mode or another of a rubber that stiffens: as high as anywhere on a grid."""
+    rubber = (63.0, 0.12, -1.0, 1.3, 5.0, -2.0)  # N/m: Ogden's of 1972 in a film 0.1 mm thick
+    modes = ((STRIP, 0.33, 24), (Planar(), 0.20, 14), (SHEET, 0.17, 17))
+    tests = {rig.name: made(rig, "ogden", rubber, top=top, points=n, noise=0.0) for rig, top, n in modes}
+    both = joint(tests, hypothesis("neo_hookean", convexity="none"))
+    found, objective = fit_jointly(both), JointObjective(both)
+
+    def log_likelihood(ln_gd: float) -> float:
+        noises = objective.inferred(np.array([ln_gd]))
+        return -float(np.sum(objective.sizes * np.log(noises)))
+
+    grid = [log_likelihood(x) for x in np.log(np.linspace(20.0, 70.0, 201))]
+    assert log_likelihood(float(found.coordinates[0])) >= max(grid) - 1e-3
