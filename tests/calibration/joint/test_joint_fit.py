@@ -105,7 +105,7 @@ def test_a_long_test_is_fitted_with_all_its_readings(monkeypatch: pytest.MonkeyP
 def test_of_several_maxima_the_highest_is_found() -> None:
     """A neo-Hookean film follows one mode or another of a rubber that stiffens: as high as anywhere on a grid."""
     rubber = (63.0, 0.12, -1.0, 1.3, 5.0, -2.0)  # N/m: Ogden's of 1972 in a film 0.1 mm thick
-    modes = ((STRIP, 0.33, 24), (Planar(), 0.20, 14), (SHEET, 0.17, 17))
+    modes = ((STRIP, 0.33, 24), (Planar(), 0.06, 14), (SHEET, 0.17, 17))
     tests = {rig.name: made(rig, "ogden", rubber, top=top, points=n, noise=0.0) for rig, top, n in modes}
     both = joint(tests, hypothesis("neo_hookean", convexity="none"))
     found, objective = fit_jointly(both), JointObjective(both)
