@@ -17,7 +17,7 @@ from bayesmembrane.data.measurement import Provenance
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.report.blocks import Figure, Heading, Lead, Points, Table, Text
-from bayesmembrane.report.page import Content, compose, write_report
+from bayesmembrane.report.page import Content, compose, sections, write_report
 from bayesmembrane.report.runs import read
 from bayesmembrane.report.sections.diagnosis.lead import handles, steps_of
 from bayesmembrane.words.candidates import sizes
@@ -83,6 +83,21 @@ def test_a_first_screen_has_fewer_than_120_words_and_begins_with_probabilities(r
         assert "%" in lead.answer.partition(":")[0], name
         assert lead.left.startswith("leaving "), name
         assert lead.following.endswith("."), name
+
+
+def test_every_part_of_a_page_is_made_once(named: Loop, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its pictures are what a page takes most of its time for."""
+    made: list[str] = []
+    for section in sections():
+        kind, parts = type(section), type(section).parts
+
+        def counted(self: Any, results: Any, parts: Any = parts) -> Any:
+            made.append(self.name)
+            return parts(self, results)
+
+        monkeypatch.setattr(kind, "parts", counted)
+    assert compose([named]).lead is not None
+    assert sorted(made) == sorted(s.name for s in sections())
 
 
 def test_a_name_says_what_it_leaves_in_its_own_sentence(named: Loop, strip: Diagnosis) -> None:
