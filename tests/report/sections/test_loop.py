@@ -27,7 +27,7 @@ from bayesmembrane.words import loop as loop_words
 from bayesmembrane.words.brief import of_diagnosis, of_loop
 from bayesmembrane.words.candidates import candidate_title
 from bayesmembrane.words.diagnosis import set_aside
-from bayesmembrane.words.moved import Change, changes, modulus_sentence
+from bayesmembrane.words.moved import Change, changes, modulus_fitted, modulus_sentence
 from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.rounds import answer, bound_sentences, moved, rival_sentences, validation_sentences
 from bayesmembrane.words.seen import DISC, seen
@@ -62,6 +62,17 @@ def test_sampled_rivals_stand_side_by_side_and_are_not_added(sampled: Loop) -> N
     (sentence,) = rival_sentences(sampled)
     assert sentence.count("MPa") == 3
     assert loop_words.round_document(sampled.rounds[0])["leaders"][1]["log_evidence"] == 550.0
+
+
+def test_rivals_that_were_only_fitted_have_a_modulus_without_a_spread(ambiguous: Loop) -> None:
+    (sentence,) = rival_sentences(ambiguous)
+    d, before = ambiguous.rounds[0].diagnosis, ambiguous.rounds[0].before.run
+    assert sentence.count("MPa") == 1 + len(d.members)
+    assert sentence.count("+-") == 1
+    c1 = before.data.posterior["neo_hookean.c1"].values
+    assert f"{2e-6 * c1.mean() / THICKNESS:.4g} +- " in sentence
+    # The friction that is in the curve stiffens the film of a model without it.
+    assert modulus_fitted(d.null, d.measurement) == pytest.approx(2e-6 * c1.mean() / THICKNESS, rel=0.05)
 
 
 def test_candidates_are_ranked_against_the_model_as_it_was(named: Loop) -> None:
