@@ -117,10 +117,9 @@ def loop(
     """Diagnose, sample, add what is named, and again.
 
     A `Question` may leave the energy open: the most probable one is sampled first. Named effects or a better energy
-    make the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop,
-    and so does a hypothesis that was there before. Of an ambiguous answer as many are sampled as the settings say. More readings
-    than `thinning.MOST` are thinned and single outliers set aside, for all of it. Raises what `sample` and `diagnose`
-    raise.
+    make the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop, and so does a hypothesis that was
+    there before. Of an ambiguous answer as many are sampled as the settings say. More readings than `thinning.MOST`
+    are thinned and single outliers set aside, for all of it. Raises what `sample` and `diagnose` raise.
     """
     part = thinned(measurement)
     question = hypothesis if isinstance(hypothesis, Question) else Question(hypothesis)

@@ -25,6 +25,8 @@ from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.seen import seen
 from tests.report.sections.loops import only
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 WORDS = 120
 RECONSTRUCTED = Provenance("c.csv", "c.toml", "", "statement: RECONSTRUCTED, not raw data: inferred from losses")
 

@@ -184,6 +184,7 @@ def test_an_estimate_at_a_bound_is_a_limit(named: Loop) -> None:
 # ---- the page --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_the_page_answers_with_the_loop_first(tmp_path: Path, named: Loop, yeoh: Shown) -> None:
     page = write_report([yeoh, named], tmp_path).read_text()
     twin = json.loads((tmp_path / TWIN).read_text())
@@ -195,6 +196,7 @@ def test_the_page_answers_with_the_loop_first(tmp_path: Path, named: Loop, yeoh:
     assert {"loop errors", "loop scores", "loop parameters", "loop candidates", "loop power"} <= set(twin["tables"])
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_two_loops_keep_apart(named: Loop, unknown: Loop) -> None:
     sections = LoopSection().parts([named, unknown])
     names = [b.name for s in sections for b in s.blocks if isinstance(b, Table)]
@@ -204,6 +206,7 @@ def test_two_loops_keep_apart(named: Loop, unknown: Loop) -> None:
     assert starts == ["synthetic <film>, neo-Hookean, 120 readings"] * 2
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_without_a_name_the_rest_is_drawn_and_nothing_is_added(unknown: Loop) -> None:
     (section,) = LoopSection().parts([unknown])
     assert unknown.left is not None
@@ -215,6 +218,7 @@ def test_without_a_name_the_rest_is_drawn_and_nothing_is_added(unknown: Loop) ->
     assert not any(r["in_answer"] for r in ranking_table(unknown.rounds[0].diagnosis, "r").records())
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_rivals_are_listed_with_what_would_part_them(ambiguous: Loop) -> None:
     (section,) = LoopSection().parts([ambiguous])
     lines = [line for b in section.blocks if isinstance(b, Points) for line in b.lines]
@@ -230,6 +234,7 @@ def test_rivals_are_listed_with_what_would_part_them(ambiguous: Loop) -> None:
     assert residual_rows(waypoints(ambiguous))[1].title.startswith("The first rival, not added")
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_an_adequate_model_needs_no_candidates(named: Loop) -> None:
     (section,) = LoopSection().parts([Loop(named.rounds[1:], None)])
     names = [b.name for b in section.blocks if isinstance(b, Table)]
@@ -274,6 +279,7 @@ def test_a_single_loading_without_times_is_drawn() -> None:
 # ---- without any run -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_loop_and_a_diagnosis_stand_alone(tmp_path: Path, named: Loop) -> None:
     page = write_report([named], tmp_path / "loop").read_text()
     assert "What the force curve of synthetic &lt;film&gt; says" in page
@@ -291,6 +297,7 @@ def test_a_loop_and_a_diagnosis_stand_alone(tmp_path: Path, named: Loop) -> None
     assert twin["tables"]["glance"][0]["found"] == "named: neo-Hookean with friction in the guide"
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_stored_diagnosis_gives_the_same_page(tmp_path: Path, named: Loop) -> None:
     d = only(named, "named")
     store(tmp_path / "answer", "diagnosis", d, {})
