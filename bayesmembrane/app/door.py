@@ -153,17 +153,15 @@ def loop(
     ess: float = 1000.0,
     seed: int = 0,
     adapt_noise: bool = True,
-    rivals: int = 0,
     out: Folder | None = None,
 ) -> Loop:
     """Diagnose, sample, add what is missing, and again, until adequate or abstaining.
 
     Without a ``hypothesis`` it begins with the most probable energy. ``adapt_noise`` samples with correlated noise
-    where neighbouring readings turn out to be correlated. Of an ambiguous answer the first ``rivals`` members are
-    sampled, too: each takes as long as a calibration of its own.
+    where neighbouring readings turn out to be correlated. Of an ambiguous answer nothing more is sampled: its members
+    are hypotheses that `sample` takes.
     """
-    work = _work(seed, out, ess)
-    return analyses.loop(measurement, _asked(hypothesis), work, adapt_noise=adapt_noise, rivals=rivals).result
+    return analyses.loop(measurement, _asked(hypothesis), _work(seed, out, ess), adapt_noise=adapt_noise).result
 
 
 def _asked(hypothesis: Hypothesis | None) -> Question:

@@ -20,7 +20,6 @@ from bayesmembrane.words.diagnosis import document, sentence
 from tests.diagnosis.curves import measured
 from tests.generator.datasets import Dataset, generate
 
-
 EVERY = 3
 """Of the readings that the generator makes, about 700: so many take a second, and two thirds of the time are theirs."""
 
