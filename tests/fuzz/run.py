@@ -97,8 +97,8 @@ def page(rows: Iterable[Row], first: int, count: int) -> str:
     return (
         "# Calls of the command line at random\n\n"
         f"Made by `python -m tests.fuzz.run --first {first} --count {count} --table docs/studies/fuzz.md`: `fit`, "
-        "`sample` and `diagnose` on curves and settings drawn from a seed: rigs (R2/R1 1.1 to 10), thickness, protocols, "
-        "energies, effects, faults that no effect describes, noise, and options that nobody should choose. Each answer "
+        "`sample` and `diagnose` on curves and settings drawn from a seed: rigs (R2/R1 1.1 to 10), thickness, "
+        "protocols, energies, effects, faults that no effect describes, noise, and options that nobody should choose. Each answer "
         "must be one whole JSON document that does not contradict itself, each refusal one sentence that says what, "
         "where and how to mend it. A call is given up after "
         f"{', '.join(f'{s:g} s ({verb})' for verb, s in LIMIT.items())} of computing.\n\n"
