@@ -155,6 +155,9 @@ def first_order(search: Search, base: Candidate, effect: Effect) -> float:
     white = search.noise.white(np.column_stack([s for s, _ in slopes]))
     freed = model.freed(base.theta, white)
     along, square = freed.T @ model.data, np.sum(white * freed, axis=0)
+    # Of a slope that the base follows wholly nothing is left but round-off, which may be negative.
+    left = square > GROWTH.round_off * np.sum(white * white, axis=0)
+    along, square = np.where(left, along, 0.0), np.where(left, square, 0.0)
     allowed = np.array([not effect.size.one_sided or side * a > 0 for a, (_, side) in zip(along, slopes, strict=True)])
     gain = 0.5 * along**2 / (square + 1) * allowed - 0.5 * np.log1p(square)
     return float(np.max(gain))
