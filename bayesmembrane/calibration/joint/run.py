@@ -29,8 +29,8 @@ from bayesmembrane.calibration.run import Run, RunSettings, predictions_of
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.segments import Segments
 from bayesmembrane.calibration.sampling.walk import (
-    Beside,
     Callback,
+    Meanwhile,
     Sampled,
     begun,
     run_ensembles,
@@ -185,8 +185,8 @@ def _walked(
         chains = _begun(posterior, how)
         if segments is not None:
             segments.write(chains)
-    beside = Beside(stop=stop) if segments is None else Beside(segments.write, stop)
-    return run_ensembles(target, settings, how.seed, progress, chains, beside)
+    meanwhile = Meanwhile(stop=stop) if segments is None else Meanwhile(segments.write, stop)
+    return run_ensembles(target, settings, how.seed, progress, chains, meanwhile)
 
 
 def _begun(posterior: JointPosterior, how: RunSettings) -> Chains:
