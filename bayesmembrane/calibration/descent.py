@@ -77,7 +77,8 @@ def descend(
         little = np.where(better, won, promise) < patience.slow_below * size[rows]
         slow[rows] = np.where(little, slow[rows] + 1, 0)
         crawl[rows] = np.where(better & (won > CRAWL * size[rows]), 0, crawl[rows] + 1)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        # A step that promised next to nothing may have won far more: the cube overflows, and is clipped.
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             eased = np.clip(1 - (2 * won / promise - 1) ** 3, EASIER, HARDER)
         damping[rows] *= np.where(better, np.where(promise > 0, eased, 1.0), harder[rows])
         damping = np.maximum(damping, 1e-12)

@@ -11,7 +11,36 @@ from tests.fuzz.run import page, run, stored, table
 
 CALLS = 500
 # Quick ones of every rig and verb, among them those that once failed and have been mended.
-FIXED = (1, 2, 4, 5, 6, 12, 13, 16, 20, 22, 23, 27, 31, 34, 39, 44, 47, 52, 57, 66, 67, 70, 75, 76, 84, 247, 21010)
+FIXED = (
+    1,
+    2,
+    4,
+    5,
+    6,
+    12,
+    13,
+    16,
+    20,
+    22,
+    23,
+    27,
+    31,
+    34,
+    39,
+    44,
+    47,
+    52,
+    57,
+    66,
+    67,
+    70,
+    75,
+    76,
+    84,
+    247,
+    21010,
+    21035,
+)
 
 
 @pytest.mark.parametrize("seed", FIXED)
