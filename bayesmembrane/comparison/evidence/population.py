@@ -26,7 +26,7 @@ Base = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
-class Population:
+class LedWalkers:
     """Walkers led to base * added^1.
 
     x : (S, W, k) snapshots of W walkers
@@ -41,7 +41,7 @@ class Population:
     sd: float
 
 
-def from_prior(problem: Problem, modes: Modes, rng: np.random.Generator, walkers: int, snapshots: int) -> Population:
+def from_prior(problem: Problem, modes: Modes, rng: np.random.Generator, walkers: int, snapshots: int) -> LedWalkers:
     """Populations of p(x | y) ~ g^(1-b) (p0 L)^b with g half the prior and half the modes that are known.
 
     ``log_ratio`` is then an estimate of ln Z. Without any mode g is the prior.
@@ -82,7 +82,7 @@ def _spread_out(
     return x[:walkers], part, float(error)
 
 
-def lead(terms: Base, start: Array, rng: np.random.Generator, snapshots: int) -> Population:
+def lead(terms: Base, start: Array, rng: np.random.Generator, snapshots: int) -> LedWalkers:
     """Lead draws ``start`` (W, k) of exp(base) to draws of exp(base + added), in steps that keep half of them alive.
 
     At each power the population is weighted, resampled and moved by differential evolution (P. Del Moral, A. Doucet,
@@ -108,7 +108,7 @@ def lead(terms: Base, start: Array, rng: np.random.Generator, snapshots: int) ->
         x, base, added = _moved(terms, x, base, added, 1.0, rng)
         kept.append((x, base, added))
     snapshots_x, log_base, log_added = (np.stack(part) for part in zip(*kept, strict=True))
-    return Population(snapshots_x, log_base, log_added, log_ratio, float(np.sqrt(variance)))
+    return LedWalkers(snapshots_x, log_base, log_added, log_ratio, float(np.sqrt(variance)))
 
 
 def _rise(added: Array, left: float) -> float:
