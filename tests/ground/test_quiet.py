@@ -51,3 +51,8 @@ def test_the_daily_warning_is_silent_and_the_user_s_filters_stay(tmp_path: Path)
 def test_two_processes_at_midnight_both_get_it(tmp_path: Path) -> None:
     done = run(RACE, tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+def test_where_nothing_can_be_written_it_is_there_all_the_same(tmp_path: Path) -> None:
+    done = run("import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n" + IMPORT, tmp_path)
+    assert done.returncode == 0, done.stderr
