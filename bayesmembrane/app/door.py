@@ -18,11 +18,12 @@ from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.exports.hints import hints_of
 from bayesmembrane.data.importers.base import read_export
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.reading import read_measurement as read_files
+from bayesmembrane.data.sequence import read_one_after_another
 from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.threads import one_thread
 from bayesmembrane.physics import hypothesis as hypotheses
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.reconstruction.result import Reconstruction
@@ -34,9 +35,12 @@ from bayesmembrane.valleys.result import Valleys
 Folder = str | Path
 
 
-def read(curve: Folder, specimen: Folder) -> Measurement:
-    """The measured curve (CSV) of a specimen (TOML), in SI; raises `DataError` that says what is wrong where."""
-    return read_files(Path(curve), Path(specimen))
+def read(curve: Folder, specimen: Folder, then: Sequence[Folder] = (), rest_s: float = 0.0) -> Measurement:
+    """The measured curve (CSV) of a specimen (TOML), in SI; raises `DataError` that says what is wrong where.
+
+    ``then``: further tests of the same film, not taken out in between, each after ``rest_s`` s of rest.
+    """
+    return read_one_after_another([curve, *then], specimen, rest_s)
 
 
 def read_measurement(export: Folder, specimen: Folder | None = None, **said: Any) -> Measurement:
@@ -61,6 +65,7 @@ def hypothesis(
     return hypotheses.hypothesis(material, [n.strip() for n in names if n.strip()], noise, convexity)
 
 
+@one_thread
 def fit(
     measurement: Measurement,
     hypothesis: Hypothesis,
@@ -75,6 +80,7 @@ def fit(
     return analyses.fit(measurement, hypothesis, _work(seed, out), loss=loss).result
 
 
+@one_thread
 def sample(
     measurement: Measurement,
     hypothesis: Hypothesis,
@@ -92,6 +98,7 @@ def sample(
     return analyses.sample(measurement, hypothesis, _work(seed, out, ess), whole=whole).result
 
 
+@one_thread
 def compare(
     measurement: Measurement,
     hypotheses: Sequence[Hypothesis],
@@ -110,6 +117,7 @@ def compare(
     return found
 
 
+@one_thread
 def valleys(
     measurement: Measurement,
     hypothesis: Hypothesis,
@@ -137,6 +145,7 @@ def diagnose(
     return analyses.diagnose(measurement, _asked(hypothesis), _work(seed, out)).result
 
 
+@one_thread
 def loop(
     measurement: Measurement,
     hypothesis: Hypothesis | None = None,
@@ -161,6 +170,7 @@ def _asked(hypothesis: Hypothesis | None) -> Question:
     return Question(hypotheses.hypothesis(min(materials())), declared=False)
 
 
+@one_thread
 def reconstruct(*, seed: int = 0, out: Folder | None = None) -> Reconstruction:
     """The measured curve behind the losses that the paper prints, with its covariance."""
     return analyses.reconstruct(_work(seed, out)).result

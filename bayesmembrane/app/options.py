@@ -78,6 +78,13 @@ class CurveOptions(OptionGroup):
         Path, typer.Argument(help="The measured curve: CSV whose header names carry units.", metavar="CURVE")
     ]
     specimen: Annotated[Path, typer.Option("--specimen", help="TOML with film, rig and noise.")]
+    then: Annotated[
+        list[Path] | None,
+        typer.Option("--then", help="Next test of the same film, not taken out in between; may be given again."),
+    ] = None
+    rest_s: Annotated[
+        float, typer.Option("--rest-s", min=0.0, help="Rest at zero before each --then whose clock starts anew, s.")
+    ] = 0.0
 
     @property
     def shown(self) -> str:
@@ -86,9 +93,9 @@ class CurveOptions(OptionGroup):
 
     def read(self) -> Measurement:
         """The whole measurement; what was left aside while reading is said on stderr."""
-        from bayesmembrane.data.reading import read_measurement
+        from bayesmembrane.data.sequence import read_one_after_another
 
-        measurement = read_measurement(self.curve, self.specimen)
+        measurement = read_one_after_another([self.curve, *(self.then or ())], self.specimen, self.rest_s)
         for left_aside in measurement.provenance.notes:
             note(f"{self.shown}: {left_aside}.")
         return measurement

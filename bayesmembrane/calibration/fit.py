@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -13,6 +14,7 @@ from bayesmembrane.calibration.constrained import constrained_optimum
 from bayesmembrane.calibration.descent import descend
 from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.calibration.posterior import enough_points
+from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.thinning import shortened
 from bayesmembrane.ground.parameters import Array
@@ -61,6 +63,7 @@ class Fit(Showable):
     at_bound : coordinates without an optimum inside their bounds: the loss falls, or is flat, up to the bound
     status : "converged", or why the search ended, or in a sentence why there is no fit: then all numbers are nan
     constrained : the optimum among films that meet the convexity prior; this one if it does; None without any
+    rig, thickness, origin : what held the film, m, and where the points come from: as people see the curve
     """
 
     hypothesis: Hypothesis
@@ -78,6 +81,9 @@ class Fit(Showable):
     at_bound: tuple[str, ...]
     status: str
     constrained: Fit | None = field(default=None, repr=False)
+    rig: Fixture | None = None
+    thickness: float = math.nan
+    origin: str = ""
 
     @property
     def convex(self) -> bool:
@@ -227,6 +233,9 @@ def _result(objective: Objective, x: Array, status: str) -> Fit:
         margins={m.name: float(m.margin(prediction, objective.hypothesis.material)[0]) for m in RESTRICTING},
         at_bound=tuple(p.name for p, b in zip(objective.parameters, bound, strict=True) if b),
         status=status,
+        rig=objective.measurement.rig,
+        thickness=objective.measurement.specimen.thickness,
+        origin=objective.measurement.provenance.origin,
     )
 
 

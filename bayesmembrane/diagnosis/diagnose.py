@@ -21,11 +21,13 @@ from bayesmembrane.diagnosis.reference.outliers import without_outliers
 from bayesmembrane.diagnosis.result import Diagnosis, thinning
 from bayesmembrane.diagnosis.separation import Experiment, experiments
 from bayesmembrane.diagnosis.thresholds import VERDICT
+from bayesmembrane.ground.threads import one_thread
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 
 
+@one_thread
 def diagnose(
     measurement: Measurement,
     hypothesis: Hypothesis | Question,

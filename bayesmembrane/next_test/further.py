@@ -11,6 +11,7 @@ import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.motion import NOMINAL_SPEED
+from bayesmembrane.data.sequence import one_after_another
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.forward import Forward, Solve
@@ -161,7 +162,7 @@ def other_specimens(m: Measurement, stretch: float) -> Iterator[OnSpecimen]:
 
 
 def other_motions(m: Measurement) -> Iterator[OnFilm]:
-    """The same film and range, moved in another way, and on the variants of its rig."""
+    """The same film and range, moved in another way after what was measured, and anew on the variants of its rig."""
     top = float(np.max(m.path.deflection))
     up = np.linspace(top / LEG, top, LEG)
     there_and_back = np.concatenate([up, up[::-1]])
@@ -174,7 +175,9 @@ def other_motions(m: Measurement) -> Iterator[OnFilm]:
     if m.path.time is not None:
         yield _moved(m, FurtherTest(Kind.FASTER, speed=FASTER), again)
     for words, rig in rig_of(m).variants():
-        yield _moved(replace(m, rig=rig), FurtherTest(Kind.OTHER_SIZE, change=words), again)
+        test = FurtherTest(Kind.OTHER_SIZE, change=words)
+        trial = _test(replace(m, rig=rig), test, again)
+        yield OnFilm(test, trial, trial.deflection)
 
 
 def _between(m: Measurement, test: FurtherTest, readings: int) -> OnFilm:
@@ -184,9 +187,16 @@ def _between(m: Measurement, test: FurtherTest, readings: int) -> OnFilm:
 
 
 def _moved(m: Measurement, test: FurtherTest, deflection: Array) -> OnFilm:
-    """Through ``deflection`` at the speed of the measurement, times that of the test."""
+    """Through ``deflection``, by a film that remembers what was done to it before."""
+    before = replace(m, force_sd=None, covariance=None)
+    both = one_after_another([before, _test(m, test, deflection)])
+    trial = both.select(np.arange(len(m), len(both)))
+    return OnFilm(test, trial, trial.deflection)
+
+
+def _test(m: Measurement, test: FurtherTest, deflection: Array) -> Measurement:
+    """Readings at ``deflection``, at the speed of the measurement times that of the test."""
     speed = test.speed * (NOMINAL_SPEED if m.path.time is None else float(np.median(m.path.speed)))
     steps = np.maximum(np.abs(np.diff(deflection, prepend=0.0)), 1e-9)
     time = None if m.path.time is None else np.cumsum(steps) / speed
-    trial = Measurement(deflection, np.ones(deflection.size), m.rig, m.specimen, time=time, full_range=m.full_range)
-    return OnFilm(test, trial, trial.deflection)
+    return Measurement(deflection, np.ones(deflection.size), m.rig, m.specimen, time=time, full_range=m.full_range)

@@ -14,8 +14,8 @@ import numpy as np
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.words.hypothesis import spoken
-from bayesmembrane.words.language import digits, interval, listed, millimetres, newtons, percent, spoken_parameter
-from bayesmembrane.words.seen import DISC, Seen, alike
+from bayesmembrane.words.language import digits, interval, listed, millimetres, percent, spoken_parameter
+from bayesmembrane.words.seen import DISC, Seen, alike, seen_by_fit
 
 P_VALUE = 0.01
 """Below this the residuals are larger than the measurement's own noise allows."""
@@ -330,13 +330,19 @@ def verdict(case: Case) -> str:
     return VERDICTS.get(case.verdict, "noise not stated")
 
 
+LOADS = {"force": "forces", "stress": "stresses"}
+
+
 def fit_sentence(found: Fit) -> str:
     """The optimum of one fit: how far it misses the data, and whether it can be trusted as one."""
-    end = millimetres(float(np.max(found.deflection)))
+    how = seen_by_fit(found)
+    end = how.place(float(np.max(found.deflection)))
     if not math.isfinite(found.rmse_N):
         return f"{spoken(found.hypothesis)} up to {end}: {found.status}"
-    told = f"{spoken(found.hypothesis)} fitted up to {end} misses the forces by {newtons(found.rmse_N)} rms"
-    told += f", at most {newtons(found.max_N)}"
+    told = (
+        f"{spoken(found.hypothesis)} fitted up to {end} misses the {LOADS[how.load]} by {how.force(found.rmse_N)} rms"
+    )
+    told += f", at most {how.force(found.max_N)}"
     if found.at_bound:
         names = listed(spoken_parameter(n) for n in found.at_bound)
         told += f"; there is no optimum inside the bounds for {names}: the loss falls, or is flat, up to it"
@@ -346,8 +352,8 @@ def fit_sentence(found: Fit) -> str:
             "no film that meets the convexity prior was found"
             if held is None
             else (
-                f"among films that meet the convexity prior the least loss is {held.loss_N:.4g} instead of "
-                f"{found.loss_N:.4g} N"
+                f"among films that meet the convexity prior the least loss is {held.loss_N * how.load_scale[0]:.4g} "
+                f"instead of {how.loss(found.loss_N)}"
             )
         )
         told += f"; its energy is not convex where the film goes, and {least}"

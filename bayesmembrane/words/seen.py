@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.words.language import digits, newtons, three_digits
+
+if TYPE_CHECKING:
+    from bayesmembrane.calibration.fit import Fit
 
 MEASURED = "measured"
 _NOT_MEASURED = ("reconstructed", "synthetic", "simulated")
@@ -57,7 +62,15 @@ class Seen:
 
     def force(self, value: float) -> str:
         """A force in N in words, three digits: mN below 0.1 N; of a strip its stress."""
-        return newtons(value) if not self.rest else f"{digits(self.load_scale[0] * value)} {self.load_scale[1]}"
+        if not self.rest:
+            return newtons(value)
+        return (
+            f"{digits(self.load_scale[0] * value)} {self.load_scale[1]}" if math.isfinite(value) else f"no {self.load}"
+        )
+
+    def loss(self, value: float, count: int = 4) -> str:
+        """A loss in N, in the unit of the vertical axis, with so many digits."""
+        return f"{self.load_scale[0] * value:.{count}g} {self.load_scale[1]}"
 
     def place(self, deflection: float) -> str:
         """A deflection in m in words, to follow "up to": ``30 mm``, ``a stretch of 2.5``."""
@@ -99,6 +112,11 @@ def seen_on(rig: Fixture, thickness: float, origin: str = "") -> Seen:
     if rig.homogeneous:
         return Seen("stretch", (shown["m"][0], "-"), 1.0, "stress", shown["N"], shown["N"], made(origin))
     return Seen("deflection", shown["m"], 0.0, "force", (1.0, "N"), shown["N"], made(origin))
+
+
+def seen_by_fit(found: Fit) -> Seen:
+    """How the curve of a fit is seen; one whose rig is not known as that of a lifted disc."""
+    return DISC if found.rig is None else seen_on(found.rig, found.thickness, found.origin)
 
 
 def seen(measurement: Measurement) -> Seen:

@@ -44,10 +44,20 @@ def test_every_rig_that_proposes_a_test_offers_one() -> None:
 def test_a_faster_test_needs_a_clock_and_a_wider_disc_needs_room() -> None:
     assert Kind.FASTER not in {t.test.kind for t in other_motions(film())}
     timed = {t.test.kind: t for t in other_motions(film(timed=True))}
-    assert timed[Kind.FASTER].measurement.time[-1] == pytest.approx(0.1 * timed[Kind.OTHER_SIZE].measurement.time[-1])
+    faster, usual = (np.ptp(timed[k].measurement.time) for k in (Kind.FASTER, Kind.OTHER_SIZE))
+    assert faster == pytest.approx(0.1 * usual)
     assert timed[Kind.UNLOADING].deflection[-1] < timed[Kind.UNLOADING].deflection[239]
     tight = film(rig=Annulus(0.025, 0.035))
     assert Kind.OTHER_SIZE not in {t.test.kind for t in other_motions(tight)}
+
+
+def test_a_film_that_is_moved_again_remembers_and_one_on_another_rig_is_new() -> None:
+    for trial in other_motions(film(timed=True)):
+        if trial.test.kind is Kind.OTHER_SIZE:
+            assert trial.measurement.path.deflection.size == len(trial.measurement)
+        else:
+            assert np.array_equal(trial.measurement.path.deflection[:8], film().deflection)
+            assert not np.any(trial.measurement.is_first_loading[trial.deflection < 0.025])
 
 
 def test_a_test_of_the_film_shows_what_the_forward_model_says() -> None:

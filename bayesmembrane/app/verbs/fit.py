@@ -44,13 +44,17 @@ def verb(
 
 def show(found: Fit, title: str) -> None:
     """Parameters, residuals and what limits them, on the terminal."""
+    from bayesmembrane.words.seen import seen_by_fit
+
     rows = [
         [name, f"{e.value:.6g}", "-" if e.sd is None else f"{e.sd:.2g}", e.unit] for name, e in found.parameters.items()
     ]
     table(title, ["parameter", "value", "sd", "unit"], rows)
-    say(f"Loss {found.loss_N:.5g} N, rms residual {found.rmse_N:.4g} N, largest {found.max_N:.4g} N.")
+    how = seen_by_fit(found)
+    rms, largest = how.loss(found.rmse_N), how.loss(found.max_N)
+    say(f"Loss {how.loss(found.loss_N, 5)}, rms residual {rms}, largest {largest}.")
     say(f"The energy is {'' if found.convex else 'not '}convex where the film goes. Status: {found.status}.")
     if found.at_bound:
         say(f"No optimum inside the bounds for {', '.join(found.at_bound)}: the loss falls, or is flat, up to it.")
     if found.constrained is not None and found.constrained is not found:
-        say(f"Among films that meet the convexity prior the least loss is {found.constrained.loss_N:.5g} N.")
+        say(f"Among films that meet the convexity prior the least loss is {how.loss(found.constrained.loss_N, 5)}.")

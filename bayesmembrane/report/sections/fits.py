@@ -16,7 +16,8 @@ from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
 from bayesmembrane.report.style import FAINT, colour, linestyle, marker
 from bayesmembrane.words.calibration import fit_sentence
 from bayesmembrane.words.hypothesis import spoken, spoken_apart
-from bayesmembrane.words.language import listed, newtons, spoken_parameter
+from bayesmembrane.words.language import listed, spoken_parameter
+from bayesmembrane.words.seen import Seen, alike, seen_by_fit
 
 
 class FitsSection(Section):
@@ -35,11 +36,12 @@ class FitsSection(Section):
         fits = of_kind(results, Fit)
         if not fits:
             return ()
+        how = _seen(fits)
         figure = Figure(
             curves_picture(fits),
-            alt=f"Fitted force against deflection by {listed(_names(fits))}",
-            caption="Fitted force (N) against deflection (mm) at the measured points; the legend tells the root mean "
-            "square of measured minus fitted force.",
+            alt=f"Fitted {how.load} against {how.travel} by {listed(_names(fits))}",
+            caption=f"Fitted {how.load_label} against {how.travel_label} at the measured points; the legend tells the "
+            f"root mean square of measured minus fitted {how.load}.",
         )
         tables = [parameters_table(f, number if len(fits) > 1 else 0) for number, f in enumerate(fits, 1)]
         return [*points([fit_sentence(f) for f in fits]), optima_table(fits), figure, *tables]
@@ -49,7 +51,11 @@ class FitsSection(Section):
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
         return [
-            Glance("fit", f"{spoken(f.hypothesis)}, up to {_end(f)}", f"rms residual {newtons(f.rmse_N)}; {f.status}")
+            Glance(
+                "fit",
+                f"{spoken(f.hypothesis)}, up to {_end(f)}",
+                f"rms residual {seen_by_fit(f).force(f.rmse_N)}; {f.status}",
+            )
             for f in of_kind(results, Fit)
         ]
 
@@ -63,19 +69,26 @@ def _names(fits: Sequence[Fit]) -> list[str]:
 
 
 def _end(f: Fit) -> str:
-    return f"{1e3 * float(np.max(f.deflection)):.4g} mm"
+    return seen_by_fit(f).place(float(np.max(f.deflection)))
+
+
+def _seen(fits: Sequence[Fit]) -> Seen:
+    """How the curves of all are seen in one table and one picture."""
+    return alike([seen_by_fit(f) for f in fits])
 
 
 def optima_table(fits: Sequence[Fit]) -> Table:
     """One row for each fit."""
+    how = _seen(fits)
+    load, small = how.load_scale, how.small
     columns = (
         Column("model", "model"),
-        Column("end_mm", "fitted up to (mm)"),
+        Column("end_mm" if not how.rest else "end", f"fitted up to, {how.travel_label}"),
         Column("loss", "loss"),
-        Column("loss_N", "loss (N)"),
-        Column("rmse_mN", "rms residual (mN)", ".3g"),
-        Column("max_mN", "largest residual (mN)", ".3g"),
-        Column("convex_loss_N", "loss under the convexity prior (N)"),
+        Column(f"loss_{load[1]}", f"loss ({load[1]})"),
+        Column(f"rmse_{small[1]}", f"rms residual ({small[1]})", ".3g"),
+        Column(f"max_{small[1]}", f"largest residual ({small[1]})", ".3g"),
+        Column(f"convex_loss_{load[1]}", f"loss under the convexity prior ({load[1]})"),
         Column("convex", "convex"),
         Column("at_bound", "at a bound"),
         Column("status", "status"),
@@ -83,12 +96,12 @@ def optima_table(fits: Sequence[Fit]) -> Table:
     rows = tuple(
         (
             spoken(f.hypothesis),
-            1e3 * float(np.max(f.deflection)),
+            float(np.max(how.along(f.deflection))),
             f.loss,
-            f.loss_N,
-            1e3 * f.rmse_N,
-            1e3 * f.max_N,
-            f.constrained.loss_N if f.constrained is not None else None,
+            load[0] * f.loss_N,
+            small[0] * f.rmse_N,
+            small[0] * f.max_N,
+            load[0] * f.constrained.loss_N if f.constrained is not None else None,
             f.convex,
             ", ".join(spoken_parameter(n) for n in f.at_bound) or None,
             f.status,
@@ -96,8 +109,8 @@ def optima_table(fits: Sequence[Fit]) -> Table:
         for f in fits
     )
     caption = (
-        "Optima of each model: losses are Euclidean norms of measured minus computed force (N). Convex: whether the "
-        "energy meets the convexity prior where the film goes."
+        "Optima of each model: losses are Euclidean norms of measured minus computed "
+        f"{how.load_label}. Convex: whether the energy meets the convexity prior where the film goes."
     )
     return Table("optima", caption, columns, rows).without_empty()
 
@@ -130,23 +143,24 @@ def parameters_table(f: Fit, number: int) -> Table:
 
 def curves_picture(fits: Sequence[Fit], kind: str = "svg") -> Picture:
     """The fitted curves."""
+    how = _seen(fits)
     with style():
         figure = new_figure(4.2)
         ax = figure.subplots()
         for name, f in zip(spoken_apart([f.hypothesis for f in fits]), fits, strict=True):
             material = f.hypothesis.material.name
             ax.plot(
-                1e3 * f.deflection,
-                f.force,
+                how.along(f.deflection),
+                how.carried(f.force),
                 color=colour(material),
                 linestyle=linestyle(material),
                 marker=marker(material) if f.deflection.size <= 60 else "",
                 markersize=4,
-                label=f"{name} (rms {newtons(f.rmse_N)})",
+                label=f"{name} (rms {how.force(f.rmse_N)})",
             )
-        ax.set_xlabel("deflection (mm)")
-        ax.set_ylabel("force (N)")
-        ax.set_xlim(left=0)
+        ax.set_xlabel(how.travel_label)
+        ax.set_ylabel(how.load_label)
+        ax.set_xlim(left=how.rest)
         ax.grid(color=FAINT, linewidth=0.6)
         ax.legend(loc="upper left")
         return encoded(figure, kind)

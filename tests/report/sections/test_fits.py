@@ -5,10 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from bayesmembrane.calibration.fit import Fit, FittedParameter
 from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.report.page import TWIN, write_report
 from bayesmembrane.words.calibration import fit_sentence
 from tests.report.pages import without_pictures
@@ -38,6 +40,18 @@ def test_a_fit_stands_alone(tmp_path: Path) -> None:
     assert twin["tables"]["optimum"][2]["sd"] is None
     assert 'id="fits"' in page
     assert 'id="data"' not in page
+
+
+def test_a_strip_is_told_in_stretch_and_stress(tmp_path: Path) -> None:
+    strip = replace(fitted(), rig=Uniaxial(length=0.05, width=0.01), thickness=1e-3, constrained=None)
+    page = without_pictures(write_report([strip], tmp_path).read_text())
+    (row,) = json.loads((tmp_path / TWIN).read_text())["tables"]["optima"]
+    assert row["end"] == pytest.approx(1.7)  # 35 mm on 50
+    assert row["rmse_MPa"] == pytest.approx(3e-4)  # 3 mN on 10 mm by 1 mm
+    assert "up to a stretch of 1.7 misses the stresses by 0.000300 MPa rms" in page
+    assert "fitted up to, stretch (-)" in page
+    assert " mN" not in page
+    assert " mm" not in page
 
 
 def test_a_bound_and_a_prior_that_is_not_met_are_said() -> None:
