@@ -42,7 +42,7 @@ Tell = Callable[[str], None]
 class Keep(Protocol):
     """What ``make`` returns, or what it returned when the piece of this name was made before."""
 
-    def __call__(self, name: str, make: Callable[[], ARun]) -> ARun: ...
+    def __call__(self, name: str, make: Callable[[], ARun], /) -> ARun: ...
 
 
 def nested(
