@@ -79,7 +79,7 @@ study-second: $(STAMP)
 	$(PY) -m tests.studies.reliability --generator second --jobs $(PYTEST_WORKERS) --table docs/studies/second.md $(SECOND)
 
 study-fuzz: $(STAMP)
-	$(PY) -m tests.fuzz.run --jobs $(PYTEST_WORKERS) $(FUZZ)
+	$(PY) -m tests.fuzz.run --jobs $(PYTEST_WORKERS) --table docs/studies/fuzz.md $(FUZZ)
 
 study-scale: $(STAMP)
 	$(PY) -m tests.studies.scale --table docs/studies/scale.md $(SCALE)

@@ -3,6 +3,7 @@
 import signal
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +20,26 @@ move()  # before any test module draws
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 INNER, OUTER = 0.010, 0.035
+# What takes longest begins first, so that no worker is left alone with it at the end.
+LONGEST = (
+    "diagnosis/test_diagnose.py",
+    "app/test_campaign.py",
+    "statistics/test_evidence_posteriors.py",
+    "plugin/test_plugin.py",
+    "reconstruction/test_reconstruct.py",
+    "calibration/test_run.py",
+    "app/test_cli.py",
+    "comparison/test_evidence.py",
+    "report/sections/test_lead.py",
+    "report/sections/test_loop.py",
+    "test_door.py",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """`LONGEST` first, else as they were; files stay whole."""
+    place = {Path(__file__).parent / name: number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path, len(place)))
 
 
 @cache

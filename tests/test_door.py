@@ -80,13 +80,22 @@ def test_everything_behind_the_door_is_imported_without_a_word(tmp_path: Path) -
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
+# Walks short enough for a test; what draws are worth is tested where they are made.
+SHORTLY = """\
+from bayesmembrane.comparison import compare
+from tests.short_walks import shorten
+shorten()
+compare.cores = lambda: 1
+"""
+
+
 def test_the_lines_of_the_readme_run(tmp_path: Path) -> None:
     """As they stand there, from a folder in which the shipped data lie."""
     blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "README.md").read_text(), re.MULTILINE | re.DOTALL)
     (lines,) = [block for block in blocks if "import bayesmembrane as bm" in block]
     assert 8 <= len([line for line in lines.splitlines() if line.strip()]) <= 12
     (tmp_path / "data").symlink_to(data_folder())
-    done = run("-c", lines, home=tmp_path)
+    done = run("-c", SHORTLY + lines, home=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     page = Path(tmp_path / done.stdout.strip().splitlines()[-1])

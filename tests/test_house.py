@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections import defaultdict
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from bayesmembrane.data.shipped import data_folder, shipped
 from bayesmembrane.ground.errors import SettingsError
 
 ROOT = Path(__file__).resolve().parent.parent
+# Of a comparison, whose stored answers carry the name, and of a campaign's page.
+KNOWN_TWICE = {"Row"}
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 
@@ -78,6 +81,17 @@ def test_ci_runs_make_test_and_nothing_else() -> None:
     assert os.access(script, os.X_OK)
     commands = [x for x in script.read_text().splitlines() if x and not x.startswith("#")]
     assert commands == ["set -euo pipefail", 'cd "$(dirname "$0")/.."', "make test"]
+
+
+def test_a_name_of_a_class_means_one_thing() -> None:
+    """Whoever reads of a `Candidate` need not ask which."""
+    where = defaultdict(list)
+    for path in sorted((ROOT / "bayesmembrane").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                where[node.name].append(path.relative_to(ROOT).as_posix())
+    twice = {name: places for name, places in where.items() if len(places) > 1}
+    assert set(twice) <= KNOWN_TWICE, twice
 
 
 def test_make_refuses_an_old_python(tmp_path: Path) -> None:

@@ -198,12 +198,17 @@ def loop(
     *,
     adapt_noise: bool = True,
     runs: Path | None = None,
+    rivals: int = 0,
 ) -> Answer[Loop]:
-    """Diagnose, add what is missing, calibrate again; its runs lie in ``runs``, or where the answers do."""
-    how = LoopSettings(work.seed, runs or work.out, work.ess, adapt_noise)
+    """Diagnose, add what is missing, calibrate again; its runs lie in ``runs``, or where the answers do.
+
+    Of an ambiguous answer the first ``rivals`` members are sampled, too.
+    """
+    how = LoopSettings(work.seed, runs or work.out, work.ess, adapt_noise, leaders=rivals)
     question = claim if isinstance(claim, Question) else Question(claim)
     label = question.hypothesis.label()
     settings = {"seed": work.seed, "ess": work.ess, "adapt_noise": adapt_noise, "declared": question.declared}
+    settings |= {"rivals": rivals} if rivals else {}
     what = asked("loop", run_loop, [measurement], [question.hypothesis], settings, library())
     if (stored := held("loop", what, work.out)) is not None:
         return stored

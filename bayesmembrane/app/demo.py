@@ -25,6 +25,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import shipped
+from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.ground.jobs import Tell, silent, workers
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.registry import materials
@@ -35,8 +36,14 @@ from bayesmembrane.report.page import write_report
 TITLE = "What the reconstructed force curve of a 50 um silicone film says about five materials"
 RANGES = ("OP1", "OP2")
 VALLEYS = ("yeoh", "mooney_rivlin", "gent")
-# What the loop is closed on: the paper's curve over both of its ranges, and a cyclic curve with something hidden in it.
-LOOPS = (("yeoh", "elastosil_50um_first_loading"), ("yeoh", "elastosil_50um_op1"), ("yeoh", "synthetic_cyclic"))
+OPEN = ""
+"""No energy is declared."""
+# What the loop is closed on: the paper's curve over both of its ranges, a measured cycle of which nothing is declared,
+# and a cyclic curve with something hidden in it.
+LOOPS = (
+    *(("yeoh", "elastosil_50um_first_loading"), ("yeoh", "elastosil_50um_op1")),
+    *((OPEN, "vhb4910_0d03"), ("yeoh", "synthetic_cyclic")),
+)
 LOOP_ESS = 400.0
 
 
@@ -130,7 +137,8 @@ def close_loop(name: str, stem: str, work: Work) -> None:
     """The loop on one curve that ships; its runs lie deeper, for the page shows them with their loop."""
     measurement = read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
     well = replace(work, ess=min(work.ess, LOOP_ESS))
-    analyses.loop(measurement, hypothesis(name), well, runs=_folder(work) / "loops")
+    question = Question(hypothesis(name or VALLEYS[0]), declared=name != OPEN)
+    analyses.loop(measurement, question, well, runs=_folder(work) / "loops")
 
 
 def compare(work: Work) -> None:

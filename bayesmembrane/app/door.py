@@ -158,7 +158,8 @@ def loop(
     """Diagnose, sample, add what is missing, and again, until adequate or abstaining.
 
     Without a ``hypothesis`` it begins with the most probable energy. ``adapt_noise`` samples with correlated noise
-    where neighbouring readings turn out to be correlated.
+    where neighbouring readings turn out to be correlated. Of an ambiguous answer nothing more is sampled: its members
+    are hypotheses that `sample` takes.
     """
     return analyses.loop(measurement, _asked(hypothesis), _work(seed, out, ess), adapt_noise=adapt_noise).result
 

@@ -29,8 +29,8 @@ from bayesmembrane.calibration.resume import Origin, check_same, ends, origin
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.segments import Segments
 from bayesmembrane.calibration.sampling.walk import (
-    Beside,
     Callback,
+    Meanwhile,
     Sampled,
     Settings,
     begun,
@@ -245,9 +245,9 @@ class _Work:
     def _walked(self, segments: Segments | None) -> Sampled:
         settings, seed = self.how.sampling, self.how.seed
         if segments is None:
-            begin, beside = self._at_the_end_of_another(), Beside(stop=self.stop)
+            begin, beside = self._at_the_end_of_another(), Meanwhile(stop=self.stop)
         else:
-            begin, beside = self._continued(segments), Beside(segments.write, self.stop)
+            begin, beside = self._continued(segments), Meanwhile(segments.write, self.stop)
         return run_ensembles(self.posterior, settings, seed, self.progress, begin, beside)
 
     def _continued(self, segments: Segments) -> Chains | None:

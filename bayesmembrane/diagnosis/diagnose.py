@@ -140,5 +140,5 @@ def _experiments(search: Search, found: Verdict) -> tuple[Experiment, ...]:
     """What to measure next, where rivals are left."""
     if found.verdict != "ambiguous" or len(found.members) < 2:
         return ()
-    rivals = [j.candidate for j in found.members]
+    rivals = [j.candidate for j in found.members[: VERDICT.most_members]]
     return tuple(experiments(search.measurement, rivals, search.noise.sd, search.quick))

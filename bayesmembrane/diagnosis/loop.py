@@ -93,6 +93,7 @@ class LoopSettings:
     adapt_noise : True: all are sampled with AR(1) noise where the readings turn out to be correlated, for white noise
         would make the posterior too narrow
     most_rounds : after which it stops
+    leaders : members of an ambiguous answer that are sampled, the most probable first; the others are fitted only
     solve : what solves films
     """
 
@@ -101,6 +102,7 @@ class LoopSettings:
     ess: float = 1000.0
     adapt_noise: bool = False
     most_rounds: int = LOOP.most_rounds
+    leaders: int = LOOP.leaders
     solve: Solve = api.solve
 
 
@@ -115,10 +117,9 @@ def loop(
     """Diagnose, sample, add what is named, and again.
 
     A `Question` may leave the energy open: the most probable one is sampled first. Named effects or a better energy
-    make the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop,
-    and so does a hypothesis that was there before. Of an ambiguous answer the first few are sampled. More readings
-    than `thinning.MOST` are thinned and single outliers set aside, for all of it. Raises what `sample` and `diagnose`
-    raise.
+    make the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop, and so does a hypothesis that was
+    there before. Of an ambiguous answer as many are sampled as the settings say. More readings than `thinning.MOST`
+    are thinned and single outliers set aside, for all of it. Raises what `sample` and `diagnose` raise.
     """
     part = thinned(measurement)
     question = hypothesis if isinstance(hypothesis, Question) else Question(hypothesis)
@@ -132,8 +133,8 @@ def loop(
         following = replace(found.hypothesis, noise=noise)
         goes_on = found.explains and following.label() not in seen
         after = closing.sampled(following) if goes_on else stage
-        leaders = found.members[: LOOP.leaders] if found.verdict == "ambiguous" else ()
-        rivals = [closing.sampled(replace(j.candidate.hypothesis, noise=noise)) for j in leaders]
+        first = found.members[: closing.settings.leaders] if found.verdict == "ambiguous" else ()
+        rivals = [closing.sampled(replace(j.candidate.hypothesis, noise=noise)) for j in first]
         # The readings that are left have no outliers: what was set aside at the start is told of every round.
         rounds.append(Round(replace(found, set_aside=aside), stage, after, tuple(rivals)))
         if not goes_on or len(rounds) >= closing.settings.most_rounds:

@@ -200,6 +200,26 @@ class GrowthThresholds:
     """ln of the Bayes factor behind the best energy, beyond which one is not tried with further sets of a size."""
     worth: float = 1e-3
     """Of the probability of all smaller sets: below it, larger sets are not looked at."""
+    round_off: float = 3e-6
+    """Of the squares of a slope: what is left of it below that, freed of what the base follows, is round-off. With a
+    noise of a millionth of the force it was -8e-7 to 9e-7."""
+
+
+@dataclass(frozen=True)
+class TwinsThresholds:
+    """When two effects cannot be told apart by a test, beside `DETECTION.near_degrees`."""
+
+    speeds: float = 1.5
+    """Times by which the fastest leg is faster than the slowest: below it the disc moved at one speed."""
+    readings: int = 5
+    """Of a leg, at least, for its speed to count."""
+    alike: float = 0.05
+    """Of the misfit beyond noise: a set that leaves more than this beyond its twin does not fit as it does. It is the
+    square of a law that is 22 % off."""
+    alike_in_time: float = 0.25
+    """The same where only another speed or a hold could tell: there no shape of a law counts for much."""
+    added: int = 3
+    """Twins of the most probable set that are fitted where they were not, at most."""
 
 
 @dataclass(frozen=True)
@@ -241,7 +261,8 @@ class VerdictThresholds:
     doubted: float = 0.5
     """Of no effect, to first order: where it is less probable, all are weighed although no test sees a misfit."""
     most_members: int = 6
-    """Of an ambiguous answer; if more are needed and no effect is sure to be among them, nothing can be told."""
+    """Of an ambiguous answer; if more are needed and no effect is more probable than not, nothing can be told. Only so
+    many are held against each other when further tests are looked for."""
     carried: float = 0.05
     """Relative error of an energy from which on none of those known is said to hold."""
     law_carried: float = 0.35
@@ -306,8 +327,9 @@ class LoopThresholds:
 
     most_rounds: int = 3
     """Two added effects are as many as a curve can carry; the third round says that nothing more is missing."""
-    leaders: int = 2
-    """Members of an ambiguous answer that are sampled."""
+    leaders: int = 0
+    """Members of an ambiguous answer that are sampled unless more is asked for. Each is a calibration of its own: of
+    the paper's curve up to 91.5 mm the first takes minutes, for its parameters go together; the next test decides."""
     band: float = 0.9
     """Part of new readings that a predictive band is to cover."""
 
@@ -316,6 +338,8 @@ class LoopThresholds:
 class WordsThresholds:
     """From where on something is worth a sentence."""
 
+    likely: float = 0.8
+    """Probability of an effect, summed over sets, from which on an ambiguous answer says so."""
     listed_sets: int = 4
     """Sets of an ambiguous answer that are told with their sizes; of more the rest are counted."""
     listed_readings: int = 6
@@ -364,6 +388,7 @@ SEARCH = SearchThresholds()
 SIZES = Sizes()
 FORM = FormThresholds()
 GROWTH = GrowthThresholds()
+TWINS = TwinsThresholds()
 FOREIGN = ForeignThresholds()
 VERDICT = VerdictThresholds()
 HELD_OUT = HeldOutThresholds()

@@ -19,7 +19,7 @@ def never() -> bool:
     return False
 
 
-class Asked:
+class StopAsked:
     """Whether somebody asked to stop; once true it stays so."""
 
     def __init__(self, stop: Stop) -> None:
@@ -31,13 +31,13 @@ class Asked:
 
 
 @contextmanager
-def deferred(stop: Stop = never) -> Iterator[Asked]:
+def deferred(stop: Stop = never) -> Iterator[StopAsked]:
     """While the body runs, SIGINT and SIGTERM only make what this yields true, as ``stop`` does; a second one raises.
 
     For a body that looks every now and then and ends at a good place. In threads, where signals do not arrive, only
     ``stop`` counts.
     """
-    asked = Asked(stop)
+    asked = StopAsked(stop)
     if threading.current_thread() is not threading.main_thread():
         yield asked
         return

@@ -99,31 +99,24 @@ def compose(results: Sequence[Any], title: str | None = None) -> Content:
     subject = _subject([s for s in (section.subject(results) for section in every) if s is not None])
     about = f"What the {subject.curve}{' of ' if subject.films else ''}{listed(subject.films)} says"
     parts = [part for section in every for part in section.parts(results)]
-    if leading is not None:
-        return _led(
-            leading[1], title or about, every, results, [s for s in told if s not in leading[0].answer(results)]
-        )
-    return Content(
+    plain = Content(
         title=title or about,
         subtitle=subject.sentence,
         answer=told or [s for section in every for s in section.answer(results)],
         warnings=[s for section in every for s in section.warnings(results)],
         parts=_named_once([*_general_table(every, results), *parts]),
     )
+    if leading is None:
+        return plain
+    section, lead = leading
+    others = _told_below([s for s in told if s not in section.answer(results)])
+    # A page that begins with a first screen: what the other sections answer comes after it.
+    parts = _named_once([*_general_table(every, results), *others, *parts])
+    return replace(plain, subtitle="", answer=lead.lines, parts=parts, lead=lead)
 
 
-def _led(lead: Lead, title: str, every: list[Section], results: Sequence[Any], told: Sequence[str]) -> Content:
-    """A page that begins with a first screen; what the other sections answer comes after it."""
-    others = [Part("answers", "What the calibrations say", tuple(map(Text, told)))] if told else []
-    parts = [part for section in every for part in section.parts(results)]
-    return Content(
-        title=title,
-        subtitle="",
-        answer=lead.lines,
-        warnings=[s for section in every for s in section.warnings(results)],
-        parts=_named_once([*_general_table(every, results), *others, *parts]),
-        lead=lead,
-    )
+def _told_below(told: Sequence[str]) -> list[Part]:
+    return [Part("answers", "What the calibrations say", tuple(map(Text, told)))] if told else []
 
 
 def _subject(told: Sequence[Subject]) -> Subject:

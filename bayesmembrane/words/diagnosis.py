@@ -270,7 +270,11 @@ def _common(found: Diagnosis) -> str:
     """What is in every set of an ambiguous answer, for that much is sure."""
     sets = [set(j.candidate.names) for j in found.members]
     shared = sorted(set.intersection(*sets) - set(found.null.names))
-    return f"{_at_work(shared)} each of them, yet " if shared else ""
+    if shared:
+        return f"{_at_work(shared)} each of them, yet "
+    p = found.probabilities
+    likely = [f"{set_title(n)} ({percent(p.of_effect(n))})" for n in p.likely(WORDS.likely)]
+    return f"{listed(likely)} {'is' if len(likely) == 1 else 'are'} in most of them, yet " if likely else ""
 
 
 def _at_work(names: Sequence[str]) -> str:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesmembrane.calibration.run import Run
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.words.calibration import LOOSE
 from bayesmembrane.words.hypothesis import spoken
@@ -84,6 +86,12 @@ def _posterior(run: Run) -> dict[str, tuple[tuple[float, float], str]]:
     h = run.hypothesis
     pairs = zip(h.natural_names, h.natural_units, strict=True)
     return {n: (_moments(run.data.posterior[n].values), u) for n, u in pairs}
+
+
+def modulus_fitted(c: Candidate, m: Measurement) -> float:
+    """G in MPa of what was fitted and not sampled."""
+    modulus = c.hypothesis.material.shear_modulus(c.hypothesis.films(c.x[None]).T)
+    return float(1e-6 * np.ravel(modulus)[0] / m.specimen.thickness)
 
 
 def modulus_of(run: Run) -> tuple[float, float]:

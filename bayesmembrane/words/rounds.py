@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesmembrane.diagnosis.loop import Loop, Stage
+from bayesmembrane.diagnosis.loop import Loop, Round, Stage
 from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.diagnosis.thresholds import WORDS
 from bayesmembrane.words.candidates import bounds, validation_sentence
 from bayesmembrane.words.diagnosis import sentence
 from bayesmembrane.words.hypothesis import spoken
-from bayesmembrane.words.moved import modulus_of, moved_sentences
+from bayesmembrane.words.language import listed
+from bayesmembrane.words.moved import modulus_fitted, modulus_of, moved_sentences
 from bayesmembrane.words.seen import seen
 
 
@@ -56,7 +58,7 @@ def rival_sentences(found: Loop) -> list[str]:
     """What the modulus is under each explanation of an ambiguous answer: whether the choice matters for the film."""
     last = found.rounds[-1]
     if not last.leaders:
-        return []
+        return _fitted_rivals(last)
     every = [(spoken(s.run.hypothesis), modulus_of(s.run)) for s in (last.before, *last.leaders)]
     values = "; ".join(f"{mean:.4g} +- {sd:.2g} MPa in {name}" for name, (mean, sd) in every)
     means, sds = np.array([m for _, m in every[1:]]).T
@@ -64,6 +66,21 @@ def rival_sentences(found: Loop) -> list[str]:
     matters = apart > float(np.max(sds))
     end = "Which of them is right decides the modulus." if matters else "Which of them is right matters little for it."
     return [f"The shear modulus is {values}. {end}"]
+
+
+def _fitted_rivals(last: Round) -> list[str]:
+    """The same of rivals that were fitted and not sampled: how far they are apart, not how sure each is."""
+    d = last.diagnosis
+    if d.verdict != "ambiguous":
+        return []
+    told = [j.candidate for j in d.members[: WORDS.listed_sets]]
+    moduli = [modulus_fitted(c, d.measurement) for c in told]
+    fitted = listed(f"{g:.4g} MPa in {spoken(c.hypothesis)}" for g, c in zip(moduli, told, strict=True))
+    (mean, sd), model = modulus_of(last.before.run), spoken(last.before.run.hypothesis)
+    spread = (
+        "" if len(told) == 1 else f" They lie {100 * np.ptp(moduli) / np.mean(moduli):.2g} % apart from end to end."
+    )
+    return [f"The shear modulus is {mean:.4g} +- {sd:.2g} MPa in {model}; as fitted, not sampled, {fitted}.{spread}"]
 
 
 def deciding(loop: Loop) -> Diagnosis:

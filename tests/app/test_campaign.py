@@ -52,16 +52,16 @@ def draws(campaign: Path) -> dict[str, bytes]:
 
 
 def test_a_campaign_runs_goes_on_and_reports(run: Run, tmp_path: Path) -> None:
-    file = write_campaign(tmp_path, analyses='wanted = ["sample"]\npages = true')
+    file = write_campaign(tmp_path, analyses='wanted = ["sample"]\npages = true', films=("a",))
     write_film(tmp_path / "films", "bad").write_text("stretch,nominal_stress_MPa\n1.1,x\n")
     code, out, err = run("run", file, "--json", "--workers", 2, "--out", "two")
     answer = json.loads(out)
     assert code == 0, err
-    assert (answer["tasks"]["done"], answer["tasks"]["refused"]) == (4, 1)
+    assert (answer["tasks"]["done"], answer["tasks"]["refused"]) == (2, 1)
     assert (answer["ended"], answer["finished"]) == ("finished", True)
     assert any("bad.csv" in r["reason"] for r in answer["reasons"])
     rows = json.loads((tmp_path / "two" / "report" / "report.json").read_text())["rows"]
-    assert len(rows) == 4
+    assert len(rows) == 2
     for row in rows:
         assert row["ess"] >= 50
         assert row["parameters"]["c1"][1] < row["parameters"]["c1"][0] < row["parameters"]["c1"][2]
@@ -71,17 +71,17 @@ def test_a_campaign_runs_goes_on_and_reports(run: Run, tmp_path: Path) -> None:
     more = file.read_text().replace('["reached", "none"]', '["box", "none", "reached"]')
     file.write_text(more.replace("pages = true", "pages = false"))
     code, out, _ = run("run", file, "--json", "--workers", 1, "--out", "one")
-    assert (code, json.loads(out)["tasks"]["done"]) == (0, 6)
+    assert (code, json.loads(out)["tasks"]["done"]) == (0, 3)
     serial, side_by_side = draws(tmp_path / "one"), draws(tmp_path / "two")
-    assert len(side_by_side) == 4
+    assert len(side_by_side) == 2
     assert {name: serial[name] for name in side_by_side} == side_by_side
 
     # What is done is read, and not done again.
     before = {p: p.stat().st_mtime_ns for p in (tmp_path / "two" / "records").iterdir()}
     code, out, _ = run("resume", "two", "--json", "--workers", 1)
-    assert (code, json.loads(out)["tasks"]["done"]) == (0, 4)
+    assert (code, json.loads(out)["tasks"]["done"]) == (0, 2)
     assert {p: p.stat().st_mtime_ns for p in (tmp_path / "two" / "records").iterdir()} == before
-    assert json.loads(run("status", "two", "--json")[1])["tasks"]["done"] == 4
+    assert json.loads(run("status", "two", "--json")[1])["tasks"]["done"] == 2
     assert "sample" in run("status", "two")[1]
     code, out, _ = run("report", "two", "--out", "page", "--json")
     assert Path(json.loads(out)["report"]).read_text().startswith("<!DOCTYPE html>")

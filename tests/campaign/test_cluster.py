@@ -105,7 +105,7 @@ def test_faults_are_told_as_by_the_local_pool(tmp_path: Path, scheduler: Path) -
 
 def test_a_worker_that_is_killed_loses_nothing(tmp_path: Path, scheduler: Path) -> None:
     """The steps of its task are gone on with, and nothing is done twice."""
-    calm, plan = planned(tmp_path / "calm", 10)
+    calm, plan = planned(tmp_path / "calm", 4)
     drive(calm, plan, lambda: LocalPool(1), Session(quick))
     shot, killed = tmp_path / "shot", list[str]()
     write_plan(shot, plan)
@@ -120,7 +120,7 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path: Path, scheduler: Path) 
 
     ended = drive(shot, plan, lambda: DaskCluster(str(scheduler)), Session(slow, show=kill))
     assert len(killed) == 1
-    assert ended.states == {DONE: 10}
+    assert ended.states == {DONE: 4}
     assert answers(shot) == answers(calm)
     assert {p.read_text() for p in (shot / "films").glob("*.ends")} == {"x"}
     assert max(r.attempts for r in read_records(shot).values()) == 1, "the dead worker wrote no record"

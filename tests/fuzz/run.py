@@ -18,7 +18,7 @@ from dataclasses import asdict, fields
 from functools import partial
 from pathlib import Path
 
-from tests.fuzz.calls import GOOD, Row, call
+from tests.fuzz.calls import GOOD, LIMIT, Row, call
 from tests.fuzz.cases import VERBS, Case, case
 
 ROOT = Path(__file__).parents[2]
@@ -90,6 +90,23 @@ def table(rows: Iterable[Row]) -> str:
     return "\n".join(lines)
 
 
+def page(rows: Iterable[Row], first: int, count: int) -> str:
+    """docs/studies/fuzz.md: what was called, and what came of it."""
+    rows = list(rows)
+    good, given_up = sum(r.outcome in GOOD for r in rows), sum(r.outcome == "timeout" for r in rows)
+    return (
+        "# Calls of the command line at random\n\n"
+        f"Made by `python -m tests.fuzz.run --first {first} --count {count} --table docs/studies/fuzz.md`: `fit`, "
+        "`sample` and `diagnose` on curves and settings drawn from a seed: rigs (R2/R1 1.1 to 10), thickness, "
+        "protocols, energies, effects, faults that no effect describes, noise, and options that nobody should choose. "
+        "Each answer must be one whole JSON document that does not contradict itself, each refusal one sentence that "
+        "says what, where and how to mend it. A call is given up after "
+        f"{', '.join(f'{s:g} s ({verb})' for verb, s in LIMIT.items())} of computing.\n\n"
+        f"{len(rows)} of {count} seeds were run; {good} calls were answered or refused, {given_up} given up.\n\n"
+        f"{table(rows)}\n"
+    )
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run, and print the table of all calls asked for; exit status 1 if one of them failed."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -99,6 +116,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--only", choices=sorted(set(VERBS)), help="only the calls of this verb")
     parser.add_argument("--limit", type=float, help="seconds of a call; without, those of its verb")
     parser.add_argument("--results", type=Path, default=RESULTS, help="CSV, one row a call")
+    parser.add_argument("--table", type=Path, help="write what came of all calls here, as Markdown")
     parser.add_argument("--write", type=Path, help="write the files of the first call here, and print its command")
     asked = parser.parse_args(arguments)
     if asked.write is not None:
@@ -108,6 +126,8 @@ def main(arguments: list[str] | None = None) -> int:
     run((c for c in map(case, seeds) if asked.only in (None, c.verb)), asked.results, asked.jobs, asked.limit)
     rows = [r for r in stored(asked.results).values() if r.seed in seeds and asked.only in (None, r.verb)]
     print(table(rows))
+    if asked.table is not None:
+        asked.table.write_text(page(rows, asked.first, asked.count), encoding="utf-8")
     return int(any(r.outcome not in GOOD for r in rows))
 
 

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.fuzz.calls import GOOD, call, contradiction, judged
+from tests.fuzz.calls import GOOD, Row, call, contradiction, judged
 from tests.fuzz.cases import Case, case
-from tests.fuzz.run import run, stored, table
+from tests.fuzz.run import page, run, stored, table
 
 CALLS = 500
 # Quick ones of every rig and verb, among them those that once failed and have been mended.
-FIXED = (1, 2, 4, 5, 6, 12, 13, 16, 20, 22, 23, 27, 31, 34, 39, 44, 47, 52, 57, 66, 67, 70, 75, 76, 84, 247)
+FIXED = (1, 2, 4, 5, 6, 12, 13, 16, 20, 22, 23, 27, 31, 34, 39, 44, 47, 52, 57, 66, 67, 70, 75, 76, 84, 247, 21010)
 
 
 @pytest.mark.parametrize("seed", FIXED)
@@ -74,4 +74,14 @@ def test_a_run_goes_on_where_it_was(tmp_path: Path, capsys: pytest.CaptureFixtur
     run([refused], results, 1)
     assert results.read_text() == first
     assert stored(results)[7].outcome == "refused"
-    assert "| fit | 1 | 0 |" in table(stored(results).values())
+    assert "| fit | 1 | " in table(stored(results).values())
+
+
+def test_the_page_says_how_many_ran_and_what_failed() -> None:
+    rows = [
+        Row(7, "fit", "a film", 0, 1.0, "answered", ""),
+        Row(8, "sample", "a film", 1, 2.0, "traceback", "ZeroDivisionError: nobody foresaw this"),
+    ]
+    told = page(rows, 7, 500)
+    assert "2 of 500 seeds were run; 1 calls were answered or refused, 0 given up." in told
+    assert "traceback: ZeroDivisionError: nobody foresaw this\n  seeds 8" in told

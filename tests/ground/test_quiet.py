@@ -12,8 +12,8 @@ import warnings
 warnings.simplefilter("error")
 before = list(warnings.filters)
 from bayesmembrane.ground.quiet import arviz
-assert warnings.filters == before
 assert arviz.ess
+assert warnings.filters == before
 """
 
 RACE = """
@@ -29,7 +29,17 @@ def gone(part, target):
 
 pathlib.Path.replace = gone
 from bayesmembrane.ground.quiet import arviz
-assert times and arviz.ess
+assert arviz.ess and times
+"""
+
+
+LATER = """
+import sys
+from bayesmembrane.app import analyses
+assert "arviz" not in sys.modules
+from bayesmembrane.ground.quiet import arviz
+assert "arviz" not in sys.modules
+assert arviz.ess is sys.modules["arviz"].ess
 """
 
 
@@ -46,6 +56,12 @@ def test_the_daily_warning_is_silent_and_the_user_s_filters_stay(tmp_path: Path)
     assert done.returncode == 0, done.stderr
     assert done.stdout == done.stderr == ""
     assert list(tmp_path.rglob("daily_warning")), "arviz would have warned"
+
+
+def test_it_is_imported_when_it_is_used(tmp_path: Path) -> None:
+    """A fit uses none of it, and its import is the longest of all."""
+    done = run(LATER, tmp_path)
+    assert done.returncode == 0, done.stderr
 
 
 def test_two_processes_at_midnight_both_get_it(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 
 from bayesmembrane.app.cli import main
 from bayesmembrane.comparison import compare
+from tests.report.blank import blank
 from tests.short_walks import shorten
 
 
@@ -31,5 +32,6 @@ def answer(words: list[str]) -> Any:
 if __name__ == "__main__":
     commands = json.loads(sys.argv[1])
     shorten()
+    blank()
     compare.cores = lambda: 1
     print(json.dumps([answer(words) for words in commands]))

@@ -45,8 +45,10 @@ def test_the_grid_is_fine_enough(name):
 @pytest.mark.parametrize(
     ("name", "range_name"),
     [
-        *((name, end) for name in ("neo_hookean", "gent") for end in ("OP1", "OP2")),
+        *(("neo_hookean", end) for end in ("OP1", "OP2")),
+        ("gent", "OP1"),
         ("mooney_rivlin", "OP2"),
+        pytest.param("gent", "OP2", marks=pytest.mark.study),
         pytest.param("mooney_rivlin", "OP1", marks=pytest.mark.study),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +11,7 @@ import typer
 from bayesmembrane.app.options import (
     CurveOptions,
     HypothesisOptionsAuto,
+    OptionGroup,
     OutputOptions,
     PreferredMaterialOption,
     RangeOption,
@@ -26,6 +28,16 @@ if TYPE_CHECKING:
 place = 10
 
 
+@dataclass(frozen=True)
+class EndOptions(OptionGroup):
+    """What is made of the answer."""
+
+    rivals: Annotated[
+        int, typer.Option("--rivals", min=0, help="Members of an ambiguous answer that are sampled, too.")
+    ] = 0
+    report_folder: Annotated[Path, typer.Option("--report", help="Folder of the page.")] = Path("reports/loop")
+
+
 def verb(
     curve: CurveOptions,
     material: PreferredMaterialOption,
@@ -34,7 +46,7 @@ def verb(
     sampling: SamplingOptions,
     stored: StoredOption,
     output: OutputOptions,
-    report_folder: Annotated[Path, typer.Option("--report", help="Folder of the page.")] = Path("reports/loop"),
+    ends: EndOptions,
 ) -> None:
     """Calibrate, diagnose, add what is missing, calibrate again, until adequate or abstaining; and report."""
     from bayesmembrane.app import analyses
@@ -48,8 +60,8 @@ def verb(
     with resumable(stored.folder), lines() as tell:
         work = analyses.Work(output.seed, stored.folder, sampling.ess, tell)
         question = Question(claim, material.declared)
-        found = analyses.loop(measurement, question, work, adapt_noise=adapt)
-    page = write_report([*analyses.loop_runs(found.result), found.result], report_folder)
+        found = analyses.loop(measurement, question, work, adapt_noise=adapt, rivals=ends.rivals)
+    page = write_report([*analyses.loop_runs(found.result), found.result], ends.report_folder)
     document = {**found.document, "report": str(page)}
     answer(document, output.as_json, lambda: show(document, measurement))
 

@@ -17,7 +17,7 @@ from bayesmembrane.calibration.sampling.convergence import LEAST_TAUS, Convergen
 from bayesmembrane.calibration.sampling.proposals.learned import learn, next_lesson
 from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.ground.errors import SettingsError
-from bayesmembrane.ground.interrupts import Asked, Stop, deferred, never
+from bayesmembrane.ground.interrupts import Stop, StopAsked, deferred, never
 from bayesmembrane.ground.parameters import Array
 
 SAVE_AFTER = 10.0  # s: what a run that is killed loses at most, beside the step that it was at
@@ -88,7 +88,7 @@ Callback = Callable[[Progress], None]
 
 
 @dataclass(frozen=True)
-class Beside:
+class Meanwhile:
     """What is done while the ensembles walk.
 
     keep : takes what was walked since it was last called: the starts, what `SAVE_AFTER` seconds brought, and the end
@@ -99,7 +99,7 @@ class Beside:
     stop: Stop = never
 
 
-NOTHING = Beside()
+NOTHING = Meanwhile()
 
 
 def run_ensembles(
@@ -108,7 +108,7 @@ def run_ensembles(
     seed: int,
     progress: Callback | None = None,
     chains: Chains | None = None,
-    beside: Beside = NOTHING,
+    beside: Meanwhile = NOTHING,
 ) -> Sampled:
     """Walk until tau is known (at least 50 tau steps), ESS = steps x walkers / tau is reached for the worst
     coordinate and R-hat between ensembles is at most 1.01, or until the limit of steps.
@@ -211,7 +211,7 @@ class _Walk:
     """
 
     posterior: Posterior
-    beside: Beside
+    beside: Meanwhile
     chains: Chains
 
     def __post_init__(self) -> None:
@@ -227,7 +227,7 @@ class _Walk:
         self.chains = replace(self.chains, lessons=(*self.chains.lessons, self.chains.steps))
         self.known = learn(self.posterior, self.chains)
 
-    def on_to(self, look: int, asked: Asked) -> bool:
+    def on_to(self, look: int, asked: StopAsked) -> bool:
         """Walk to the next lesson, or to the ``look`` if that comes first; False if asked to stop before."""
         # A walk that goes on may stand at its lesson, or beyond the look of one that wanted less: it is judged first.
         end = max(self.chains.steps, min(look, next_lesson(self.chains)))
@@ -245,7 +245,7 @@ class _Walk:
             self.beside.keep(part)
         self.saved = time.perf_counter()
 
-    def _walk(self, steps: int, look: int, asked: Asked) -> None:
+    def _walk(self, steps: int, look: int, asked: StopAsked) -> None:
         """At most ``steps`` more; what an interruption cuts is dropped."""
         if steps <= 0:
             return

@@ -17,7 +17,7 @@ ABOVE = 4
 """Rows above the numbers among which their names and units are looked for."""
 
 
-class Column(NamedTuple):
+class ExportColumn(NamedTuple):
     """A column: where it stands, its header as it is, its name and its unit ("" if the file names none)."""
 
     at: int
@@ -27,7 +27,7 @@ class Column(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Block:
+class NumberBlock:
     """Numbers that belong together.
 
     sheet, rows : where they stand
@@ -39,7 +39,7 @@ class Block:
 
     sheet: Sheet
     rows: Sequence[int]
-    columns: tuple[Column, ...]
+    columns: tuple[ExportColumn, ...]
     header: int | None
     label: str = ""
     numbers: frozenset[int] = frozenset()
@@ -65,20 +65,20 @@ class Fact(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Run:
+class _RunOfRows:
     start: int
     stop: int
     at: frozenset[int]
 
 
-def blocks_of(sheet: Sheet) -> list[Block]:
+def blocks_of(sheet: Sheet) -> list[NumberBlock]:
     """The blocks of numbers of a sheet, in its order; raises `DataError` for text within one."""
-    found: list[Block] = []
+    found: list[NumberBlock] = []
     runs = list(_runs(sheet))
     for k, run in enumerate(runs):
         above = runs[k - 1].stop if k else 0
         header, columns, label = _above(sheet, run, above)
-        block = Block(sheet, range(run.start, run.stop), columns, header, label, run.at)
+        block = NumberBlock(sheet, range(run.start, run.stop), columns, header, label, run.at)
         before = found[-1] if found else None
         if before is not None and k and header is None and _goes_on(runs[k - 1], run):
             _refuse_text(sheet, runs[k - 1].stop)
@@ -86,7 +86,7 @@ def blocks_of(sheet: Sheet) -> list[Block]:
     return [part for block in _joined(found) for part in _side_by_side(block)]
 
 
-def _runs(sheet: Sheet) -> Iterator[_Run]:
+def _runs(sheet: Sheet) -> Iterator[_RunOfRows]:
     """Rows of numbers that follow each other."""
     start, at = 0, frozenset[int]()
     for row in range(len(sheet)):
@@ -99,10 +99,10 @@ def _runs(sheet: Sheet) -> Iterator[_Run]:
             at |= numbers
             continue
         if at:
-            yield _Run(start, row, at)
+            yield _RunOfRows(start, row, at)
         start, at = row, (numbers if is_data else frozenset())
     if at:
-        yield _Run(start, len(sheet), at)
+        yield _RunOfRows(start, len(sheet), at)
 
 
 def _numeric(sheet: Sheet, cell: Cell) -> bool:
@@ -111,7 +111,7 @@ def _numeric(sheet: Sheet, cell: Cell) -> bool:
     )
 
 
-def _goes_on(before: _Run, run: _Run) -> bool:
+def _goes_on(before: _RunOfRows, run: _RunOfRows) -> bool:
     return before.stop - before.start >= 2 and run.stop - run.start >= 1 and before.at == run.at
 
 
@@ -120,7 +120,7 @@ def _refuse_text(sheet: Sheet, row: int) -> None:
     raise DataError(f'"{shown}" stands within the numbers', sheet.place(row), "correct or remove the line")
 
 
-def _above(sheet: Sheet, run: _Run, top: int) -> tuple[int | None, tuple[Column, ...], str]:
+def _above(sheet: Sheet, run: _RunOfRows, top: int) -> tuple[int | None, tuple[ExportColumn, ...], str]:
     """(row of the names, columns, label) of a run, from the rows between ``top`` and its first."""
     row, units = run.start - 1, None
     if row >= top and _is_units(sheet.cells(row)):
@@ -153,9 +153,9 @@ def _names(sheet: Sheet, row: int, width: int) -> Sequence[Cell]:
     return cells
 
 
-def _column(index: int, header: str, beside: str) -> Column:
+def _column(index: int, header: str, beside: str) -> ExportColumn:
     name, unit = named(header)
-    return Column(index, header, name, unit or beside.strip("[]() "))
+    return ExportColumn(index, header, name, unit or beside.strip("[]() "))
 
 
 def _padded(cells: Sequence[Cell], width: int) -> list[Cell]:
@@ -193,9 +193,9 @@ def _label(sheet: Sheet, names: int | None, top: int) -> str:
     return full.pop()[:60] if len(full) == 1 else ""
 
 
-def _joined(blocks: list[Block]) -> list[Block]:
+def _joined(blocks: list[NumberBlock]) -> list[NumberBlock]:
     """Blocks under the same header and label, one after the other, are pages of one table."""
-    out: list[Block] = []
+    out: list[NumberBlock] = []
     for block in blocks:
         same = bool(out) and block.header is not None and out[-1].columns == block.columns
         if same and out[-1].label == block.label and _pages(out[-1], block):
@@ -205,7 +205,7 @@ def _joined(blocks: list[Block]) -> list[Block]:
     return out
 
 
-def _pages(first: Block, second: Block) -> bool:
+def _pages(first: NumberBlock, second: NumberBlock) -> bool:
     """Whether the time goes on from the one to the other."""
     sheet = first.sheet
     at = next((c.at for c in first.columns if reading_of(c.name).role == "time"), None)
@@ -216,7 +216,7 @@ def _pages(first: Block, second: Block) -> bool:
     return a is not None and b is not None and b > a
 
 
-def _side_by_side(block: Block) -> list[Block]:
+def _side_by_side(block: NumberBlock) -> list[NumberBlock]:
     """The groups of columns of several specimens beside each other; the block itself if there is one."""
     names = [plain(c.name) for c in block.columns]
     starts = [k for k, name in enumerate(names) if name and name == names[0]]
@@ -229,7 +229,7 @@ def _side_by_side(block: Block) -> list[Block]:
     return [replace(block, columns=g, label=label) for g, label in zip(groups, labels, strict=True)]
 
 
-def _group_labels(block: Block, groups: list[tuple[Column, ...]]) -> list[str]:
+def _group_labels(block: NumberBlock, groups: list[tuple[ExportColumn, ...]]) -> list[str]:
     if block.header is None or block.header == 0:
         return [f"columns {g[0].at + 1} to {g[-1].at + 1}" for g in groups]
     above = _padded(block.sheet.cells(block.header - 1), groups[-1][-1].at + 1)

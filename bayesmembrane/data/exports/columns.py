@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesmembrane.data.exports.blocks import Block, Column
+from bayesmembrane.data.exports.blocks import ExportColumn, NumberBlock
 from bayesmembrane.data.exports.cells import NOT_MEASURED, Cell, clock
 from bayesmembrane.data.exports.hints import Guess, Hints, pairs_of
 from bayesmembrane.data.exports.words import (
@@ -41,10 +41,10 @@ EXAMPLE = "--columns time_s,travel_mm,force_N"
 
 
 @dataclass(frozen=True)
-class Candidate:
+class PossibleColumn:
     """A column with what it seems to be: ``role``, unit as `ground.units` spells it ("" unknown), and how well."""
 
-    column: Column
+    column: ExportColumn
     role: str
     unit: str
     reading: Reading
@@ -60,13 +60,13 @@ class Candidate:
 class Read:
     """A column that is used, in SI, with the lines its values stand in."""
 
-    column: Column
+    column: ExportColumn
     unit: str
     kind: str
     values: Array
 
 
-def candidates(block: Block, hints: Hints) -> list[Candidate]:
+def candidates(block: NumberBlock, hints: Hints) -> list[PossibleColumn]:
     """What the columns of a block seem to be; by ``--columns`` if that says so."""
     if hints.columns and "=" not in hints.columns:
         return _by_position(block, hints)
@@ -77,13 +77,15 @@ def candidates(block: Block, hints: Hints) -> list[Candidate]:
     return _replaced(found, said, hints)
 
 
-def has_curve(found: Iterable[Candidate]) -> bool:
+def has_curve(found: Iterable[PossibleColumn]) -> bool:
     """Whether there is something of how far and something of how hard."""
     roles = {c.role for c in found}
     return bool(roles & {TRAVEL, STRAIN, STRETCH}) and bool(roles & {FORCE, STRESS})
 
 
-def best(found: Sequence[Candidate], role: str, block: Block, kind: str | None = None) -> Candidate | None:
+def best(
+    found: Sequence[PossibleColumn], role: str, block: NumberBlock, kind: str | None = None
+) -> PossibleColumn | None:
     """The column of a role, None if there is none; raises `DataError` where two serve as well."""
     of_role = [c for c in found if c.role == role and (kind is None or c.kind in kind.split("|"))]
     if not of_role:
@@ -101,7 +103,7 @@ def best(found: Sequence[Candidate], role: str, block: Block, kind: str | None =
     return equal[0]
 
 
-def read(block: Block, chosen: Candidate, rows: Sequence[int], hints: Hints) -> Read:
+def read(block: NumberBlock, chosen: PossibleColumn, rows: Sequence[int], hints: Hints) -> Read:
     """The values of a column in SI; raises `DataError` at the first cell that is no number, or for want of a unit."""
     quantity = QUANTITY[chosen.role]
     raw, is_clock = _numbers(block, chosen.column, rows)
@@ -114,7 +116,7 @@ def read(block: Block, chosen: Candidate, rows: Sequence[int], hints: Hints) -> 
     return Read(chosen.column, "1" if unit == "one" else unit, chosen.kind, to_si(raw, scale))
 
 
-def trimmed(block: Block, chosen: Iterable[Candidate]) -> Sequence[int]:
+def trimmed(block: NumberBlock, chosen: Iterable[PossibleColumn]) -> Sequence[int]:
     """The rows of a block without those at its end in which no chosen column has anything: others go on there."""
     at = [c.column.at for c in chosen]
     rows, end = block.rows, len(block.rows)
@@ -124,7 +126,7 @@ def trimmed(block: Block, chosen: Iterable[Candidate]) -> Sequence[int]:
     return rows[:end]
 
 
-def _check_width(block: Block, rows: Sequence[int]) -> None:
+def _check_width(block: NumberBlock, rows: Sequence[int]) -> None:
     """Raise `DataError` at a row with more cells than there are columns: two lines in one, or a sign too much."""
     if isinstance(block.sheet.raw[rows[0]] if rows else "", str) and block.header is not None:
         width = max(block.width, len(block.sheet.cells(block.header)))
@@ -135,7 +137,7 @@ def _check_width(block: Block, rows: Sequence[int]) -> None:
                 raise DataError(fault, block.sheet.place(row), "correct or remove the line")
 
 
-def guess_of(role: str, chosen: Candidate, hints: Hints) -> list[Guess]:
+def guess_of(role: str, chosen: PossibleColumn, hints: Hints) -> list[Guess]:
     """What was taken for a role, in which unit, and why."""
     header = chosen.column.header or f"column {chosen.column.at + 1}"
     said = bool(hints.columns)
@@ -146,7 +148,7 @@ def guess_of(role: str, chosen: Candidate, hints: Hints) -> list[Guess]:
 # ---- what a column seems to be ---------------------------------------------------------------------------------------
 
 
-def _candidate(column: Column, hints: Hints) -> Candidate | None:
+def _candidate(column: ExportColumn, hints: Hints) -> PossibleColumn | None:
     reading = reading_of(column.name)
     role = reading.role
     unit = _unit(column, role, hints)
@@ -169,10 +171,10 @@ def _candidate(column: Column, hints: Hints) -> Candidate | None:
         and any(w in plain(column.name) for w in ("crosshead", "cross head", "traverse", "stroke"))
     ):
         score -= 1
-    return Candidate(column, role, unit, reading, score)
+    return PossibleColumn(column, role, unit, reading, score)
 
 
-def _unit(column: Column, role: str, hints: Hints) -> str:
+def _unit(column: ExportColumn, role: str, hints: Hints) -> str:
     said = {**hints.pairs}
     text = said.get(column.header.lower()) or said.get(role) or column.unit
     if not text:
@@ -180,7 +182,7 @@ def _unit(column: Column, role: str, hints: Hints) -> str:
     return unit_of(text, QUANTITY[role] if role in (FORCE,) else "") or unit_of(text)
 
 
-def _by_position(block: Block, hints: Hints) -> list[Candidate]:
+def _by_position(block: NumberBlock, hints: Hints) -> list[PossibleColumn]:
     names = [n.strip() for n in hints.columns.split(",")]
     if len(names) > len(block.columns):
         raise SettingsError(
@@ -193,7 +195,9 @@ def _by_position(block: Block, hints: Hints) -> list[Candidate]:
         said = named(name)
         role, kind = _role(said.name)
         unit = unit_of(said.unit, QUANTITY[role]) or _unit(column, role, hints)
-        found.append(Candidate(column._replace(header=column.header or name), role, unit, Reading(role, kind), 20.0))
+        found.append(
+            PossibleColumn(column._replace(header=column.header or name), role, unit, Reading(role, kind), 20.0)
+        )
     return found
 
 
@@ -208,7 +212,7 @@ def _role(name: str) -> tuple[str, str]:
     return role, reading.kind
 
 
-def _pointed(text: str, block: Block) -> Column:
+def _pointed(text: str, block: NumberBlock) -> ExportColumn:
     """The column that a header or a number from 1 names."""
     exact = [c for c in block.columns if text.lower() in (c.header.lower(), c.name.lower())]
     if not exact and text.isdecimal():
@@ -220,7 +224,7 @@ def _pointed(text: str, block: Block) -> Column:
     return exact[0]
 
 
-def _replaced(found: list[Candidate], said: dict[str, Column], hints: Hints) -> list[Candidate]:
+def _replaced(found: list[PossibleColumn], said: dict[str, ExportColumn], hints: Hints) -> list[PossibleColumn]:
     roles = {_role(name): column for name, column in said.items()}
     taken = {column.at for column in roles.values()}
     rest = [c for c in found if c.column.at not in taken and c.role not in {r for r, _ in roles}]
@@ -229,17 +233,17 @@ def _replaced(found: list[Candidate], said: dict[str, Column], hints: Hints) -> 
         unit = _unit(column, role, hints)
         fits = unit == "one" or (unit in UNITS and UNITS[unit].quantity == QUANTITY[role])
         reading = reading_of(column.name)
-        out.append(Candidate(column, role, unit if fits else "", Reading(role, kind or reading.kind), 20.0))
+        out.append(PossibleColumn(column, role, unit if fits else "", Reading(role, kind or reading.kind), 20.0))
     return rest + out
 
 
-def _alike(equal: Sequence[Candidate], block: Block) -> bool:
+def _alike(equal: Sequence[PossibleColumn], block: NumberBlock) -> bool:
     """Whether columns hold the same numbers, so that it does not matter which is taken."""
     columns = [[_at(block.sheet.cells(r), c.column.at) for r in block.rows] for c in equal]
     return all(c == columns[0] for c in columns[1:]) and len({c.unit for c in equal}) == 1
 
 
-def _refuse_unit(chosen: Candidate, block: Block) -> None:
+def _refuse_unit(chosen: PossibleColumn, block: NumberBlock) -> None:
     header = chosen.column.header or f"column {chosen.column.at + 1}"
     example = {TIME: "s", TRAVEL: "mm", FORCE: "N", STRESS: "MPa", STRAIN: "percent"}.get(chosen.role, "1")
     named_unit = f', and "{chosen.column.unit}" is none of it' if chosen.column.unit else ""
@@ -254,7 +258,7 @@ def _at(cells: Sequence[Cell], index: int) -> Cell:
     return cells[index] if index < len(cells) else ""
 
 
-def _numbers(block: Block, column: Column, rows: Sequence[int]) -> tuple[Array, bool]:
+def _numbers(block: NumberBlock, column: ExportColumn, rows: Sequence[int]) -> tuple[Array, bool]:
     """The numbers of a column, and whether they are clock times in s."""
     sheet, marks = block.sheet, block.sheet.marks
     out = np.empty(len(rows))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayesmembrane.data.exports.blocks import Block
+from bayesmembrane.data.exports.blocks import NumberBlock
 from bayesmembrane.data.exports.columns import trimmed
 from bayesmembrane.data.exports.export import Export
 from bayesmembrane.data.exports.film import Film, film_of
@@ -79,7 +79,7 @@ def curve_of(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: Sequence
     return Curve(columns, film, rig, export.lines, export.guesses, export.contradictions, export.notes)
 
 
-def _outside(export: Export, blocks: Sequence[Block]) -> None:
+def _outside(export: Export, blocks: Sequence[NumberBlock]) -> None:
     """Say which lines look like readings and stand outside of them; refuse where there are many."""
     block = export.block
     for other in blocks:

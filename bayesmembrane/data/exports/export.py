@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from bayesmembrane.data.exports.blocks import Block, Fact
-from bayesmembrane.data.exports.columns import EXAMPLE, Candidate, Read, best, guess_of, read
+from bayesmembrane.data.exports.blocks import Fact, NumberBlock
+from bayesmembrane.data.exports.columns import EXAMPLE, PossibleColumn, Read, best, guess_of, read
 from bayesmembrane.data.exports.hints import Guess, Hints
 from bayesmembrane.ground.errors import DataError
 
@@ -17,8 +17,8 @@ class Export:
 
     file: str
     hints: Hints
-    block: Block
-    found: list[Candidate]
+    block: NumberBlock
+    found: list[PossibleColumn]
     rows: Sequence[int] = ()
     guesses: list[Guess] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from bayesmembrane.data.exports.blocks import Block, Fact, blocks_of, facts_of, name_in
-from bayesmembrane.data.exports.columns import EXAMPLE, Candidate, candidates, has_curve
+from bayesmembrane.data.exports.blocks import Fact, NumberBlock, blocks_of, facts_of, name_in
+from bayesmembrane.data.exports.columns import EXAMPLE, PossibleColumn, candidates, has_curve
 from bayesmembrane.data.exports.hints import Hints
 from bayesmembrane.data.exports.sheets import Sheet
 from bayesmembrane.data.exports.words import STRAIN, STRETCH, TRAVEL
@@ -14,7 +14,9 @@ from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.units import FORCE, STRESS
 
 
-def part(sheets: Sequence[Sheet], file: str, hints: Hints) -> tuple[Block, list[Candidate], list[Block]]:
+def part(
+    sheets: Sequence[Sheet], file: str, hints: Hints
+) -> tuple[NumberBlock, list[PossibleColumn], list[NumberBlock]]:
     """(the table of the test, what its columns seem to be, all tables); raises `DataError` where that is open."""
     if hints.sheet:
         sheets = [s for s in sheets if s.name == hints.sheet] or _no_sheet(sheets, hints.sheet)
@@ -34,7 +36,7 @@ def part(sheets: Sequence[Sheet], file: str, hints: Hints) -> tuple[Block, list[
     return *parts[0], blocks
 
 
-def _judged(block: Block, hints: Hints, largest: bool) -> list[Candidate]:
+def _judged(block: NumberBlock, hints: Hints, largest: bool) -> list[PossibleColumn]:
     """Candidates; ``--columns`` is about the blocks that it fits."""
     if not hints.columns:
         return candidates(block, hints)
@@ -46,7 +48,9 @@ def _judged(block: Block, hints: Hints, largest: bool) -> list[Candidate]:
         return []
 
 
-def _chosen(parts: list[tuple[Block, list[Candidate]]], file: str, hints: Hints) -> tuple[Block, list[Candidate]]:
+def _chosen(
+    parts: list[tuple[NumberBlock, list[PossibleColumn]]], file: str, hints: Hints
+) -> tuple[NumberBlock, list[PossibleColumn]]:
     labels = _labels([b for b, _ in parts])
     if hints.part:
         for k, label in enumerate(labels, 1):
@@ -57,7 +61,7 @@ def _chosen(parts: list[tuple[Block, list[Candidate]]], file: str, hints: Hints)
     raise DataError(f"{fault} ({shown})", file, "say which, --part 1 or its name")
 
 
-def _labels(blocks: list[Block]) -> list[str]:
+def _labels(blocks: list[NumberBlock]) -> list[str]:
     labels = [b.label or b.sheet.name or f"line {b.sheet.lines[b.rows[0]]}" for b in blocks]
     if len(set(labels)) == len(labels):
         return labels
@@ -68,7 +72,7 @@ def _no_sheet(sheets: Sequence[Sheet], name: str) -> Any:
     raise SettingsError(f'there is no sheet "{name}"', remedy=f"known: {', '.join(s.name for s in sheets)}")
 
 
-def _refuse_columns(block: Block, hints: Hints) -> None:
+def _refuse_columns(block: NumberBlock, hints: Hints) -> None:
     names = [c.header for c in block.columns if c.header]
     n = len(block.columns)
     if not names:
@@ -82,7 +86,9 @@ def _refuse_columns(block: Block, hints: Hints) -> None:
     raise DataError(f"no column is known to hold {missing} among {shown}", block.place, f"name them, {EXAMPLE}")
 
 
-def facts_beside(sheets: Sequence[Sheet], blocks: Sequence[Block], block: Block) -> tuple[list[Fact], list[str], str]:
+def facts_beside(
+    sheets: Sequence[Sheet], blocks: Sequence[NumberBlock], block: NumberBlock
+) -> tuple[list[Fact], list[str], str]:
     """(facts, remarks, name of the specimen) of all that is no table of readings, the test's own sheet first."""
     facts: list[Fact] = []
     remarks: list[str] = []

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.data.exports.blocks import Block, blocks_of
-from bayesmembrane.data.exports.columns import Candidate, read
+from bayesmembrane.data.exports.blocks import NumberBlock, blocks_of
+from bayesmembrane.data.exports.columns import PossibleColumn, read
 from bayesmembrane.data.exports.film import Film
 from bayesmembrane.data.exports.hints import Guess, Hints
 from bayesmembrane.data.exports.sheets import Sheet
@@ -72,7 +72,7 @@ def _two_axes(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: list[Gu
     return Imported(columns, f"imported from {file}", (), tuple(guesses), (), film, "biaxial")
 
 
-def _column(block: Block, name: str, hints: Hints) -> Array:
+def _column(block: NumberBlock, name: str, hints: Hints) -> Array:
     """The values in SI of the column that begins with a name, ``XForce_mN`` with ``xforce``."""
     column = next((c for c in block.columns if c.header.lower().replace(" ", "").startswith(name)), None)
     if column is None:
@@ -81,5 +81,5 @@ def _column(block: Block, name: str, hints: Hints) -> Array:
             f"the column {name} is missing among {shown}", block.place, "export sizes, displacements and forces"
         )
     role = FORCE if name.endswith("force") else TRAVEL
-    chosen = Candidate(column, role, unit_of(column.unit), Reading(role), 20.0)
+    chosen = PossibleColumn(column, role, unit_of(column.unit), Reading(role), 20.0)
     return read(block, chosen, block.rows, hints).values

@@ -30,6 +30,10 @@ class Beliefs:
     takes: float = 15.0
     """Squares, in those of the noise, that it must take away to count all the same, where it is only that the form
     error could take them too."""
+    apart: float = 4.0
+    """Times by which one of two sets may be more probable than the other where they differ by effects that the test
+    cannot tell apart (`twins`). Of six such names on the calibration half of `make study-reliability` (cases 60 to
+    133) that were told to be nearly sure, two were wrong."""
     declared: float = 0.5
     """Of the energy that was declared; the others share the rest. Without one, all are equally probable."""
 

@@ -13,7 +13,8 @@ from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase, renewed
-from bayesmembrane.diagnosis.thresholds import GROWTH
+from bayesmembrane.diagnosis.explanation.twins import swapped, twins
+from bayesmembrane.diagnosis.thresholds import GROWTH, TWINS
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -101,7 +102,23 @@ def grown(case: OpenCase) -> Grown:
         out.polish(size)
         if not _worth_more(out, size):
             break
+    _with_twins(out)
     return out
+
+
+def _with_twins(out: Grown) -> None:
+    """The most probable set with each of its effects that this test cannot tell from another as that other."""
+    best = max(out.found.values(), key=lambda c: c.log_evidence)
+    energy, known = best.hypothesis.material.name, {e.name: e for e in out.case.effects}
+    unseen = [
+        (old, new)
+        for old, new, names in swapped(frozenset(best.names), twins(out.case))
+        if (energy, names) not in out.found and new in known
+    ]
+    for old, new in unseen[: TWINS.added]:
+        base = out.found.get((energy, frozenset(best.names) - {old}))
+        if base is not None:
+            out.add(_added(out, base, known[new]))
 
 
 def _beam(out: Grown, size: int) -> list[Candidate]:
@@ -138,6 +155,9 @@ def first_order(search: Search, base: Candidate, effect: Effect) -> float:
     white = search.noise.white(np.column_stack([s for s, _ in slopes]))
     freed = model.freed(base.theta, white)
     along, square = freed.T @ model.data, np.sum(white * freed, axis=0)
+    # Of a slope that the base follows wholly nothing is left but round-off, which may be negative.
+    left = square > GROWTH.round_off * np.sum(white * white, axis=0)
+    along, square = np.where(left, along, 0.0), np.where(left, square, 0.0)
     allowed = np.array([not effect.size.one_sided or side * a > 0 for a, (_, side) in zip(along, slopes, strict=True)])
     gain = 0.5 * along**2 / (square + 1) * allowed - 0.5 * np.log1p(square)
     return float(np.max(gain))

@@ -13,6 +13,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown
+from bayesmembrane.diagnosis.explanation.twins import levelled, twins
 from bayesmembrane.diagnosis.thresholds import FOREIGN, VERDICT
 from bayesmembrane.ground.parameters import Array
 
@@ -64,8 +65,12 @@ class Probabilities:
 
     def sure(self) -> list[str]:
         """Effects that are in all that is probable, by name: what is known even where the whole set is not."""
+        return self.likely(VERDICT.sure)
+
+    def likely(self, least: float = 0.5) -> list[str]:
+        """Effects whose probability is ``least`` or more, by name."""
         names = {n for key in self.effects for n in key.split("+")} - {NOTHING}
-        return sorted(n for n in names if self.of_effect(n) >= VERDICT.sure)
+        return sorted(n for n in names if self.of_effect(n) >= least)
 
     @property
     def anything_foreign(self) -> float:
@@ -104,8 +109,13 @@ def summed(grown: Grown) -> Total:
         energy = BELIEFS.log_energy(c.hypothesis.material.name, case.question.energy, len(case.plain))
         return BELIEFS.log_set(len(c.names) - len(given), visible) + energy
 
-    def weight(c: Candidate) -> float:
+    def own(c: Candidate) -> float:
         return counts * c.log_evidence + believed(c)
+
+    raised = _raised(grown, {id(c): own(c) for c in every})
+
+    def weight(c: Candidate) -> float:
+        return own(c) + raised[frozenset(c.names)]
 
     every.sort(key=weight, reverse=True)
     found = _foreign(grown, every, given)
@@ -114,7 +124,7 @@ def summed(grown: Grown) -> Total:
     terms = [(c, NOTHING, weight(c) + nothing) for c in every]
     # What the data do not speak for is neither seen nor excluded, like a further effect that is idle.
     seen = [f for f in found if counts * f.gain > BELIEFS.supported]
-    terms += [(f.base, f.kind, weight(f.base) + counts * f.gain + BELIEFS.log_foreign(kinds)) for f in seen]
+    terms += [(f.base, f.kind, own(f.base) + counts * f.gain + BELIEFS.log_foreign(kinds)) for f in seen]
     p = _normalised(np.array([w for _, _, w in terms]))
     judged = [
         _judged(grown, c, float(q), believed(c)) for (c, kind, _), q in zip(terms, p, strict=True) if kind == NOTHING
@@ -127,6 +137,21 @@ def summed(grown: Grown) -> Total:
     both = _falling(joint)
     marginal = Probabilities(_summed_out(both, 0), _falling(energies), _summed_out(both, 1))
     return Total(tuple(judged), marginal, both, tuple(found))
+
+
+def _raised(grown: Grown, weights: Mapping[int, float]) -> dict[frozenset[str], float]:
+    """By set of effects, by how much its ln weight rises where twins of it have more than they can be sure of.
+
+    ``weights`` : ln weight by the identity of a candidate.
+    """
+    plain = grown.found[(grown.case.null.hypothesis.material.name, frozenset(grown.case.null.names))]
+    before = max(grown.search.excess(plain), 1e-300)
+    total, left = {}, {}
+    for names in {names for _, names in grown.found}:
+        same = [c for (_, own), c in grown.found.items() if own == names]
+        total[names] = float(np.logaddexp.reduce([weights[id(c)] for c in same]))
+        left[names] = grown.search.excess(max(same, key=lambda c: weights[id(c)])) / before
+    return levelled(total, left, twins(grown.case))
 
 
 def _foreign(grown: Grown, every: Sequence[Candidate], given: Sequence[str]) -> list[Foreign]:

@@ -55,7 +55,7 @@ def decided(case: OpenCase, total: Total) -> Verdict:
         best.setdefault(set_name(j.candidate, given), j)
     members = tuple(best[name] for name in _smallest(p.effects) if name in best)
     unknown = Verdict("unknown", (), total.ranking, p, strange)
-    if not members or (len(members) > VERDICT.most_members and not p.sure()):
+    if not members or (len(members) > VERDICT.most_members and not p.likely()):
         return unknown
     first = members[0]
     if strange is not None and p.anything_foreign > 0.5 and strange.share * first.unexplained > VERDICT.foreign_carries:

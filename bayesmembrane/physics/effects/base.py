@@ -69,6 +69,8 @@ class Effect(ABC):
     needs_time : True if it means nothing without times
     absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
     exact : True if it has no law that could be off: an offset is an offset
+    remembers : False if it changes the curve by a function of the deflection alone, alike on every leg
+    twins_at_one_speed : names of effects that only another speed, or a hold, tells from this one
     rank : orders effects within a stage; equal ranks go by name
     """
 
@@ -81,6 +83,8 @@ class Effect(ABC):
     needs_time: ClassVar[bool] = False
     absorbed: ClassVar[str] = ""
     exact: ClassVar[bool] = False
+    remembers: ClassVar[bool] = True
+    twins_at_one_speed: ClassVar[tuple[str, ...]] = ()
     rank: ClassVar[int] = 0
     stage: ClassVar[str]
 

@@ -19,6 +19,7 @@ class ForceOffset(Sensor):
     reference: ClassVar[str] = "ISO 376:2011, zero error of force-proving instruments"
     signature: ClassVar[str] = "A constant force everywhere, also where the film is slack."
     exact: ClassVar[bool] = True
+    remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("offset", "N", "reading without load", Normal(0.0, 0.03), (-1.0, 1.0), 0.0),
     )

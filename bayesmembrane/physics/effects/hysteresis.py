@@ -33,6 +33,7 @@ class Hysteresis(Carried):
         "Unloading below loading in every cycle and at any speed: closed loops whose width grows with the force, that "
         "do not close at rest and do not remember the largest deflection."
     )
+    twins_at_one_speed: ClassVar[tuple[str, ...]] = ("viscoelastic",)
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("level", "-", "half of the width of a loop over the force", HalfNormal(0.1), (0.0, 0.9), 0.0),
         EffectParameter(

@@ -25,6 +25,7 @@ class MachineCompliance(Compliance):
         "Too soft where the force is high: the residual follows force times slope, alike on all legs, and a blank run "
         "shows it."
     )
+    remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("compliance", "m/N", "travel lost per newton", HalfNormal(3e-4), (0.0, 1e-2), 0.0),
     )

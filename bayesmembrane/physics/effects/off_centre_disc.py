@@ -29,6 +29,7 @@ class OffCentreDisc(Carried):
         "mostly absorbed by the modulus."
     )
     needs_clamp: ClassVar[bool] = True
+    remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "square", "-", "square of the eccentricity over the free length", HalfNormal(3e-3), (0.0, 0.1), 0.0

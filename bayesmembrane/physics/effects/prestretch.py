@@ -22,6 +22,7 @@ class Prestretch(Geometry):
     )
     needs_clamp: ClassVar[bool] = True
     exact: ClassVar[bool] = True
+    remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("stretch", "-", "equibiaxial stretch before clamping", HalfNormal(0.03, 1.0), (1.0, 1.3), 1.0),
     )

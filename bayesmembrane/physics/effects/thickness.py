@@ -21,6 +21,7 @@ class Thickness(Carried):
         "The material's modulus absorbs a wrong thickness without trace: the curve gives modulus times thickness only."
     )
     exact: ClassVar[bool] = True
+    remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("error", "-", "true over stated thickness, less one", Normal(0.0, 0.05), (-0.5, 0.5), 0.0),
     )

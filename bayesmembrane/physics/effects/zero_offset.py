@@ -21,6 +21,7 @@ class ZeroOffset(Deflection):
         "The whole curve lies to the right (or left): the residual follows the slope of the curve, alike on all legs."
     )
     exact: ClassVar[bool] = True
+    remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "shift", "m", "deflection read when the film becomes taut", Normal(0.0, 5e-4), (-5e-3, 5e-3), 0.0

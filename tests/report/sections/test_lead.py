@@ -17,7 +17,7 @@ from bayesmembrane.data.measurement import Provenance
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.report.blocks import Figure, Heading, Lead, Points, Table, Text
-from bayesmembrane.report.page import Content, compose, write_report
+from bayesmembrane.report.page import Content, compose, sections, write_report
 from bayesmembrane.report.runs import read
 from bayesmembrane.report.sections.diagnosis.lead import handles, steps_of
 from bayesmembrane.words.candidates import sizes
@@ -25,14 +25,15 @@ from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.seen import seen
 from tests.report.sections.loops import only
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 WORDS = 120
 RECONSTRUCTED = Provenance("c.csv", "c.toml", "", "statement: RECONSTRUCTED, not raw data: inferred from losses")
 
 
 def lead_of(result: Any) -> Lead:
-    lead = compose([result]).lead
-    assert lead is not None
-    return lead
+    """That of the page, without the parts of the page below it, whose pictures would be drawn each time."""
+    return next(lead for section in sections() if (lead := section.lead([result])) is not None)
 
 
 def told(content: Content) -> list[str]:
@@ -83,6 +84,23 @@ def test_a_first_screen_has_fewer_than_120_words_and_begins_with_probabilities(r
         assert "%" in lead.answer.partition(":")[0], name
         assert lead.left.startswith("leaving "), name
         assert lead.following.endswith("."), name
+
+
+def test_every_part_of_a_page_is_made_once(named: Loop, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its pictures are what a page takes most of its time for."""
+    made: list[str] = []
+    for section in sections():
+        kind, parts = type(section), type(section).parts
+
+        def counted(self: Any, results: Any, parts: Any = parts) -> Any:
+            made.append(self.name)
+            return parts(self, results)
+
+        monkeypatch.setattr(kind, "parts", counted)
+    lead = compose([named]).lead
+    assert lead is not None
+    assert lead.lines == lead_of(named).lines
+    assert sorted(made) == sorted(s.name for s in sections())
 
 
 def test_a_name_says_what_it_leaves_in_its_own_sentence(named: Loop, strip: Diagnosis) -> None:

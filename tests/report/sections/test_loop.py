@@ -27,7 +27,7 @@ from bayesmembrane.words import loop as loop_words
 from bayesmembrane.words.brief import of_diagnosis, of_loop
 from bayesmembrane.words.candidates import candidate_title
 from bayesmembrane.words.diagnosis import set_aside
-from bayesmembrane.words.moved import Change, changes, modulus_sentence
+from bayesmembrane.words.moved import Change, changes, modulus_fitted, modulus_sentence
 from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.rounds import answer, bound_sentences, moved, rival_sentences, validation_sentences
 from bayesmembrane.words.seen import DISC, seen
@@ -62,6 +62,17 @@ def test_sampled_rivals_stand_side_by_side_and_are_not_added(sampled: Loop) -> N
     (sentence,) = rival_sentences(sampled)
     assert sentence.count("MPa") == 3
     assert loop_words.round_document(sampled.rounds[0])["leaders"][1]["log_evidence"] == 550.0
+
+
+def test_rivals_that_were_only_fitted_have_a_modulus_without_a_spread(ambiguous: Loop) -> None:
+    (sentence,) = rival_sentences(ambiguous)
+    d, before = ambiguous.rounds[0].diagnosis, ambiguous.rounds[0].before.run
+    assert sentence.count("MPa") == 1 + len(d.members)
+    assert sentence.count("+-") == 1
+    c1 = before.data.posterior["neo_hookean.c1"].values
+    assert f"{2e-6 * c1.mean() / THICKNESS:.4g} +- " in sentence
+    # The friction that is in the curve stiffens the film of a model without it.
+    assert modulus_fitted(d.null, d.measurement) == pytest.approx(2e-6 * c1.mean() / THICKNESS, rel=0.05)
 
 
 def test_candidates_are_ranked_against_the_model_as_it_was(named: Loop) -> None:
@@ -173,6 +184,7 @@ def test_an_estimate_at_a_bound_is_a_limit(named: Loop) -> None:
 # ---- the page --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_the_page_answers_with_the_loop_first(tmp_path: Path, named: Loop, yeoh: Shown) -> None:
     page = write_report([yeoh, named], tmp_path).read_text()
     twin = json.loads((tmp_path / TWIN).read_text())
@@ -184,6 +196,7 @@ def test_the_page_answers_with_the_loop_first(tmp_path: Path, named: Loop, yeoh:
     assert {"loop errors", "loop scores", "loop parameters", "loop candidates", "loop power"} <= set(twin["tables"])
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_two_loops_keep_apart(named: Loop, unknown: Loop) -> None:
     sections = LoopSection().parts([named, unknown])
     names = [b.name for s in sections for b in s.blocks if isinstance(b, Table)]
@@ -193,6 +206,7 @@ def test_two_loops_keep_apart(named: Loop, unknown: Loop) -> None:
     assert starts == ["synthetic <film>, neo-Hookean, 120 readings"] * 2
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_without_a_name_the_rest_is_drawn_and_nothing_is_added(unknown: Loop) -> None:
     (section,) = LoopSection().parts([unknown])
     assert unknown.left is not None
@@ -204,6 +218,7 @@ def test_without_a_name_the_rest_is_drawn_and_nothing_is_added(unknown: Loop) ->
     assert not any(r["in_answer"] for r in ranking_table(unknown.rounds[0].diagnosis, "r").records())
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_rivals_are_listed_with_what_would_part_them(ambiguous: Loop) -> None:
     (section,) = LoopSection().parts([ambiguous])
     lines = [line for b in section.blocks if isinstance(b, Points) for line in b.lines]
@@ -219,6 +234,7 @@ def test_rivals_are_listed_with_what_would_part_them(ambiguous: Loop) -> None:
     assert residual_rows(waypoints(ambiguous))[1].title.startswith("The first rival, not added")
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_an_adequate_model_needs_no_candidates(named: Loop) -> None:
     (section,) = LoopSection().parts([Loop(named.rounds[1:], None)])
     names = [b.name for b in section.blocks if isinstance(b, Table)]
@@ -263,6 +279,7 @@ def test_a_single_loading_without_times_is_drawn() -> None:
 # ---- without any run -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_loop_and_a_diagnosis_stand_alone(tmp_path: Path, named: Loop) -> None:
     page = write_report([named], tmp_path / "loop").read_text()
     assert "What the force curve of synthetic &lt;film&gt; says" in page
@@ -280,6 +297,7 @@ def test_a_loop_and_a_diagnosis_stand_alone(tmp_path: Path, named: Loop) -> None
     assert twin["tables"]["glance"][0]["found"] == "named: neo-Hookean with friction in the guide"
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_stored_diagnosis_gives_the_same_page(tmp_path: Path, named: Loop) -> None:
     d = only(named, "named")
     store(tmp_path / "answer", "diagnosis", d, {})

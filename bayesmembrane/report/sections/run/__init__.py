@@ -23,7 +23,7 @@ from bayesmembrane.report.sections.run.draws import (
     prior_posterior,
     traces,
 )
-from bayesmembrane.report.sections.run.film import Plane, Shapes, convexity_map, profiles, residual_picture
+from bayesmembrane.report.sections.run.film import LiftedFilms, Plane, convexity_map, profiles, residual_picture
 from bayesmembrane.report.sections.run.tables import coordinates_table, parameters_table
 from bayesmembrane.words.calibration import convergence, describes, extrapolation, unknown, verdict, warnings
 from bayesmembrane.words.hypothesis import spoken
@@ -217,7 +217,7 @@ def _profiles(s: Shown) -> list[Block]:
     if ring is None:
         return []
     at = listed(f"{1e3 * x:.3g}" for x in d.shape_at)
-    shapes = Shapes(d.shape_at, d.shape_radius, d.shape_height, *ring)
+    shapes = LiftedFilms(d.shape_at, d.shape_radius, d.shape_height, *ring)
     return [
         Figure(
             profiles(shapes, s.look),

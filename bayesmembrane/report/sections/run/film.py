@@ -103,7 +103,7 @@ def convexity_map(plane: Plane, material: str) -> Picture:
 
 
 @dataclass(frozen=True, eq=False)
-class Shapes:
+class LiftedFilms:
     """Deformed film: radius f and height h, (D, P, M) m, of P draws at the deflections ``at`` (D,) m, between the radii
     of disc and ring, m.
     """
@@ -115,7 +115,7 @@ class Shapes:
     outer: float
 
 
-def profiles(shapes: Shapes, look: str, kind: str = "png") -> Picture:
+def profiles(shapes: LiftedFilms, look: str, kind: str = "png") -> Picture:
     """The deformed film; disc and ring as bars."""
     x, y, deflections = 1e3 * shapes.radius, 1e3 * shapes.height, shapes.at
     inner, outer, c = shapes.inner, shapes.outer, colour(look)

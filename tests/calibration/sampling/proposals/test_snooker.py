@@ -10,7 +10,7 @@ import numpy as np
 from bayesmembrane.calibration.sampling.proposals.ensemble import ensemble_moves
 from bayesmembrane.calibration.sampling.proposals.snooker import Snooker
 
-SIZE, ENSEMBLES, WALKERS, STEPS = 4, 20, 192, 1200
+SIZE, ENSEMBLES, WALKERS, STEPS = 4, 20, 576, 400
 LIMIT = 7.0
 # Of x0 in the wedge |x1| < x0 with x ~ N(0, 1): the two rotated by 45 degrees are independent half-normals.
 MEAN = np.sqrt(2) * np.sqrt(2 / np.pi)

@@ -1,0 +1,71 @@
+"""Effects that a test cannot tell apart: no shape of a law is sure enough to choose between them.
+
+Two effects are twins on a measurement where both change the curve by functions of the deflection alone that nearly
+coincide beside the plain model (`confounded`), or where one follows time and the other the way, and the disc moved at
+one speed without a hold. Laws of a library are close to what happens, not the same: of two sets that differ by twins,
+and leave nearly as little, none is told to be more than `BELIEFS.apart` times as probable as the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+import numpy as np
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.detection.scores import confounded
+from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
+from bayesmembrane.diagnosis.explanation.case import OpenCase
+from bayesmembrane.diagnosis.thresholds import TWINS
+
+Set = frozenset[str]
+Pairs = Mapping[Set, float]
+"""Pairs of effects, and which part of the misfit beyond noise the one may leave beyond the other and still be alike."""
+
+
+def twins(case: OpenCase) -> Pairs:
+    """The pairs that this test cannot tell apart."""
+    still = {e.name for e in case.effects if not e.remembers}
+    out = {frozenset((a, b)): TWINS.alike for a, b, _ in confounded(case.signatures) if {a, b} <= still}
+    if one_speed(case.measurement):
+        out |= {frozenset((e.name, o)): TWINS.alike_in_time for e in case.effects for o in e.twins_at_one_speed}
+    return out
+
+
+def one_speed(measurement: Measurement) -> bool:
+    """True if the disc moved at one speed, within `TWINS.speeds`, and never stood still; also where nobody timed it."""
+    if measurement.time is None:
+        return True
+    leg = np.cumsum(np.abs(np.diff(measurement.leg, prepend=measurement.leg[0])) > 0)
+    speed = measurement.path.speed[measurement.on_path]
+    each = [float(np.median(speed[leg == n])) for n in np.unique(leg) if np.count_nonzero(leg == n) >= TWINS.readings]
+    return not measurement.holds and (len(each) < 2 or max(each) < TWINS.speeds * min(each))
+
+
+def swapped(names: Set, pairs: Iterable[Set]) -> Iterator[tuple[str, str, Set]]:
+    """(out, in, the set after it) for every effect of a set whose twin is not in it."""
+    for pair in pairs:
+        inside = names & pair
+        if len(inside) == 1:
+            (out,), (new,) = inside, pair - inside
+            yield out, new, (names - {out}) | {new}
+
+
+def levelled(weights: Mapping[Set, float], left: Mapping[Set, float], pairs: Pairs) -> dict[Set, float]:
+    """By how much ln of a set's probability rises, so that none is `BELIEFS.apart` times less than a twin of it.
+
+    weights : by set, ln of its probability, whatever the constant
+    left : by set, the part of the squares beyond noise that it leaves
+    """
+    out = {}
+    for names, weight in weights.items():
+        best = max(
+            (
+                weights[other]
+                for old, new, other in swapped(names, pairs)
+                if other in weights and left[names] - left[other] < pairs[frozenset((old, new))]
+            ),
+            default=-np.inf,
+        )
+        out[names] = max(best - float(np.log(BELIEFS.apart)) - weight, 0.0)
+    return out

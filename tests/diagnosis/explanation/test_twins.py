@@ -1,0 +1,77 @@
+"""Effects that a test cannot tell apart: which they are, and that no shape of a law chooses between them."""
+
+import numpy as np
+import pytest
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
+from bayesmembrane.diagnosis.explanation.twins import levelled, one_speed, swapped
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.annulus import Annulus
+
+A, B, C, D = (frozenset(names) for names in (["a"], ["b"], ["a", "c"], ["b", "c"]))
+PAIRS = {frozenset(("a", "b")): 0.05}
+UP = np.linspace(0.0, 0.03, 31)
+LEG = np.concatenate([UP, UP[-2::-1]])
+
+
+def curve(deflection: np.ndarray, time: np.ndarray | None) -> Measurement:
+    return Measurement(deflection, 1 + deflection, Annulus(0.010, 0.035), Specimen("film", 5e-5), time=time)
+
+
+def odds(weights: dict[frozenset[str], float], left: dict[frozenset[str], float]) -> dict[frozenset[str], float]:
+    raised = levelled(weights, left, PAIRS)
+    return {names: weights[names] + raised[names] for names in weights}
+
+
+def test_a_twin_is_at_most_so_many_times_less_probable() -> None:
+    weights, left = {A: 0.0, B: -60.0, C: -2.0, D: -3.0}, {A: 0.01, B: 0.02, C: 0.0, D: 0.0}
+    found = odds(weights, left)
+    assert found[A] - found[B] == pytest.approx(np.log(BELIEFS.apart))
+    assert (found[A], found[C], found[D]) == (0.0, -2.0, -3.0)  # who is near enough stays
+
+
+def test_a_twin_that_leaves_much_more_is_told_apart() -> None:
+    found = odds({A: 0.0, B: -60.0}, {A: 0.01, B: 0.07})
+    assert found[B] == -60.0
+
+
+def test_levels_are_those_of_a_first_look_whoever_is_raised() -> None:
+    """b is raised by a, and c by b as it was: no chain of twins lifts what nobody near has."""
+    pairs = {frozenset(("a", "b")): 0.05, frozenset(("b", "c")): 0.05}
+    weights = {A: 0.0, B: -60.0, frozenset(["c"]): -90.0}
+    raised = levelled(weights, dict.fromkeys(weights, 0.0), pairs)
+    assert weights[frozenset(["c"])] + raised[frozenset(["c"])] == pytest.approx(-60.0 - np.log(BELIEFS.apart))
+
+
+def test_sets_differ_by_one_twin() -> None:
+    assert list(swapped(C, PAIRS)) == [("a", "b", D)]
+    assert list(swapped(frozenset(["a", "b"]), PAIRS)) == []
+    assert list(swapped(frozenset(["c"]), PAIRS)) == []
+
+
+def test_one_speed_is_one_speed_until_a_leg_is_faster_or_the_disc_stands() -> None:
+    even = np.arange(LEG.size, dtype=float)
+    assert one_speed(curve(LEG, even))
+    assert one_speed(curve(LEG, None))
+    faster = np.where(even < 31, even, 30 + 0.1 * (even - 30))
+    assert not one_speed(curve(LEG, faster))
+    still = np.insert(LEG, 31, np.full(20, LEG[30]))
+    assert not one_speed(curve(still, np.arange(still.size, dtype=float)))
+
+
+@pytest.mark.parametrize("name", sorted(components("effects")))
+def test_effects_that_do_not_remember_are_alike_on_every_leg(name: str) -> None:
+    """And those that say they do, are not."""
+    claim = hypothesis("neo_hookean", [name])
+    effect = claim.effects[0]
+    slow_fast = np.cumsum(np.where(np.arange(4 * 31 - 3) < 60, 1.0, 0.1))
+    m = curve(np.concatenate([LEG, LEG[1:]]), slow_fast)
+    sizes = np.array([0.5 * p.typical if p.null is None else p.null + 0.5 * p.scale for p in effect.coordinates])
+    x = np.concatenate([np.log([10.0]), np.clip(sizes, *zip(*((p.bounds) for p in effect.coordinates), strict=True))])
+    force = Forward(claim, m, m.deflection)(x[None, :]).force[0]
+    legs = force[:31], force[30:61][::-1], force[60:91], force[90:][::-1]
+    alike = all(leg == pytest.approx(legs[0], rel=1e-9, abs=1e-12) for leg in legs)
+    assert alike is not effect.remembers
