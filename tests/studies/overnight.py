@@ -29,7 +29,7 @@ from bayesmembrane.calibration.sampling import walk
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.proposals import learned
 from bayesmembrane.calibration.sampling.segments import Segments
-from bayesmembrane.calibration.sampling.walk import Beside, Settings, begun, run_ensembles
+from bayesmembrane.calibration.sampling.walk import Meanwhile, Settings, begun, run_ensembles
 from bayesmembrane.campaign.drive import DEADLINE, GRACE, Session, drive
 from bayesmembrane.campaign.pool import LocalPool
 from bayesmembrane.ground.parameters import Array
@@ -77,7 +77,7 @@ def checkpoints(place: Path) -> list[Row]:
     start = np.random.default_rng(0).standard_normal((2, 32, posterior.size))
     began = time.perf_counter()
     settings = Settings(ess=1e9, walkers=32, chunk=10**8, most_steps=10**8)
-    beside = Beside(keep, lambda: time.perf_counter() - began > LASTS)
+    beside = Meanwhile(keep, lambda: time.perf_counter() - began > LASTS)
     found = run_ensembles(posterior, settings, 0, chains=begun(posterior, start, 0), beside=beside)  # type: ignore[arg-type]
     took, evaluations = time.perf_counter() - began, found.chains.evaluations
     size = sum(path.stat().st_size for path in segments.paths)
