@@ -10,7 +10,11 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
+<<<<<<< HEAD
 .PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-import study-scale study-kill study-damage study-seeds study-sbc study-modes clean
+=======
+.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-import study-scale study-kill study-overnight study-damage study-seeds study-sbc clean
+>>>>>>> overnight
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -23,7 +27,8 @@ help:
 	@echo "make study-second  the same on the second generator, once and at the end; SECOND='--count 60' asks for less"
 	@echo "make study-fuzz  500 calls at random, each judged, an hour or so; goes on where it was; FUZZ='--only fit' asks for less"
 	@echo "make study-scale  ten thousand tiny runs in a campaign, some minutes: what it costs beside the work itself"
-	@echo "make study-kill  runs killed at random moments and while they write, some minutes; KILL='--kills 20' asks for less"
+	@echo "make study-kill  runs killed at random moments and while they write, and a campaign of 60 runs, some minutes; KILL='--kills 20' asks for less"
+	@echo "make study-overnight  what checkpoints cost, the memory of ten million draws, how late a deadline is, some minutes"
 	@echo "make study-damage  every stored file damaged 500 times, an hour or less; DAMAGE='--times 50' asks for less"
 	@echo "make study-import 10 000 damaged exports, what becomes of them, some minutes; IMPORT='--count 1000' asks for less"
 	@echo "make study-seeds 50 seeds for the statistical tests, lanes on and off, hours; goes on where it was; SEEDS='--group quick' asks for less"
@@ -86,6 +91,10 @@ study-scale: $(STAMP)
 
 study-kill: $(STAMP)
 	$(PY) -m tests.studies.kill --table docs/studies/kill.md $(KILL)
+	$(PY) -m tests.studies.kill_campaign --table docs/studies/kill_campaign.md
+
+study-overnight: $(STAMP)
+	$(PY) -m tests.studies.overnight --table docs/studies/overnight.md $(OVERNIGHT)
 
 study-damage: $(STAMP)
 	$(PY) -m tests.studies.damage --table docs/studies/damage.md $(DAMAGE)

@@ -18,7 +18,7 @@ from bayesmembrane.ground.errors import SettingsError
 
 ROOT = Path(__file__).resolve().parent.parent
 # Of a comparison, whose stored answers carry the name, and of a campaign's page.
-KNOWN_TWICE = {"Row"}
+KNOWN_TWICE: set[str] = set()
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 

@@ -29,7 +29,7 @@ from bayesmembrane.campaign.task import Task
 from bayesmembrane.ground.errors import BayesmembraneError
 
 STEPS = 400
-PATIENCE = 180.0  # s
+PATIENCE = 180.0  # s of a processor
 SHARES = {"sample": 1.0, "compare": 1.2, "valleys": 0.6, "diagnose": 3.7, "loop": 10.0}
 """How many runs an analysis of one hypothesis takes as long as.
 
@@ -41,14 +41,30 @@ Kind = tuple[str, ...]
 
 
 @dataclass(frozen=True)
+class Pace:
+    """s that something takes by the clock, while this machine does what it does now, and of a processor alone."""
+
+    clock: float
+    processor: float
+
+    def times(self, many: float) -> Pace:
+        return Pace(many * self.clock, many * self.processor)
+
+
+def total(paces: Sequence[Pace]) -> Pace:
+    """One after the other."""
+    return Pace(sum(p.clock for p in paces), sum(p.processor for p in paces))
+
+
+@dataclass(frozen=True)
 class Estimate:
     """What would run, and for how long.
 
     tasks : how many of each analysis are left to do
     work : s of one core that they take
-    seconds : until the last one is done, on ``workers``
+    seconds : by the clock until the last one is done, on ``workers``
     done, refused : tasks that are done already, and why others cannot be
-    rehearsed : s that a run of each kind takes, as measured
+    rehearsed : s by the clock that a run of each kind takes, as measured
     """
 
     tasks: Mapping[str, int]
@@ -80,18 +96,16 @@ def estimated(campaign: Path, made: Plan, workers: int, tell: Callable[[str], No
     able = [task for task in made.tasks if not task.fault]
     left = [task for task in able if task.key not in ended]
     paces, start = _rehearsed(left, tell), _start()
-    times = [(task, _seconds(task, paces)) for task in left]
-    work: Counter[str] = Counter()
-    for task, seconds in times:
-        work[task.analysis] += seconds  # type: ignore[assignment]  # a counter of times
+    times = [(task, _pace(task, paces)) for task in left]
+    analyses = Counter(task.analysis for task in left)
     return Estimate(
-        tasks=Counter(task.analysis for task in left),
-        work=work,
-        seconds=_wall(times, workers) + (start if left else 0.0),
+        tasks=analyses,
+        work={a: sum(pace.processor for task, pace in times if task.analysis == a) for a in analyses},
+        seconds=_wall([(task, pace.clock) for task, pace in times], workers) + (start if left else 0.0),
         workers=workers,
         done=len(able) - len(left),
         refused=tuple(task.fault for task in made.tasks if task.fault),
-        rehearsed=paces,
+        rehearsed={kind: pace.clock for kind, pace in paces.items()},
     )
 
 
@@ -99,16 +113,16 @@ def _kind(claim: Mapping[str, Any]) -> Kind:
     return (claim["material"], *claim["effects"])
 
 
-def _rehearsed(left: Sequence[Task], tell: Callable[[str], None]) -> dict[Kind, float]:
-    """s that a run of each kind takes; empty if none can be made."""
+def _rehearsed(left: Sequence[Task], tell: Callable[[str], None]) -> dict[Kind, Pace]:
+    """What a run of each kind takes; empty if none can be made."""
     first: dict[Kind, Task] = {}
     for task in left:
         for claim in task.claims:
             first.setdefault(_kind(claim), replace(task, claims=(claim,)))
-    found: dict[Kind, float] = {}
-    began = time.monotonic()
+    found: dict[Kind, Pace] = {}
+    began = time.process_time()
     for kind, task in first.items():
-        if found and time.monotonic() - began > PATIENCE:
+        if found and time.process_time() - began > PATIENCE:
             break
         tell(f"Timing {'+'.join(kind)}")
         try:
@@ -120,19 +134,19 @@ def _rehearsed(left: Sequence[Task], tell: Callable[[str], None]) -> dict[Kind, 
     return found
 
 
-def _rehearse(task: Task) -> float:
-    """s of one run, of which a part is walked."""
+def _rehearse(task: Task) -> Pace:
+    """What one run takes, of which a part is walked."""
     options = {"sampling": {"ess": 1000.0}, "page": False, **(task.options or {})}
     walk = {**options["sampling"]}
     walk["most_steps"] = max(min(walk.get("most_steps", STEPS), STEPS), walk.get("chunk", 300))
     short = replace(task, analysis="sample", options={**options, "sampling": walk})
     told: list[Progress] = []
-    began = time.perf_counter()
+    began, busy = time.perf_counter(), time.process_time()
     with tempfile.TemporaryDirectory(prefix="rehearsal-") as name:
         perform(short, Path(name).resolve(), lambda _, now: told.append(now) if isinstance(now, Progress) else None)
-    seconds = time.perf_counter() - began
+    made = Pace(time.perf_counter() - began, time.process_time() - busy)
     lacking = told[-1].seconds_left if told else 0.0
-    return seconds + (lacking if lacking > 0 else 0.0)
+    return made.times(1.0 + lacking / made.clock) if lacking > 0 else made
 
 
 def _start() -> float:
@@ -142,12 +156,12 @@ def _start() -> float:
     return time.perf_counter() - began
 
 
-def _seconds(task: Task, paces: Mapping[Kind, float]) -> float:
-    """s that a task takes of one worker."""
+def _pace(task: Task, paces: Mapping[Kind, Pace]) -> Pace:
+    """What a task takes of one worker."""
     if not paces:
-        return 0.0
-    mean = sum(paces.values()) / len(paces)
-    return SHARES[task.analysis] * sum(paces.get(_kind(claim), mean) for claim in task.claims)
+        return Pace(0.0, 0.0)
+    mean = total([*paces.values()]).times(1 / len(paces))
+    return total([paces.get(_kind(claim), mean) for claim in task.claims]).times(SHARES[task.analysis])
 
 
 def _wall(times: Sequence[tuple[Task, float]], workers: int) -> float:

@@ -28,7 +28,7 @@ ORDER = (FAILED, REFUSED, PREEMPTED, WAITING, DONE)
 
 
 @dataclass
-class Row:
+class HypothesisRow:
     """One hypothesis on one measurement."""
 
     film: str
@@ -95,9 +95,9 @@ def _refuse_foreign(path: Path) -> None:
 # ---- rows ------------------------------------------------------------------------------------------------------------
 
 
-def table_rows(entries: Iterable[Entry]) -> list[Row]:
+def table_rows(entries: Iterable[Entry]) -> list[HypothesisRow]:
     """A row for every hypothesis on every range of every measurement, with what all the analyses say of it."""
-    rows: dict[tuple[str, str, str], Row] = {}
+    rows: dict[tuple[str, str, str], HypothesisRow] = {}
     asked: list[Entry] = []
     for entry in entries:
         if entry.analysis in QUESTIONS:
@@ -109,7 +109,7 @@ def table_rows(entries: Iterable[Entry]) -> list[Row]:
                 row.sampled = entry.found
             if entry.analysis == "compare" and entry.found:
                 row.evidence = entry.found["rows"][place]
-    beside: dict[tuple[str, str], list[Row]] = {}
+    beside: dict[tuple[str, str], list[HypothesisRow]] = {}
     for row in rows.values():
         beside.setdefault((row.film, row.reach), []).append(row)
     for entry in asked:
@@ -117,16 +117,16 @@ def table_rows(entries: Iterable[Entry]) -> list[Row]:
     return [row for group in beside.values() for row in group]
 
 
-def _row(entry: Entry, claim: Mapping[str, Any]) -> Row:
+def _row(entry: Entry, claim: Mapping[str, Any]) -> HypothesisRow:
     label = "+".join([claim["material"], *claim["effects"]])
-    return Row(entry.film, entry.reach, label, claim["noise"], claim["convexity"])
+    return HypothesisRow(entry.film, entry.reach, label, claim["noise"], claim["convexity"])
 
 
-def _answer(beside: dict[tuple[str, str], list[Row]], entry: Entry) -> None:
+def _answer(beside: dict[tuple[str, str], list[HypothesisRow]], entry: Entry) -> None:
     """Lay the verdict on a measurement beside all of its hypotheses; alone in a row where there is none."""
     group = beside.setdefault((entry.film, entry.reach), [])
     if not any(row.convexity == entry.convexity for row in group):
-        group.append(Row(entry.film, entry.reach, "any", entry.noise, entry.convexity))
+        group.append(HypothesisRow(entry.film, entry.reach, "any", entry.noise, entry.convexity))
     for row in group:
         if row.convexity == entry.convexity:
             row.take(entry)
@@ -153,7 +153,7 @@ def _few(names: Sequence[str]) -> str:
     return ", ".join(names[:FEW]) + (f" and {more} more" if more > 0 else "")
 
 
-def remarks(rows: Sequence[Row]) -> list[str]:
+def remarks(rows: Sequence[HypothesisRow]) -> list[str]:
     """What must be known before the numbers are trusted."""
     sampled = [row for row in rows if row.sampled]
     short = [row for row in sampled if not row.sampled["converged"]]
@@ -172,7 +172,7 @@ def remarks(rows: Sequence[Row]) -> list[str]:
     return said
 
 
-def _films(rows: Sequence[Row]) -> str:
+def _films(rows: Sequence[HypothesisRow]) -> str:
     return _few([f"{row.film} {row.label}" for row in rows])
 
 
@@ -196,7 +196,7 @@ _HEADS = {
 _ONLY_IF_SEVERAL = ("reach", "noise", "convexity")
 
 
-def _columns(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def _columns(rows: Sequence[HypothesisRow]) -> list[dict[str, Any]]:
     """Columns that say something: what is the same in all rows is left out of the ranges, noises and convexities."""
     used = {k for row in rows for k, v in _values(row).items() if v not in (None, "", {})} | {"state"}
     for name in _ONLY_IF_SEVERAL:
@@ -205,7 +205,7 @@ def _columns(rows: Sequence[Row]) -> list[dict[str, Any]]:
     return [{"key": key, "head": head} for key, head in _HEADS.items() if key in used]
 
 
-def _values(row: Row) -> dict[str, Any]:
+def _values(row: HypothesisRow) -> dict[str, Any]:
     z, sd = row.evidence.get("log_evidence") or {}, row.evidence.get("log_evidence_sd") or {}
     first = next(iter(z), None)
     return {
@@ -226,12 +226,12 @@ def _values(row: Row) -> dict[str, Any]:
     }
 
 
-def _plain(row: Row) -> dict[str, Any]:
+def _plain(row: HypothesisRow) -> dict[str, Any]:
     """A row as programs read it."""
     return {**_values(row), "states": row.states, "reasons": row.reasons, "converged": row.sampled.get("converged")}
 
 
-def _cells(row: Row, base: str) -> dict[str, Any]:
+def _cells(row: HypothesisRow, base: str) -> dict[str, Any]:
     """A row as people read it: text, and what it is sorted by where that is another thing."""
     values = _values(row)
     texts: dict[str, str] = {k: str(values[k]) for k in ("film", "reach", "label", "noise", "convexity", "verdict")}

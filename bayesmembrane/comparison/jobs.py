@@ -22,10 +22,10 @@ from bayesmembrane.calibration.store import describe, run_name
 from bayesmembrane.comparison.convexity_modes import WITHIN, ByMode, by_convexity
 from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, SIGMAS, together
-from bayesmembrane.comparison.evidence.nested import nested
+from bayesmembrane.comparison.evidence.nested import ARun, Keep, nested
 from bayesmembrane.comparison.evidence.target import EvidenceEstimate, PosteriorTarget, averaged
 from bayesmembrane.comparison.leave_out.score import leave_one_out, leave_range_out
-from bayesmembrane.comparison.parts import kept, run_folder, serves
+from bayesmembrane.comparison.parts import drop_pieces, kept, run_folder, serves
 from bayesmembrane.comparison.prior_widths import prior_widths
 from bayesmembrane.comparison.result import Row
 from bayesmembrane.data.measurement import Measurement
@@ -115,11 +115,18 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
     def step(text: str) -> None:
         tell(job.label, text)
 
+    def climb(name: str, doing: str, seed: int) -> EvidenceEstimate:
+        def keep(piece: str, make: Callable[[], ARun]) -> ARun:
+            return kept(run.path, f"{name}-{piece}", key, make)
+
+        found = part(name, doing, lambda: _nested(posterior, draws, seed, step, keep))
+        drop_pieces(run.path, name)
+        return found
+
     bridged = part("bridge", "bridge sampling", lambda: _bridged(posterior, run, seed))
-    climbed = part("nested", "nested sampling", lambda: _nested(posterior, draws, seed, step))
+    climbed = climb("nested", "nested sampling", seed)
     if by_chance(climbed, bridged):
-        again = part("again", "nested sampling, again", lambda: _nested(posterior, draws, seed + AGAIN, step))
-        climbed = averaged(climbed, again)
+        climbed = averaged(climbed, climb("again", "nested sampling, again", seed + AGAIN))
     loo = part("loo", "leave one out", lambda: leave_one_out(posterior, run.data, seed, step))
     widths = part("widths", "prior widths", lambda: prior_widths(posterior, draws, worth, seed))
     rest = None
@@ -157,12 +164,12 @@ def _no_mass(hypothesis: Hypothesis) -> str:
     )
 
 
-def _nested(posterior: Posterior, draws: Array, seed: int, tell: Callable[[str], None]) -> EvidenceEstimate:
+def _nested(posterior: Posterior, draws: Array, seed: int, tell: Callable[[str], None], keep: Keep) -> EvidenceEstimate:
     """Nested sampling that begins around the draws, and around every valley that a descent from prior draws finds."""
     rng = np.random.default_rng([seed, 7])
     starts = starting_points(posterior, rng, 2, STARTS, Outcomes()).reshape(-1, posterior.size)
     tolerance = NESTED_SD if posterior.size <= FEW else NESTED_SD_MANY
-    return nested(PosteriorTarget(posterior), seed, tolerance, tell, (draws, starts))
+    return nested(PosteriorTarget(posterior), seed, tolerance, tell, (draws, starts), keep)
 
 
 def by_chance(climbed: EvidenceEstimate, bridged: EvidenceEstimate) -> bool:

@@ -1,6 +1,7 @@
 """The parts of a comparison beside their run, in its folder ``comparison``, so that each is computed once.
 
-bridge, nested, again, loo, widths, range and modes, each with the key of what it was made from.
+bridge, nested, again, loo, widths, range and modes, each with the key of what it was made from. A part that takes long
+is kept in pieces (nested-run-2) until it is there.
 """
 
 from __future__ import annotations
@@ -58,3 +59,9 @@ def kept(run: Path | None, name: str, key: str, make: Callable[[], Part]) -> Par
     part = make()
     store(folder, name, part, {"key": digest})
     return part
+
+
+def drop_pieces(run: Path | None, name: str) -> None:
+    """Remove the pieces of a part that is there: files called ``<name>-...``."""
+    for path in [] if run is None else (run / FOLDER).glob(f"{name}-*"):
+        path.unlink(missing_ok=True)

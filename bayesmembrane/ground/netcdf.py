@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import xarray
@@ -17,4 +19,11 @@ def packed(groups: Mapping[str, Any]) -> bytes:
         for name, held in groups.items()
     }
     tree: Any = xarray.DataTree.from_dict(dict(groups))
-    return bytes(tree.to_netcdf(None, engine="h5netcdf", encoding=encoding))
+    with _without_cluster():
+        return bytes(tree.to_netcdf(None, engine="h5netcdf", encoding=encoding))
+
+
+def _without_cluster() -> AbstractContextManager[Any]:
+    """On a worker of Dask xarray asks the scheduler for a lock on the bytes that it writes, and nobody knows those."""
+    dask: Any = sys.modules.get("dask.config")  # loaded on every worker
+    return nullcontext() if dask is None else dask.set(scheduler="synchronous")

@@ -3,18 +3,17 @@
 Once a day its import warns of a coming rewrite, which is no user's concern: that warning alone is kept silent, and the
 user's own filters stay as they are. It notes the day in a file; of two processes that do so at the same moment one
 finds its file gone, and its import fails: by then the day is noted, and a second try passes. Where it cannot write at
-all, as in a home that is closed or full, it notes the day in a folder that is removed again.
+all, as in a home that is closed or on a disk that is full, it notes nothing.
 """
 
 from __future__ import annotations
 
-import os
-import tempfile
 import warnings
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from unittest.mock import patch
+from unittest.mock import DEFAULT, patch
 
 
 @cache
@@ -26,10 +25,7 @@ def _imported() -> Any:
                 return import_module("arviz")
             except OSError:
                 continue
-        with (
-            tempfile.TemporaryDirectory() as place,
-            patch.dict(os.environ, {"HOME": place, "XDG_CACHE_HOME": place, "LOCALAPPDATA": place}),
-        ):
+        with patch.multiple(Path, mkdir=DEFAULT, write_text=DEFAULT, replace=DEFAULT):
             return import_module("arviz")
 
 

@@ -12,8 +12,14 @@ from pathlib import Path
 import pytest
 
 from bayesmembrane.app.cli import main
+from bayesmembrane.app.tasks import perform
 from bayesmembrane.calibration.run import load_run
+from bayesmembrane.campaign.file import read_campaign
+from bayesmembrane.campaign.plan import write_plan
+from bayesmembrane.campaign.planning import plan
 from bayesmembrane.campaign.record import read_now
+from bayesmembrane.diagnosis.result import VERDICTS
+from bayesmembrane.ground.jobs import silent
 from tests.campaign.films import write_campaign, write_film
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -81,12 +87,39 @@ def test_a_campaign_runs_goes_on_and_reports(run: Run, tmp_path: Path) -> None:
     assert Path(json.loads(out)["report"]).read_text().startswith("<!DOCTYPE html>")
 
 
+def test_a_dry_run_says_what_would_run_and_writes_nothing(run: Run, tmp_path: Path) -> None:
+    file = write_campaign(tmp_path, analyses='wanted = ["sample", "valleys"]\npages = false')
+    before = sorted(tmp_path.rglob("*"))
+    code, out, err = run("run", file, "--dry-run", "--json", "--workers", 2)
+    assert code == 0, err
+    found = json.loads(out)
+    assert found["tasks"] == {"sample": 4, "valleys": 4}
+    assert (found["workers"], found["done"], found["refused"]) == (2, 0, [])
+    assert 0.0 < found["core_seconds"]["valleys"] < found["core_seconds"]["sample"]
+    assert list(found["rehearsed"]) == ["neo_hookean"]
+    assert found["seconds"] > 2 * found["rehearsed"]["neo_hookean"]
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.usefixtures("short_walks")
+def test_a_loop_in_a_campaign_comes_to_its_end(tmp_path: Path) -> None:
+    """Its runs lie apart from those of others, its answer is read back, and tables get its verdict."""
+    file = write_campaign(tmp_path, films=("a",), analyses='wanted = ["loop"]\npages = true')
+    campaign = tmp_path / "night"
+    task = plan(read_campaign(file), file).tasks[0]
+    found = perform(task, campaign, silent)
+    assert found.values["verdict"] in VERDICTS
+    assert found.values["rounds"] >= 1
+    assert found.page is not None
+    assert found.page.is_file()
+    assert list((campaign / "films" / task.film / "loops" / task.key).glob("*/status.json"))
+    before = {path: path.stat().st_mtime_ns for path in campaign.rglob("*.npz")}
+    assert perform(task, campaign, silent).values == found.values
+    assert {path: path.stat().st_mtime_ns for path in campaign.rglob("*.npz")} == before
+
+
 def test_a_measurement_that_changed_since_is_refused(run: Run, tmp_path: Path) -> None:
     file = write_campaign(tmp_path, films=("a",))
-    from bayesmembrane.campaign.file import read_campaign
-    from bayesmembrane.campaign.plan import write_plan
-    from bayesmembrane.campaign.planning import plan
-
     write_plan(tmp_path / "night", plan(read_campaign(file), file))
     write_film(tmp_path / "films", "a", 0.9)
     code, out, _ = run("resume", "night", "--json", "--workers", 1)

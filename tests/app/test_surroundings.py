@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import resource
 import subprocess
 import sys
+from math import inf
 from pathlib import Path
 
 import pytest
@@ -29,6 +31,15 @@ TABLE: dict[str, tuple[str, str, int, str]] = {
     "seed": ("--seed -1", "> out.txt", 2, "--seed"),
 }
 
+# The same for the verb sample, whose files are 1 kB to 1 MB; 40 and 600 kB are left for compiled code, too.
+SAMPLED: dict[str, tuple[str, float, int, str]] = {
+    "endless": ("--ess inf", inf, 1, "a positive, finite ESS"),
+    "no number": ("--ess nan", inf, 1, "a positive, finite ESS"),
+    "no room": ("--out out", 0, 1, "cannot be written"),
+    "40 kB": ("--out out", 40e3, 1, "cannot be written"),
+    "600 kB": ("--out out", 600e3, 0, ""),
+}
+
 
 @pytest.mark.parametrize("name", TABLE)
 def test_surroundings(name: str, tmp_path: Path) -> None:
@@ -45,6 +56,27 @@ def test_surroundings(name: str, tmp_path: Path) -> None:
     assert done.returncode == status, err
     assert "Traceback" not in err
     assert says in err
+
+
+@pytest.mark.parametrize("name", SAMPLED)
+def test_surroundings_of_a_run(name: str, tmp_path: Path) -> None:
+    """A limit on the size of files stands for a disk that is full: nothing beyond it can be written."""
+    more, room, status, says = SAMPLED[name]
+    words = ["sample", *strip(tmp_path), "--material", "neo_hookean", *more.split()]
+    places = {"HOME": tmp_path / "home", "XDG_CACHE_HOME": tmp_path / "cache", "NUMBA_CACHE_DIR": tmp_path / "code"}
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.comparison.short_compare", *words],
+        cwd=tmp_path,
+        env={**os.environ, **{k: str(v) for k, v in places.items()}, "PYTHONPATH": str(ROOT), "COLUMNS": "200"},
+        preexec_fn=None if room == inf else lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (int(room),) * 2),
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == status, done.stderr
+    assert "Traceback" not in done.stderr
+    assert says in done.stderr
 
 
 def test_brackets_and_bytes_in_names_are_shown_as_they_are(tmp_path: Path) -> None:

@@ -77,6 +77,12 @@ def faulty(task: Task, campaign: Path, tell: Tell) -> Found:
     return quick(task, campaign, tell)
 
 
+def deaf(task: Task, campaign: Path, tell: Tell) -> Found:
+    """Does not come back for an hour, whoever asks."""
+    time.sleep(3600)
+    return Found({})
+
+
 def suicide() -> None:
     """Kill this process."""
     os.kill(os.getpid(), signal.SIGKILL)

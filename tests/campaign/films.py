@@ -43,9 +43,9 @@ def write_campaign(folder: Path, body: str = "", films: Sequence[str] = ("a", "b
     return path
 
 
-def planned(folder: Path, count: int = 0, **sections: str) -> tuple[Path, Plan]:
+def planned(folder: Path, count: int = 0, films: Sequence[str] = ("a", "b"), **sections: str) -> tuple[Path, Plan]:
     """(folder of the campaign, plan) of such a campaign, stored; with ``count`` tasks like its first instead."""
-    file = write_campaign(folder, **sections)
+    file = write_campaign(folder, films=films, **sections)
     made = plan(read_campaign(file), file)
     if count:
         one = made.tasks[0]

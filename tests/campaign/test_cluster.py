@@ -9,18 +9,23 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
+from bayesmembrane.app.tasks import perform
+from bayesmembrane.calibration.run import load_run
 from bayesmembrane.campaign.cluster import DaskCluster
 from bayesmembrane.campaign.drive import Session, drive
 from bayesmembrane.campaign.plan import write_plan
 from bayesmembrane.campaign.pool import LocalPool
 from bayesmembrane.campaign.record import DONE, read_now, read_records
 from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.jobs import silent
 from tests.campaign.doing import faulty, quick, slow
 from tests.campaign.films import planned
+from tests.studies.kill import same
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -28,28 +33,53 @@ ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 
-@pytest.fixture(scope="module")
-def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The file of a scheduler that runs as a process of its own, with two workers."""
-    folder = tmp_path_factory.mktemp("cluster")
-    file = folder / "scheduler.json"
-    common = {"cwd": folder, "env": {**os.environ, "PYTHONPATH": str(ROOT)}, "stderr": subprocess.DEVNULL}
-    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--scheduler-file", str(file)]
-    processes = [subprocess.Popen([*command, "--port", "0", "--no-dashboard"], **common)]  # type: ignore[call-overload]
-    try:
-        wait_for(file.exists)
-        for _ in range(2):
-            command = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(file)]
-            options = ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(folder)]
-            processes.append(subprocess.Popen([*command, *options], **common))  # type: ignore[call-overload]
-        cluster = DaskCluster(str(file))
+@dataclass
+class Cluster:
+    """A scheduler and its workers, as processes of their own."""
+
+    folder: Path
+    processes: list[subprocess.Popen[bytes]] = field(default_factory=list)
+
+    @property
+    def file(self) -> Path:
+        """Of the scheduler."""
+        return self.folder / "scheduler.json"
+
+    def begin(self, part: str, *options: str) -> None:
+        command = [sys.executable, "-m", f"distributed.cli.dask_{part}", "--scheduler-file", str(self.file), *options]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        quiet = subprocess.DEVNULL
+        self.processes.append(subprocess.Popen(command, cwd=self.folder, env=environment, stderr=quiet))
+
+    def with_two_workers(self) -> Path:
+        """The file of the scheduler, once it has two workers."""
+        cluster = DaskCluster(str(self.file))
+        for _ in range(cluster.workers(), 2):
+            self.begin(
+                "worker", "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(self.folder)
+            )
         wait_for(lambda: cluster.workers() == 2)
         cluster.close()
-        yield file
+        return self.file
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    found = Cluster(tmp_path_factory.mktemp("cluster"))
+    try:
+        found.begin("scheduler", "--port", "0", "--no-dashboard")
+        wait_for(found.file.exists)
+        yield found
     finally:
-        for process in reversed(processes):
+        for process in reversed(found.processes):
             process.kill()
             process.wait(timeout=60)
+
+
+@pytest.fixture
+def scheduler(cluster: Cluster) -> Path:
+    """The file of a scheduler that has two workers."""
+    return cluster.with_two_workers()
 
 
 def wait_for(what: Callable[[], bool], seconds: float = 300.0) -> None:
@@ -74,10 +104,10 @@ def test_faults_are_told_as_by_the_local_pool(tmp_path: Path, scheduler: Path) -
 
 
 def test_a_worker_that_is_killed_loses_nothing(tmp_path: Path, scheduler: Path) -> None:
-    """Last, for it leaves one worker. The steps of its task are gone on with, and nothing is done twice."""
+    """The steps of its task are gone on with, and nothing is done twice."""
     calm, plan = planned(tmp_path / "calm", 4)
     drive(calm, plan, lambda: LocalPool(1), Session(quick))
-    shot, killed = tmp_path / "shot", []
+    shot, killed = tmp_path / "shot", list[str]()
     write_plan(shot, plan)
 
     def kill(_: object) -> None:
@@ -94,6 +124,28 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path: Path, scheduler: Path) 
     assert answers(shot) == answers(calm)
     assert {p.read_text() for p in (shot / "films").glob("*.ends")} == {"x"}
     assert max(r.attempts for r in read_records(shot).values()) == 1, "the dead worker wrote no record"
+
+
+def test_real_runs_are_those_of_one_process_also_when_a_worker_is_killed(tmp_path: Path, scheduler: Path) -> None:
+    lines = "ess = 1e6\nwalkers = 16\nchunk = 40\nmost_steps = 150"
+    calm, plan = planned(tmp_path / "calm", sampling=lines, films=("a",))
+    for task in plan.tasks:
+        perform(task, calm, silent)
+    shot, killed = tmp_path / "shot", list[str]()
+    write_plan(shot, plan)
+
+    def kill(_: object) -> None:
+        if now := {} if killed else read_now(shot):
+            killed.append(min(now))
+            os.kill(int(now[killed[0]]["worker"].rpartition(":")[2]), signal.SIGKILL)
+
+    ended = drive(shot, plan, lambda: DaskCluster(str(scheduler)), Session(perform, show=kill))
+    assert len(killed) == 1
+    assert ended.states == {DONE: len(plan.tasks)}, [r.reason + r.trace for r in read_records(shot).values()]
+    runs = {path.parent.relative_to(calm): path.parent for path in calm.glob("films/*/*/status.json")}
+    assert len(runs) == len(plan.tasks) == 2
+    for place, run in runs.items():
+        assert same(load_run(run), load_run(shot / place)), place
 
 
 def test_a_cluster_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

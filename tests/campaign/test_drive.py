@@ -23,7 +23,7 @@ from bayesmembrane.campaign.status import standing
 from bayesmembrane.campaign.work import Perform
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.locks import held, is_held
-from tests.campaign.doing import deadly, deadly_once, faulty, quick, slow, suicide
+from tests.campaign.doing import deadly, deadly_once, deaf, faulty, quick, slow, suicide
 from tests.campaign.films import planned
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -121,6 +121,17 @@ def test_a_deadline_stops_and_resuming_goes_on_to_the_same_answers(
     calm, _ = planned(tmp_path / "calm", 6)
     driven(calm, plan, quick)
     assert answers(campaign) == answers(calm)
+
+
+def test_work_that_hears_nothing_is_ended_after_the_deadline(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Or this test would take an hour."""
+    campaign, plan = planned(tmp_path, 3)
+    monkeypatch.setattr("bayesmembrane.campaign.drive.GRACE", 1.0)
+    monkeypatch.setattr("bayesmembrane.campaign.drive.next_time", lambda clock: time.time() + 3.0)
+    ended = drive(campaign, plan, lambda: LocalPool(2), Session(deaf, deadline="07:30"))
+    assert ended.how == DEADLINE
+    assert set(ended.states) <= {PREEMPTED, WAITING}
+    assert driven(campaign, plan, quick).states == {DONE: 3}
 
 
 def test_the_next_time_of_a_clock_is_today_or_tomorrow() -> None:

@@ -1,6 +1,8 @@
 """Both estimators against closed forms, and the rules by which their answers are put together."""
 
 import re
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, Disagreem
 from bayesmembrane.comparison.evidence.nested import nested
 from bayesmembrane.comparison.evidence.population import lead
 from bayesmembrane.comparison.evidence.target import EvidenceEstimate, Problem
+from bayesmembrane.comparison.parts import drop_pieces, kept
 from bayesmembrane.ground.errors import SettingsError
 from tests.statistics.evidence_targets import Banana, Box, Cut, Linear, Modes, NormalGamma
 
@@ -121,6 +124,36 @@ def test_the_seed_decides():
     assert bridge(target, seed=5).log_evidence == bridge(target, seed=5).log_evidence
     found, again, other = (nested(target, seed, tolerance=0.4).log_evidence for seed in (5, 5, 6))
     assert found == again != other
+
+
+class KilledError(Exception):
+    """Stands for the end of the process."""
+
+
+def test_nested_that_is_killed_goes_on_after_its_last_run_to_the_same_answer(tmp_path):
+    """Killed again and again, each time before another run is kept."""
+    target = Modes(2)
+    whole = nested(target, 7, tolerance=0.4)
+    starts = 0
+
+    def keep(name, make):
+        if (tmp_path / "comparison" / f"nested-{name}.json").exists():
+            return kept(tmp_path, f"nested-{name}", "key", lambda: pytest.fail("made twice"))
+        if made:
+            raise KilledError
+        made.append(name)
+        return kept(tmp_path, f"nested-{name}", "key", make)
+
+    found = None
+    while found is None:
+        made: list[str] = []
+        starts += 1
+        with suppress(KilledError):
+            found = nested(target, 7, tolerance=0.4, keep=keep)
+    assert starts >= len(whole.parts) >= 3
+    assert replace(found, seconds=0.0) == replace(whole, seconds=0.0)
+    drop_pieces(tmp_path, "nested")
+    assert not list((tmp_path / "comparison").iterdir())
 
 
 # ---- agreement -------------------------------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 """Leave-one-out and leave-range-out against sums over a grid, for a material of one modulus and correlated noise."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.special import logsumexp
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.run import RunSettings, sample
 from bayesmembrane.comparison.leave_out import score as pc
+from bayesmembrane.comparison.leave_out.pool import LED_BY, Pool
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
@@ -90,6 +92,25 @@ def test_leaving_out_a_point_is_fitting_the_others():
     rows = np.arange(0, len(x), 997)
     whole = p.log_likelihood(x[rows])
     assert log_likelihood[rows] == pytest.approx(whole - p.pointwise(x[rows], force[rows])[:, i], rel=1e-6)
+
+
+def test_films_of_absurd_force_lead_nobody(monkeypatch):
+    """Where all of ln p is what one point adds to it, and that is beyond all digits, the difference is chance."""
+    evaluate, data, draws, i = Posterior.evaluate, run().data, run().draws(), 4
+
+    def absurd(p, x):
+        found = evaluate(p, x)
+        log_likelihood, force = found.log_likelihood.copy(), found.force.copy()
+        force[:50] = p.measurement.force
+        force[:50, i] += 1e95
+        residual = p.measurement.force - force[:50]
+        log_likelihood[:50] = p.noise.log_likelihood(residual, p.hypothesis.noise_coordinates(x[:50]))
+        return replace(found, log_likelihood=log_likelihood, force=force)
+
+    monkeypatch.setattr(Posterior, "evaluate", absurd)
+    terms = data.log_likelihood["force"].values.reshape(len(draws), -1).astype(float)
+    pool = Pool(posterior(), draws, data.sample_stats["lp"].values.ravel(), terms, np.random.default_rng(0))
+    assert len(pool._drawn_towards(i)) >= LED_BY * posterior().size
 
 
 def test_exact_refits_agree_with_the_grid(monkeypatch):

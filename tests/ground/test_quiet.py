@@ -67,3 +67,8 @@ def test_it_is_imported_when_it_is_used(tmp_path: Path) -> None:
 def test_two_processes_at_midnight_both_get_it(tmp_path: Path) -> None:
     done = run(RACE, tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+def test_where_nothing_can_be_written_it_is_there_all_the_same(tmp_path: Path) -> None:
+    done = run("import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n" + IMPORT, tmp_path)
+    assert done.returncode == 0, done.stderr

@@ -133,7 +133,9 @@ def damaged(folder: Path, times: int, seed: int) -> dict[str, Counter[str]]:
             except Exception as error:
                 count[f"{type(error).__name__} ({damage.__name__}): {str(error)[:60]}"] += 1
         path.write_bytes(content)
-        found[path.name if path.suffix != ".seg" else f"segments/{path.name}"] = count
+        name = path.name if path.suffix != ".seg" else f"segments/{path.name}"
+        found[name] = count
+        print(f"{name}: {dict(count)}", file=sys.stderr, flush=True)
     return found
 
 

@@ -25,7 +25,7 @@ _LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class JointTest:
     """One of the tests.
 
     label : a word, by which its own parameters are called: ``strip.zero_offset.shift``
@@ -56,7 +56,7 @@ class Joint:
     Raises `SettingsError` for no test, for two of one label, and for tests of different energies or convexity priors.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[JointTest, ...]
 
     def __post_init__(self) -> None:
         if not self.parts:
@@ -185,7 +185,7 @@ def joint(
 ) -> Joint:
     """Tests by label, or in an order, and one claim for all or one for each label.
 
-    Without labels tests are called after their specimens. Raises what `Part` and `Joint` raise, and `SettingsError` for
+    Without labels tests are called after their specimens. Raises what `JointTest` and `Joint` raise, and `SettingsError` for
     a claim that is missing or belongs to no test.
     """
     named = measurements if isinstance(measurements, Mapping) else _named(measurements)
@@ -198,7 +198,7 @@ def joint(
         claims = dict(hypothesis)
     else:
         claims = dict.fromkeys(named, hypothesis)
-    return Joint(tuple(Part(label, m, claims[label]) for label, m in named.items()))
+    return Joint(tuple(JointTest(label, m, claims[label]) for label, m in named.items()))
 
 
 def _named(measurements: Sequence[Measurement]) -> dict[str, Measurement]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bayesmembrane.calibration.joint.claim import Joint, Part, labelled
+from bayesmembrane.calibration.joint.claim import Joint, JointTest, labelled
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.project import Listed
 from bayesmembrane.ground.errors import SettingsError, unknown_name
@@ -24,7 +24,7 @@ def joint_of(material: str, tests: Sequence[Listed], effects: str, noise: str, c
     parts = []
     for label, test in zip(labels, tests, strict=True):
         own = claimed[label] if test.effects is None else _names(test.effects)
-        parts.append(Part(label, test.measurement, hypothesis(material, own, test.noise or noise, convexity)))
+        parts.append(JointTest(label, test.measurement, hypothesis(material, own, test.noise or noise, convexity)))
     return Joint(tuple(parts))
 
 

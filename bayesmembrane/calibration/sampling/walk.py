@@ -49,7 +49,9 @@ class Settings:
 
 @dataclass(frozen=True)
 class Progress:
-    """What a progress bar shows: ESS of the worst coordinate so far, steps a second, seconds left (nan: unknown)."""
+    """What a progress bar shows: ESS of the worst coordinate so far, steps a second, seconds left (nan: unknown),
+    part of the proposals that were accepted.
+    """
 
     steps: int
     ess: float
@@ -58,6 +60,7 @@ class Progress:
     tau: float
     steps_per_second: float
     seconds_left: float
+    acceptance: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +158,8 @@ def _progress(chains: Chains, found: Convergence, settings: Settings) -> Progres
     least, tau = float(np.min(found.ess)), float(np.max(found.tau))
     needed = max(LEAST_TAUS * tau, (chains.steps - found.burn) * settings.ess / least) + found.burn
     left = max(0.0, (needed - chains.steps) / rate)
-    return Progress(chains.steps, least, settings.ess, float(np.max(found.r_hat)), tau, rate, left)
+    r_hat = float(np.max(found.r_hat))
+    return Progress(chains.steps, least, settings.ess, r_hat, tau, rate, left, found.acceptance)
 
 
 def walkers_of(posterior: Posterior, settings: Settings) -> int:

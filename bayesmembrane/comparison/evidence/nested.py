@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import time
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 from dynesty import NestedSampler
@@ -38,12 +39,19 @@ MOST_CUTS = 100  # of an interval, after which the start is kept: below that lie
 Tell = Callable[[str], None]
 
 
+class Keep(Protocol):
+    """What ``make`` returns, or what it returned when the piece of this name was made before."""
+
+    def __call__(self, name: str, make: Callable[[], ARun], /) -> ARun: ...
+
+
 def nested(
     target: Target,
     seed: int,
     tolerance: float = TOLERANCE,
     tell: Tell | None = None,
     around: Sequence[Array] | None = None,
+    keep: Keep = lambda name, make: make(),
 ) -> EvidenceEstimate:
     """ln Z = ln of the integral of L dX over the prior volume X, by live points that climb the likelihood.
 
@@ -66,26 +74,31 @@ def nested(
 
     ln Z of a run and its error come from the layers between its likelihoods (`log_integral`).
 
+    Each run has random numbers of its own, so that ``keep`` may bring those of an estimate that was killed: the rest is
+    as it would have been.
+
     J. Skilling, Bayesian Anal. 1 (2006) 833; F. Feroz, M. P. Hobson, M. Bridges, MNRAS 398 (2009) 1601; J. S. Speagle,
     MNRAS 493 (2020) 3132. Raises `SettingsError` if prior and likelihood nowhere meet.
     """
     problem, own = Problem(target), np.random.default_rng([seed, 8])
     rngs = np.random.default_rng([seed, 5]).spawn(MOST_RUNS)
     modes = search(problem, np.random.default_rng([seed, 9]))
-    found: list[_Run] = []
+    searched, took = problem.evaluations, problem.seconds
+    climbs = _Climbs(problem, rngs, keep)
+    found: list[ARun] = []
     least = PILOTS + THEN if around is None else FROM_DRAWS
     if around is None:
         from_prior = max(PILOT_LIVE, PILOT_PER_DIMENSION * problem.size)
-        pilots = [_run(problem, from_prior, rng, REMAINING) for rng in rngs[:PILOTS]]
+        pilots = [climbs.run(i, problem, from_prior, REMAINING) for i in range(PILOTS)]
         around = [np.concatenate([r.drawn(own) for r in pilots])]
         # What has missed a mode on its way up says nothing of Z, and its part in q does no harm.
         found = [r for r in pilots if not modes.beyond(r.log_evidence, r.sd)]
     near = Closer(problem, around, modes, own)
     live = max(LEAST_LIVE, PER_DIMENSION * problem.size)
-    for i, rng in enumerate(rngs[PILOTS:]):
-        if i > 0:  # the first tells what it takes
+    for number in range(PILOTS, MOST_RUNS):
+        if number > PILOTS:  # the first tells what it takes
             live = _needed(found, live, tolerance)
-        found.append(_run(near, live, rng, NEAR))
+        found.append(climbs.run(number, near, live, NEAR))
         value, sd = _together(found)
         if tell is not None:
             tell(f"nested sampling, run {len(found)}: {value:.2f} +- {sd:.2f}")
@@ -94,17 +107,21 @@ def nested(
     # Weighed draws of the modes are an estimate of their own that is never too high: a gross difference is an error.
     sd = max(sd, 0.5 * modes.beyond(value, sd))
     parts = tuple(r.log_evidence for r in found)
-    return EvidenceEstimate(value, sd, problem.evaluations, problem.seconds, parts, modes.coverage)
+    evaluations = searched + sum(r.evaluations for r in climbs.made)
+    seconds = took + sum(r.seconds for r in climbs.made)
+    return EvidenceEstimate(value, sd, evaluations, seconds, parts, modes.coverage)
 
 
 @dataclass(frozen=True, eq=False)
-class _Run:
-    """ln Z of one run with its own error, and its points x (M, k) with their weights (M,), which add up to one."""
+class ARun:
+    """ln Z of one run, its own error, its points x (M, k), their weights (M,) that add up to one, and what it cost."""
 
     log_evidence: float
     sd: float
     x: Array
     weight: Array
+    evaluations: int = 0
+    seconds: float = 0.0
 
     def drawn(self, rng: np.random.Generator) -> Array:
         """Points (n, k) of the posterior, each at most once: as many as the weights are worth, or a few times that."""
@@ -112,14 +129,35 @@ class _Run:
         return np.asarray(self.x[np.unique(rng.choice(len(self.x), count, p=self.weight))])
 
 
-def _needed(found: list[_Run], live: int, tolerance: float) -> int:
+@dataclass
+class _Climbs:
+    """The runs of an estimate, each kept as soon as it is there."""
+
+    problem: Problem
+    rngs: Sequence[np.random.Generator]
+    keep: Keep
+    made: list[ARun] = field(default_factory=list)
+
+    def run(self, number: int, where: Problem, live: int, remaining: float) -> ARun:
+        """Run ``number`` in ``where``, which asks ``problem`` for its likelihoods."""
+
+        def make() -> ARun:
+            before, began = self.problem.evaluations, time.perf_counter()
+            run = _run(where, live, self.rngs[number], remaining)
+            return replace(run, evaluations=self.problem.evaluations - before, seconds=time.perf_counter() - began)
+
+        self.made.append(self.keep(f"run-{number}", make))
+        return self.made[-1]
+
+
+def _needed(found: list[ARun], live: int, tolerance: float) -> int:
     """Live points for one more run, so that the own errors of all together come down to ``tolerance``."""
     own = np.array([r.sd for r in found])
     missing = tolerance**-2 - np.sum(own**-2)
     return int(np.clip(live * missing * own[-1] ** 2, LEAST_LIVE, MOST_LIVE))
 
 
-def _together(found: list[_Run]) -> tuple[float, float]:
+def _together(found: list[ARun]) -> tuple[float, float]:
     """(weighted mean, standard error) of runs."""
     z, own = np.array([(r.log_evidence, r.sd) for r in found]).T
     w = own**-2
@@ -128,14 +166,14 @@ def _together(found: list[_Run]) -> tuple[float, float]:
     return mean, float(np.sqrt(max(1.0, scatter) / np.sum(w)))
 
 
-def _run(problem: Problem, live: int, rng: np.random.Generator, remaining: float) -> _Run:
+def _run(problem: Problem, live: int, rng: np.random.Generator, remaining: float) -> ARun:
     """One run with ``live`` points, until at most ``remaining`` of ln Z is in them."""
     start = problem.prior_draws(rng, live)
     points = [start.u[:live], start.x[:live], start.log_likelihood[:live].copy()]
     if np.ptp(points[2]) == 0:
         # A likelihood that is constant where it is not zero has nothing to climb.
         value = float(points[2][0] + np.log(start.part))
-        return _Run(value, start.log_part_sd, points[1], np.full(live, 1 / live))
+        return ARun(value, start.log_part_sd, points[1], np.full(live, 1 / live))
     queue = max(8, int(QUEUE * live))
     with warnings.catch_warnings():
         # What dynesty warns of (inefficient ellipsoids, plateaus) is met by slices, and judged by the scatter.
@@ -161,7 +199,7 @@ def _run(problem: Problem, live: int, rng: np.random.Generator, remaining: float
     value += float(np.log(start.part))
     weight = np.exp(r.logwt - logsumexp(r.logwt))
     sd = max(float(np.hypot(error, start.log_part_sd)), LEAST_SD)
-    return _Run(value, sd, np.asarray(r.samples), weight)
+    return ARun(value, sd, np.asarray(r.samples), weight)
 
 
 def _never(_: Array) -> Any:

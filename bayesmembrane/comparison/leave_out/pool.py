@@ -18,6 +18,7 @@ EACH, PER_DIMENSION = 400, 300  # draws of such a density
 UNSEEN = 10.0  # over the effective draws is the least error
 HALVINGS = 30  # of the interval of powers
 LED_BY = 10  # effective draws for each dimension that such a density is fitted to
+HOPELESS = -1e10  # ln p: beyond it the difference that says what the other points make of a draw has no digits left
 
 
 class Pool:
@@ -72,7 +73,7 @@ class Pool:
         g = Mixture(g.log_weights, g.means, SPREAD * g.roots, min(g.degrees, HEAVY))
         x = g.draw(self.rng, count)
         e = self.posterior.evaluate(x)
-        good = np.isfinite(e.log_posterior)
+        good = e.log_posterior > HOPELESS  # heavy tails reach films of any force
         terms = np.zeros((len(x), self.terms.shape[1]))
         if np.any(good):
             terms[good] = self.posterior.pointwise(x[good], e.force[good])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bayesmembrane.calibration.joint.claim import Joint, Part, joint
+from bayesmembrane.calibration.joint.claim import Joint, JointTest, joint
 from bayesmembrane.calibration.joint.posterior import JointPosterior
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.data.measurement import Measurement
@@ -116,7 +116,7 @@ def test_labels_and_claims_must_go_together() -> None:
         (lambda: joint({"a": m}, {"b": nh}), "not both"),
         (lambda: joint({"a": m, "b": m}, {"a": nh, "b": hypothesis("gent")}), "one energy"),
         (lambda: joint({"a": m, "b": m}, {"a": nh, "b": hypothesis("neo_hookean", convexity="box")}), "one energy"),
-        (lambda: Joint((Part("a", m, nh), Part("a", m, nh))), "two tests"),
+        (lambda: Joint((JointTest("a", m, nh), JointTest("a", m, nh))), "two tests"),
     ):
         with pytest.raises(SettingsError, match=match):
             fault()  # type: ignore[no-untyped-call]
