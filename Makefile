@@ -10,11 +10,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-<<<<<<< HEAD
-.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-import study-scale study-kill study-damage study-seeds study-sbc study-modes clean
-=======
-.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-import study-scale study-kill study-overnight study-damage study-seeds study-sbc clean
->>>>>>> overnight
+.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-import study-scale study-kill study-overnight study-damage study-seeds study-sbc study-modes clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
