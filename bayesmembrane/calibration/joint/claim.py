@@ -185,8 +185,8 @@ def joint(
 ) -> Joint:
     """Tests by label, or in an order, and one claim for all or one for each label.
 
-    Without labels tests are called after their specimens. Raises what `JointTest` and `Joint` raise, and `SettingsError`
-    for a claim that is missing or belongs to no test.
+    Without labels tests are called after their specimens. Raises what `JointTest` and `Joint` raise, and
+    `SettingsError` for a claim that is missing or belongs to no test.
     """
     named = measurements if isinstance(measurements, Mapping) else _named(measurements)
     if isinstance(hypothesis, Mapping):
