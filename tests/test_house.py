@@ -83,6 +83,19 @@ def test_ci_runs_make_test_and_nothing_else() -> None:
     assert commands == ["set -euo pipefail", 'cd "$(dirname "$0")/.."', "make test"]
 
 
+def test_no_function_outside_compiled_kernels_takes_more_than_six_arguments() -> None:
+    many = []
+    for path in sorted((ROOT / "bayesmembrane").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and path.name != "kernels.py":
+                a = node.args
+                names = [x.arg for x in (*a.posonlyargs, *a.args, *a.kwonlyargs) if x.arg not in ("self", "cls")]
+                kernel = any("compiled" in ast.unparse(d) for d in node.decorator_list)
+                if len(names) > 6 and not kernel:
+                    many.append((path.name, node.name, names))
+    assert many == []
+
+
 def test_a_name_of_a_class_means_one_thing() -> None:
     """Whoever reads of a `Candidate` need not ask which."""
     where = defaultdict(list)

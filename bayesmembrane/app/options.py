@@ -50,6 +50,11 @@ class StoredOption(OptionGroup):
 
 
 @dataclass(frozen=True)
+class StoredOutputOptions(StoredOption, OutputOptions):
+    """What a verb whose answer is stored can be asked for beside it."""
+
+
+@dataclass(frozen=True)
 class StoredOnRequestOption(OptionGroup):
     """Where an answer is stored that is quickly had again."""
 
@@ -198,6 +203,11 @@ class RangesOption(OptionGroup):
 
 
 @dataclass(frozen=True)
+class RangeOrRangesOption(RangesOption, RangeOption):
+    """One range, or several."""
+
+
+@dataclass(frozen=True)
 class MaterialOption(OptionGroup):
     """The strain energy that is asked about."""
 
@@ -297,8 +307,8 @@ class SamplingOptions(OptionGroup):
 
 
 @dataclass(frozen=True)
-class ForkOption(OptionGroup):
-    """Where a run begins that does not begin on its own."""
+class RunOptions(SamplingOptions):
+    """The same, and where a run begins that does not begin on its own."""
 
     fork: Annotated[
         Path | None,

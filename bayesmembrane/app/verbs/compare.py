@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 from bayesmembrane.app.options import (
     HypothesisOptionsWeighed,
     MaterialsOption,
-    OutputOptions,
-    RangeOption,
-    RangesOption,
+    RangeOrRangesOption,
     SamplingOptions,
-    StoredOption,
+    StoredOutputOptions,
     TestsOptions,
 )
 from bayesmembrane.app.terminal import answer, lines, resumable, say, table
@@ -36,33 +34,31 @@ def verb(
     curve: TestsOptions,
     materials: MaterialsOption,
     beside: HypothesisOptionsWeighed,
-    used: RangeOption,
-    several: RangesOption,
+    used: RangeOrRangesOption,
     sampling: SamplingOptions,
-    stored: StoredOption,
-    output: OutputOptions,
+    output: StoredOutputOptions,
 ) -> None:
     """Which materials the data support, by two estimators of the evidence, with prediction beside it."""
     from bayesmembrane.app import analyses
     from bayesmembrane.comparison.compare import claimed, ranges_of
 
     if curve.several:
-        if several.ranges_mm:
+        if used.ranges_mm:
             raise SettingsError("several tests have no ranges in common", "--ranges-mm", "leave it out")
         names = [name.strip() for name in materials.materials.split(",") if name.strip()]
         tests = curve.listed(used)
         together = [_together(name, beside, tests) for name in names]
-        with resumable(stored.folder), lines() as tell:
-            both = analyses.compare_joint(together, analyses.Work(output.seed, stored.folder, sampling.ess, tell))
+        with resumable(output.folder), lines() as tell:
+            both = analyses.compare_joint(together, analyses.Work(output.seed, output.folder, sampling.ess, tell))
         answer(both.document, output.as_json, lambda: show(both.result))
         return
     claims = claimed(materials.materials, beside.effects, beside.noise, beside.convexity)
-    if several.ranges_mm and used.max_deflection_mm is not None:
+    if used.ranges_mm and used.max_deflection_mm is not None:
         raise SettingsError("the range is given twice", "--ranges-mm, --max-deflection-mm", "give one of them")
     only = [] if used.max_deflection_mm is None else [1e-3 * used.max_deflection_mm]
-    ranges = ranges_of(curve.read(), several.ends or only)
-    with resumable(stored.folder), lines() as tell:
-        work = analyses.Work(output.seed, stored.folder, sampling.ess, tell)
+    ranges = ranges_of(curve.read(), used.ends or only)
+    with resumable(output.folder), lines() as tell:
+        work = analyses.Work(output.seed, output.folder, sampling.ess, tell)
         found = analyses.compare(ranges, claims, work)
     answer(found.document, output.as_json, lambda: show(found.result))
 

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 from bayesmembrane.app.options import (
     CurveOptions,
     HypothesisOptions,
-    OutputOptions,
     PreferredMaterialOption,
     QuickOption,
     RangeOption,
-    StoredOption,
+    StoredOutputOptions,
 )
 from bayesmembrane.app.terminal import answer, note, say, status, table
 
@@ -29,8 +28,7 @@ def verb(
     beside: HypothesisOptions,
     used: RangeOption,
     how: QuickOption,
-    stored: StoredOption,
-    output: OutputOptions,
+    output: StoredOutputOptions,
 ) -> None:
     """How probable it is that nothing, an effect, another energy or something foreign is behind the curve."""
     from bayesmembrane.app import analyses
@@ -41,7 +39,7 @@ def verb(
     measurement = used.of(curve.read())
     say_thinning(measurement)
     with status(f"Diagnosing {claim.label() if material.declared else 'the curve'}") as tell:
-        work = analyses.Work(output.seed, stored.folder, tell=lambda _, text: tell(text))
+        work = analyses.Work(output.seed, output.folder, tell=lambda _, text: tell(text))
         found = analyses.diagnose(measurement, question, work)
     answer(found.document, output.as_json, lambda: show(found.document, measurement))
 

@@ -9,9 +9,8 @@ import typer
 from bayesmembrane.app.options import (
     HypothesisOptions,
     MaterialOption,
-    OutputOptions,
     RangeOption,
-    StoredOption,
+    StoredOutputOptions,
     TestsOptions,
 )
 from bayesmembrane.app.terminal import answer, say, status, table
@@ -28,8 +27,7 @@ def verb(
     material: MaterialOption,
     beside: HypothesisOptions,
     used: RangeOption,
-    stored: StoredOption,
-    output: OutputOptions,
+    output: StoredOutputOptions,
     loss: Annotated[str, typer.Option(help="euclidean (N) or weighted (by the measurement's noise).")] = "euclidean",
 ) -> None:
     """The least-squares parameters with their standard deviations."""
@@ -38,13 +36,13 @@ def verb(
     if curve.several:
         together = beside.joint(material.material, curve.listed(used))
         with status(f"Fitting {together.label()} on {len(together.parts)} tests"):
-            both = analyses.fit_joint(together, analyses.Work(output.seed, stored.folder))
+            both = analyses.fit_joint(together, analyses.Work(output.seed, output.folder))
         answer(both.document, output.as_json, lambda: show_jointly(both.result))
         return
     claim = beside.with_material(material.material)
     measurement = used.of(curve.read())
     with status(f"Fitting {claim.label()}"):
-        found = analyses.fit(measurement, claim, analyses.Work(output.seed, stored.folder), loss=loss)
+        found = analyses.fit(measurement, claim, analyses.Work(output.seed, output.folder), loss=loss)
     title = f"{claim.material.title} on {curve.shown}"
     answer(found.document, output.as_json, lambda: show(found.result, title))
 

@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import typer
 
-from bayesmembrane.app.options import FilmOptions, OutputOptions, StoredOnRequestOption
+from bayesmembrane.app.options import (
+    FilmOptions,
+    OptionGroup,
+    OutputOptions,
+    StoredOnRequestOption,
+)
 from bayesmembrane.app.terminal import answer, numbers, table
 
 place = 1
 
 
+@dataclass(frozen=True)
+class ClampedOptions(OptionGroup):
+    """What holds the film, and what solves it."""
+
+    prestretch: Annotated[float, typer.Option(help="Equibiaxial stretch of the film before it was clamped.")] = 1.0
+    inner_radius_mm: Annotated[float, typer.Option(help="Radius of the disc, mm.")] = 10.0
+    outer_radius_mm: Annotated[float, typer.Option(help="Radius of the ring, mm.")] = 35.0
+    solver: Annotated[str, typer.Option(help="ritz or shooting.")] = "ritz"
+
+
 def verb(
     film: FilmOptions,
     deflection_mm: Annotated[str, typer.Option("--deflection-mm", help="Deflections, mm: 1,10,35.1")],
+    clamped: ClampedOptions,
     stored: StoredOnRequestOption,
     output: OutputOptions,
-    prestretch: Annotated[float, typer.Option(help="Equibiaxial stretch of the film before it was clamped.")] = 1.0,
-    inner_radius_mm: Annotated[float, typer.Option(help="Radius of the disc, mm.")] = 10.0,
-    outer_radius_mm: Annotated[float, typer.Option(help="Radius of the ring, mm.")] = 35.0,
-    solver: Annotated[str, typer.Option(help="ritz or shooting.")] = "ritz",
 ) -> None:
     """The force at given deflections for given parameters, or the reason why there is none."""
     import numpy as np
@@ -34,10 +47,10 @@ def verb(
     made = kind.from_vector(numbers(film.parameters, "--parameters"))
     where = numbers(deflection_mm, "--deflection-mm")
     settings: dict[str, Any] = {
-        "inner_radius": inner_radius_mm * 1e-3,
-        "outer_radius": outer_radius_mm * 1e-3,
-        "prestretch": prestretch,
-        "solver": solver,
+        "inner_radius": clamped.inner_radius_mm * 1e-3,
+        "outer_radius": clamped.outer_radius_mm * 1e-3,
+        "prestretch": clamped.prestretch,
+        "solver": clamped.solver,
     }
     curves = solve(request(kind, made.vector, np.array(where) * 1e-3, **settings))
     states = [Status(int(s)) for s in curves.status[0]]

@@ -11,12 +11,10 @@ import typer
 from bayesmembrane.app.options import (
     CurveOptions,
     HypothesisOptionsAuto,
-    OptionGroup,
-    OutputOptions,
     PreferredMaterialOption,
     RangeOption,
     SamplingOptions,
-    StoredOption,
+    StoredOutputOptions,
 )
 from bayesmembrane.app.terminal import answer, lines, resumable, say
 from bayesmembrane.app.verbs.diagnose import say_thinning
@@ -29,7 +27,7 @@ place = 10
 
 
 @dataclass(frozen=True)
-class EndOptions(OptionGroup):
+class EndOptions(StoredOutputOptions):
     """What is made of the answer."""
 
     rivals: Annotated[
@@ -44,9 +42,7 @@ def verb(
     beside: HypothesisOptionsAuto,
     used: RangeOption,
     sampling: SamplingOptions,
-    stored: StoredOption,
-    output: OutputOptions,
-    ends: EndOptions,
+    output: EndOptions,
 ) -> None:
     """Calibrate, diagnose, add what is missing, calibrate again, until adequate or abstaining; and report."""
     from bayesmembrane.app import analyses
@@ -57,11 +53,11 @@ def verb(
     claim = beside.with_material(material.name, noise="white" if adapt else "")
     measurement = used.of(curve.read())
     say_thinning(measurement)
-    with resumable(stored.folder), lines() as tell:
-        work = analyses.Work(output.seed, stored.folder, sampling.ess, tell)
+    with resumable(output.folder), lines() as tell:
+        work = analyses.Work(output.seed, output.folder, sampling.ess, tell)
         question = Question(claim, material.declared)
-        found = analyses.loop(measurement, question, work, adapt_noise=adapt, rivals=ends.rivals)
-    page = write_report([*analyses.loop_runs(found.result), found.result], ends.report_folder)
+        found = analyses.loop(measurement, question, work, adapt_noise=adapt, rivals=output.rivals)
+    page = write_report([*analyses.loop_runs(found.result), found.result], output.report_folder)
     document = {**found.document, "report": str(page)}
     answer(document, output.as_json, lambda: show(document, measurement))
 

@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from bayesmembrane.app.options import (
-    ForkOption,
     HypothesisOptions,
     MaterialOption,
-    OutputOptions,
     RangeOption,
-    SamplingOptions,
-    StoredOption,
+    RunOptions,
+    StoredOutputOptions,
     TestsOptions,
 )
 from bayesmembrane.app.terminal import INTERRUPTED, answer, bars, command, note, resumable, say, table
@@ -31,21 +29,19 @@ def verb(
     material: MaterialOption,
     beside: HypothesisOptions,
     used: RangeOption,
-    sampling: SamplingOptions,
-    forked: ForkOption,
-    stored: StoredOption,
-    output: OutputOptions,
+    sampling: RunOptions,
+    output: StoredOutputOptions,
 ) -> None:
     """The posterior, stored as a run; the same command continues one that was stopped, or goes on to a higher --ess."""
     from bayesmembrane.app import analyses
 
     if curve.several:
-        jointly(curve.listed(used), material, beside, (sampling, forked, stored, output))
+        jointly(curve.listed(used), material, beside, sampling, output)
         return
     claim, whole = beside.with_material(material.material), curve.read()
-    with resumable(stored.folder), bars() as tell:
+    with resumable(output.folder), bars() as tell:
         tell(claim.label(), "finding starts")
-        work = analyses.Work(output.seed, stored.folder, sampling.ess, tell, fork=forked.fork)
+        work = analyses.Work(output.seed, output.folder, sampling.ess, tell, fork=sampling.fork)
         found = analyses.sample(used.of(whole), claim, work, whole=whole)
     if found.result.interrupted:
         note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")
@@ -58,18 +54,18 @@ def jointly(
     tests: Sequence[Listed],
     material: MaterialOption,
     beside: HypothesisOptions,
-    how: tuple[SamplingOptions, ForkOption, StoredOption, OutputOptions],
+    sampling: RunOptions,
+    output: StoredOutputOptions,
 ) -> None:
     """The posterior of several tests."""
     from bayesmembrane.app import analyses
 
-    sampling, forked, stored, output = how
-    if forked.fork is not None:
+    if sampling.fork is not None:
         raise SettingsError("a joint run begins on its own", "--fork", "leave it out")
     claim = beside.joint(material.material, tests)
-    with resumable(stored.folder), bars() as tell:
+    with resumable(output.folder), bars() as tell:
         tell(claim.label(), "finding starts")
-        found = analyses.sample_joint(claim, analyses.Work(output.seed, stored.folder, sampling.ess, tell))
+        found = analyses.sample_joint(claim, analyses.Work(output.seed, output.folder, sampling.ess, tell))
     if found.result.interrupted:
         note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")
         raise typer.Exit(INTERRUPTED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,17 +28,23 @@ COLUMNS = ("material", "end_mm", "loss_N", "length", "unit", "condition_number",
 TESTS = 5
 
 
+@dataclass(frozen=True)
+class WrittenOptions(OutputOptions):
+    """Where the answer is stored, and its figure beside it."""
+
+    folder: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder of the answer; JSON and figure are written here too. Without: chains."),
+    ] = None
+
+
 def verb(
     curve: CurveOptions,
     material: MaterialOption,
     beside: HypothesisOptions,
     ranges: RangesOption,
-    output: OutputOptions,
+    output: WrittenOptions,
     loss_rise: Annotated[float, typer.Option(help="A valley fits within this part of the least loss.")] = 0.1,
-    folder: Annotated[
-        Path | None,
-        typer.Option("--out", help="Folder of the answer; JSON and figure are written here too. Without: chains."),
-    ] = None,
 ) -> None:
     """How long the valley of the loss is, over one range or several, whether they meet, and what to measure next.
 
@@ -49,11 +56,11 @@ def verb(
     claim = beside.with_material(material.material)
     measurement = curve.read()
     with status(f"Following the valleys of {claim.label()}"):
-        work = analyses.Work(output.seed, folder or CHAINS)
+        work = analyses.Work(output.seed, output.folder or CHAINS)
         found = analyses.valleys(measurement, claim, work, ends=ranges.ends, rise=loss_rise)
     document = found.document
-    if folder is not None:
-        document |= {"files": [str(f) for f in write_valleys(found.result, folder)]}
+    if output.folder is not None:
+        document |= {"files": [str(f) for f in write_valleys(found.result, output.folder)]}
     title = f"Valleys of {claim.material.title} on {curve.shown}"
     answer(document, output.as_json, lambda: show(found.result, title))
 

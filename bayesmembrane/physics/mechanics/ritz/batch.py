@@ -104,23 +104,23 @@ def follow(request: Request, d: Array, level: int, sensitivities: bool = False) 
     grid, keep = path(start, d, STRIDE / 2**level)
     if np.all(start == d[:, 0]):
         grid, keep = grid[1:], keep[1:]
-    return run(request, grid, keep, Shapes.flat(request.ratio, len(d), level), level, sensitivities)
+    return run(request, (grid, keep), Shapes.flat(request.ratio, len(d), level), level, sensitivities)
 
 
 def run(
     request: Request,
-    grid: Array,
-    keep: NDArray[np.bool_],
+    way: tuple[Array, NDArray[np.bool_]],
     start: Shapes,
     level: int,
     sensitivities: bool = False,
     most: int = MOST_ITERATIONS,
 ) -> tuple[Array, Array]:
-    """B films through deflections grid (M, B) from a start each.
+    """B films through deflections grid (M, B) of a ``way`` (grid, keep) from a start each.
 
     Returns results (B, rows, N) and traces (B, 2n + E, N) at those of the deflections with ``keep`` (M,), see
     `kernels.follow`.
     """
+    grid, keep = way
     count, fields = grid.shape[1], request.parameters.shape[1]
     blocks, n = -(-count // LANES), int(np.count_nonzero(keep))
     pad = np.minimum(np.arange(blocks * LANES), count - 1)

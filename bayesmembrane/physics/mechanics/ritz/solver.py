@@ -130,7 +130,7 @@ class _Search:
         film, column = self.film, self.column
         d = self.d[film, column]
         start, once = self.shapes.placed(d, level), np.ones(1, np.bool_)
-        result, trace = run(films(self.request, film), d[None], once, start, level, self.request.sensitivities)
+        result, trace = run(films(self.request, film), (d[None], once), start, level, self.request.sensitivities)
         found, trace = result[..., 0], trace[..., 0]
         verdict, before = self._verdict(found, film, column), self.result[film, :, column]
         # A rough state that leads to no stable one lay astray, unless it was nearly resolved: the film is walked there.

@@ -163,7 +163,7 @@ class Walks:
         if level == 1:
             return shapes
         keep = np.ones(1, np.bool_)
-        result, trace = run(films(self.request, rows), at[None], keep, shapes, level, most=MOST_ITERATIONS)
+        result, trace = run(films(self.request, rows), (at[None], keep), shapes, level, most=MOST_ITERATIONS)
         good = result[:, kernels.STATUS, 0] != Status.ITERATION_LIMIT
         found = Shapes.from_trace(trace[..., 0], shapes.ends, level).of(good)
         shapes.put(good, found.placed(at[good], level))
@@ -178,7 +178,7 @@ class Walks:
             start = start.placed(now.at[some], level)
             now.shapes.put(some, start)
         keep = np.ones(len(grid), np.bool_)
-        result, trace = run(request, grid, keep, start, level, self.request.sensitivities, MOST_ITERATIONS)
+        result, trace = run(request, (grid, keep), start, level, self.request.sensitivities, MOST_ITERATIONS)
         there = np.logical_and.accumulate(result[:, kernels.STATUS] != Status.ITERATION_LIMIT, axis=1)
         reached, each = np.sum(there, axis=1), np.arange(some.size)
         margins = np.where(there[:, None], result[:, (kernels.CONVEX, kernels.ELLIPTIC)], np.inf)
