@@ -218,6 +218,8 @@ class TwinsThresholds:
     square of a law that is 22 % off."""
     alike_in_time: float = 0.25
     """The same where only another speed or a hold could tell: there no shape of a law counts for much."""
+    usual: float = 5.0
+    """Times the expected size: a twin as large is told apart by being implausible."""
     added: int = 3
     """Twins of the most probable set that are fitted where they were not, at most."""
 

@@ -30,7 +30,8 @@ class Foreign:
 
     kind : one of `KINDS`
     base : the model
-    gain : ln of the Bayes factor over the model without it
+    gain : ln of the Bayes factor over the model without it, its chance included
+    chance : ln of the chance that the data find it where it was found, of all the places or waves where it could be
     size : of the most probable member, N, or part of the force if ``relative``; of a play m
     relative : see ``size``
     place : number of the reading at which a step comes, else 0
@@ -44,6 +45,7 @@ class Foreign:
     kind: str
     base: Candidate
     gain: float
+    chance: float = 0.0
     size: float = 0.0
     relative: bool = False
     place: int = 0
@@ -52,6 +54,10 @@ class Foreign:
     against: str = ""
     share: float = 0.0
     trace: Array | None = None
+
+    def counted(self, counts: float) -> float:
+        """ln of the Bayes factor of which a part ``counts``: laws may be off, yet not where a thing could have been."""
+        return counts * (self.gain - self.chance) + self.chance
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +91,7 @@ def foreign(search: Search, base: Candidate) -> list[Foreign]:
         mean, _ = wider.coefficients(z.theta)
         trace = family.traces[:, best * family.width : (best + 1) * family.width] @ mean[-family.width :]
         gain = z.log_evidence - weighed(model, base.theta).log_evidence + spread
-        found = Foreign(family.kind, base, gain, trace=trace, share=_share(search, base, trace))
+        found = Foreign(family.kind, base, gain, spread, trace=trace, share=_share(search, base, trace))
         out.append(_told(m, found, best, float(mean[-family.width])))
     out += [f for f in (_unnamed(search, base), _clipped(search, base)) if f is not None]
     return out

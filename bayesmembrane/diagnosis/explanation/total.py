@@ -9,12 +9,14 @@ from typing import TypeVar
 
 import numpy as np
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown
 from bayesmembrane.diagnosis.explanation.twins import levelled, twins
-from bayesmembrane.diagnosis.thresholds import FOREIGN, VERDICT
+from bayesmembrane.diagnosis.thresholds import FOREIGN, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
 
 Named = TypeVar("Named")
@@ -123,8 +125,8 @@ def summed(grown: Grown) -> Total:
     nothing = BELIEFS.log_foreign(0) if kinds else 0.0
     terms = [(c, NOTHING, weight(c) + nothing) for c in every]
     # What the data do not speak for is neither seen nor excluded, like a further effect that is idle.
-    seen = [f for f in found if counts * f.gain > BELIEFS.supported]
-    terms += [(f.base, f.kind, own(f.base) + counts * f.gain + BELIEFS.log_foreign(kinds)) for f in seen]
+    seen = [f for f in found if f.counted(counts) > BELIEFS.supported]
+    terms += [(f.base, f.kind, own(f.base) + f.counted(counts) + BELIEFS.log_foreign(kinds)) for f in seen]
     p = _normalised(np.array([w for _, _, w in terms]))
     judged = [
         _judged(grown, c, float(q), believed(c)) for (c, kind, _), q in zip(terms, p, strict=True) if kind == NOTHING
@@ -150,8 +152,19 @@ def _raised(grown: Grown, weights: Mapping[int, float]) -> dict[frozenset[str], 
     for names in {names for _, names in grown.found}:
         same = [c for (_, own), c in grown.found.items() if own == names]
         total[names] = float(np.logaddexp.reduce([weights[id(c)] for c in same]))
-        left[names] = grown.search.excess(max(same, key=lambda c: weights[id(c)])) / before
+        best = max(same, key=lambda c: weights[id(c)])
+        left[names] = grown.search.excess(best) / before if _plausible(best, grown.case.measurement) else np.inf
     return levelled(total, left, twins(grown.case))
+
+
+def _plausible(candidate: Candidate, measurement: Measurement) -> bool:
+    """True if every effect of it is of a size that occurs, and away from its bound."""
+    sizes = [(e, f"{e.name}.{e.size.name}") for e in candidate.hypothesis.effects]
+    return all(
+        name not in candidate.at_bound
+        and abs(candidate.parameters[name] - (e.size.null or 0.0)) < TWINS.usual * expected_size(e, measurement)
+        for e, name in sizes
+    )
 
 
 def _foreign(grown: Grown, every: Sequence[Candidate], given: Sequence[str]) -> list[Foreign]:

@@ -20,7 +20,7 @@ class StabilitySection(Section):
 
     name = "stability"
     title = "Stability limits"
-    order = 60
+    order = 65
 
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
         shown = in_order(of_kind(results, Shown))

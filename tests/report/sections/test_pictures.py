@@ -23,7 +23,7 @@ from bayesmembrane.report.sections.run.draws import (
     prior_posterior,
     traces,
 )
-from bayesmembrane.report.sections.run.film import Plane, Shapes, convexity_map, profiles, residual_picture
+from bayesmembrane.report.sections.run.film import LiftedFilms, Plane, convexity_map, profiles, residual_picture
 
 N, G = 9, 30
 X = np.linspace(0.002, 0.03, N)
@@ -103,7 +103,7 @@ PICTURES: dict[str, Callable[[], Picture]] = {
         "gent",
     ),
     "profiles": lambda: profiles(
-        Shapes(
+        LiftedFilms(
             HAT / 100,
             np.linspace(0.01, 0.035, 20) * np.ones((3, 4, 1)),
             np.ones((3, 4, 20)) / 100,
@@ -113,7 +113,7 @@ PICTURES: dict[str, Callable[[], Picture]] = {
         "ogden",
     ),
     "profiles that do not exist": lambda: profiles(
-        Shapes(
+        LiftedFilms(
             HAT / 100,
             np.full((3, 4, 20), np.nan),
             np.full((3, 4, 20), np.nan),
