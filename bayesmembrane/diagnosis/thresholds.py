@@ -269,6 +269,8 @@ class VerdictThresholds:
     """Relative error of an energy from which on none of those known is said to hold."""
     law_carried: float = 0.35
     """Relative error of a law from which on the effect is no longer the one that the library means."""
+    foreign_told: float = 0.02
+    """Probability of something foreign from which on it is told beside what is more probable."""
     foreign_carries: float = 0.1
     """Of the misfit beyond noise: if something foreign takes more of it than that, effects are not named beside it."""
     least_coverage: float = 0.45

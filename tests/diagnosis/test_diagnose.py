@@ -10,6 +10,7 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.result import VERDICTS, Diagnosis
+from bayesmembrane.diagnosis.thresholds import VERDICT
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -130,7 +131,7 @@ def test_the_moment_of_a_sudden_change_is_told_even_where_a_tear_explains_it(
     data, found = answered(tmp_path, "temperature_step", material, protocol, noise, seed)
     assert found.verdict == verdict
     assert all(j.candidate.names == () or "tearing" in j.candidate.names for j in found.members)
-    assert found.probabilities.foreign["sudden_change"] > 0.05
+    assert found.probabilities.foreign["sudden_change"] > VERDICT.foreign_told
     assert "A sudden" in sentence(found)
     moment = data.truth["effects"]["temperature_step"]["when"] * data.time_s[-1]
     assert float(sentence(found).split(" % at ")[-1].split(" s ")[0]) == pytest.approx(moment, abs=6)

@@ -61,16 +61,16 @@ def decided(case: OpenCase, total: Total) -> Verdict:
     if strange is not None and p.anything_foreign > 0.5 and strange.share * first.unexplained > VERDICT.foreign_carries:
         return unknown
     if [set_name(m.candidate, given) for m in members] == [NOTHING]:
-        return unknown if strange else _without_effects(case, total, members)
+        return unknown if p.anything_foreign > 1 - VERDICT.sure else _without_effects(case, total, members)
     if _carried(first.candidate):
         return unknown
     return Verdict("named" if len(members) == 1 else "ambiguous", members, total.ranking, p, strange)
 
 
 def _strange(total: Total, given: Sequence[str]) -> Foreign | None:
-    """The most probable thing that is foreign, beside the most probable set; None if there is surely nothing."""
+    """The most probable thing that is foreign, beside the most probable set; None if that is not worth a word."""
     p = total.probabilities
-    if p.anything_foreign <= 1 - VERDICT.sure:
+    if p.anything_foreign <= VERDICT.foreign_told:
         return None
     first, kind = next(key for key in total.joint if key[1] != NOTHING)
     same = [f for f in total.foreign if f.kind == kind]
