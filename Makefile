@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-fuzz study-import study-scale study-kill study-overnight study-damage study-seeds study-sbc study-modes clean
+.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-sequential study-fuzz study-import study-scale study-kill study-overnight study-damage study-seeds study-sbc study-modes clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -21,6 +21,7 @@ help:
 	@echo "make study-cycles  real cyclic tests with each energy declared and with none, an hour or so; goes on where it was; CYCLES='--declare none' asks for less"
 	@echo "make study-reliability  are probabilities frequencies; hours; goes on where it was; RELIABILITY='--count 60' asks for less"
 	@echo "make study-second  the same on the second generator, once and at the end; SECOND='--count 60' asks for less"
+	@echo "make study-sequential  ambiguous answers, the tests that they propose made, and diagnosed again; hours; goes on where it was; SEQUENTIAL='--count 20' asks for less"
 	@echo "make study-fuzz  500 calls at random, each judged, an hour or so; goes on where it was; FUZZ='--only fit' asks for less"
 	@echo "make study-scale  ten thousand tiny runs in a campaign, some minutes: what it costs beside the work itself"
 	@echo "make study-kill  runs killed at random moments and while they write, and a campaign of 60 runs, some minutes; KILL='--kills 20' asks for less"
@@ -78,6 +79,9 @@ study-reliability: $(STAMP)
 
 study-second: $(STAMP)
 	$(PY) -m tests.studies.reliability --generator second --jobs $(PYTEST_WORKERS) --table docs/studies/second.md $(SECOND)
+
+study-sequential: $(STAMP)
+	$(PY) -m tests.studies.sequential --table docs/studies/sequential.md $(SEQUENTIAL)
 
 study-fuzz: $(STAMP)
 	$(PY) -m tests.fuzz.run --jobs $(PYTEST_WORKERS) --table docs/studies/fuzz.md $(FUZZ)
