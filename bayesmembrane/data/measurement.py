@@ -9,13 +9,16 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.motion import Motion, first_loading, holds
 from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.text import file_name, showable
+
+ROUND_OFF = 1e-13
+"""Of the largest deflection."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,7 @@ class Measurement:
 
     def __post_init__(self) -> None:
         n = np.size(self.deflection)
+        self._set("deflection", without_round_off(self.deflection))
         for name in ("deflection", "force", "time", "force_sd", "across"):
             self._freeze(name, (n,))
         self._freeze("covariance", (n, n))
@@ -211,6 +215,17 @@ class Measurement:
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
+
+
+def without_round_off(deflection: ArrayLike) -> Array:
+    """Deflections with zero where they differ from it by no more than a subtraction's round-off.
+
+    No solver follows a film that is lifted by 1e-17 m, and no machine lifts one so.
+    """
+    d = np.array(deflection, dtype=float)
+    size = float(np.max(np.abs(d), initial=0.0))
+    d[np.abs(d) <= ROUND_OFF * size] = 0.0
+    return d
 
 
 def check_covariance(covariance: Array, where: str | None = None) -> None:

@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import DataError, SettingsError
+from bayesmembrane.physics.rigs.annulus import Annulus
 from tests.data.curves import annulus_curve
 
 
@@ -61,3 +63,11 @@ def test_truncation_keeps_the_noise_block_and_the_full_range() -> None:
 def test_arrays_that_contradict_each_other(more: dict[str, object], said: str) -> None:
     with pytest.raises(DataError, match=said):
         annulus_curve([1, 2, 3], **more)
+
+
+def test_round_off_about_zero_is_zero() -> None:
+    """A disc that comes back to 7e-18 m is down: no solver follows a film that is lifted so little."""
+    d = np.array([0.0, 0.02, 0.04, 0.02, 6.9e-18, 1e-9, -2e-18])
+    m = Measurement(d, np.ones(7), Annulus(0.010, 0.035), Specimen("film", 5e-5))
+    assert m.deflection.tolist() == [0.0, 0.02, 0.04, 0.02, 0.0, 1e-9, 0.0]
+    assert d[4] > 0.0
