@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -90,23 +91,28 @@ def _short(hypothesis: Hypothesis, name: str) -> str:
 
 
 def _answer(hypothesis: Hypothesis, data: Any, sampled: Sampled, wanted: float) -> dict[str, Any]:
+    values = {_short(hypothesis, name): data.posterior[name].values.ravel() for name in hypothesis.natural_names}
+    return walk_answer(sampled, hypothesis.names, wanted) | {
+        "posterior": {name: marginal(v) for name, v in values.items()},
+        "failures": _failures(hypothesis, sampled.chains),
+    }
+
+
+def marginal(values: Array) -> dict[str, Any]:
+    """Mean, standard deviation and 94 % interval of draws (S,) of one parameter."""
+    low, high = arviz.hdi(values, hdi_prob=0.94)  # type: ignore[no-untyped-call]
+    return {"mean": float(np.mean(values)), "sd": float(np.std(values)), "hdi_94": [float(low), float(high)]}
+
+
+def walk_answer(sampled: Sampled, names: Sequence[str], wanted: float) -> dict[str, Any]:
+    """How a walk in the coordinates ``names`` went that was to be worth ``wanted`` draws, as JSON answers tell it."""
     c = sampled.convergence
-    table = {}
-    for name in hypothesis.natural_names:
-        values = data.posterior[name].values.ravel()
-        low, high = arviz.hdi(values, hdi_prob=0.94)  # type: ignore[no-untyped-call]
-        table[_short(hypothesis, name)] = {
-            "mean": float(np.mean(values)),
-            "sd": float(np.std(values)),
-            "hdi_94": [float(low), float(high)],
-        }
     return {
         "status": sampled.status,
-        "posterior": table,
         "ess_bulk": float(np.min(c.ess)),
         "ess_wanted": wanted,
         "r_hat": float(np.max(c.r_hat)),
-        "tau": {n: float(t) for n, t in zip(hypothesis.names, c.tau, strict=True)},
+        "tau": {n: float(t) for n, t in zip(names, c.tau, strict=True)},
         "acceptance": c.acceptance,
         "steps": sampled.chains.steps,
         "burn": c.burn,
@@ -114,7 +120,6 @@ def _answer(hypothesis: Hypothesis, data: Any, sampled: Sampled, wanted: float) 
         "evaluations": sampled.chains.evaluations,
         "seconds": sampled.chains.seconds,
         "tally": dict(sampled.chains.counts),
-        "failures": _failures(hypothesis, sampled.chains),
     }
 
 

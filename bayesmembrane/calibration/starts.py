@@ -39,8 +39,8 @@ def starting_points(
         if np.count_nonzero(good) < 4:
             more = posterior.prior.draw(rng, 2 * EACH)
         else:
-            parents = x[good][_tempered(lp[good], EACH / 2, EACH, rng)]
-            more = _evolved(parents, rng)
+            parents = x[good][tempered(lp[good], EACH / 2, EACH, rng)]
+            more = evolved(parents, rng)
         x, lp = np.concatenate([x, more]), np.concatenate([lp, _evaluate(posterior, more, counts)])
     good = np.isfinite(lp)
     x, lp = x[good], lp[good]
@@ -52,7 +52,7 @@ def starting_points(
             f"{1e3 * np.max(posterior.measurement.deflection):g} mm",
             remedy="use a shorter range, another material or another convexity prior",
         )
-    chosen = _tempered(lp, SPARE * wanted, wanted, rng)
+    chosen = tempered(lp, SPARE * wanted, wanted, rng)
     return np.asarray(x[rng.permutation(chosen)].reshape(ensembles, walkers, -1))
 
 
@@ -115,8 +115,10 @@ def _around_valleys(objective: Objective, pool: Array, rms: float, rng: np.rando
     return np.asarray(np.clip(x[likely][which] + WIDER * np.einsum("mkl,ml->mk", root[which], z), low, high))
 
 
-def _tempered(lp: Array, worth: float, count: int, rng: np.random.Generator) -> Array:
-    """Indices of ``count`` of the candidates, without replacement while they last, with weights exp(b lp)."""
+def tempered(lp: Array, worth: float, count: int, rng: np.random.Generator) -> Array:
+    """Indices (count,) of candidates drawn with weights exp(b lp), without replacement while they last; b <= 1 is the
+    largest at which they are worth ``worth`` draws.
+    """
     lp = lp - np.max(lp)
     worth = min(worth, 0.9 * len(lp))
     power, _ = bisected(lambda b: effective_draws(np.exp(b * lp)) >= worth, 0.0, 1.0, HALVINGS)
@@ -125,8 +127,8 @@ def _tempered(lp: Array, worth: float, count: int, rng: np.random.Generator) -> 
     return np.asarray(np.resize(order, count) if len(order) < count else order[:count])
 
 
-def _evolved(parents: Array, rng: np.random.Generator) -> Array:
-    """x_i + g (x_a - x_b), with g about half of what is best for exploring a normal distribution."""
+def evolved(parents: Array, rng: np.random.Generator) -> Array:
+    """(n, k) x_i + g (x_a - x_b) of parents (n, k), g about half of what is best for exploring a normal distribution."""
     n, k = parents.shape
     a, b = rng.integers(n, size=(2, n))
     g = 1.2 / np.sqrt(2 * k) * np.exp(0.3 * rng.standard_normal((n, 1)))

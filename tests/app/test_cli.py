@@ -18,20 +18,6 @@ Run = Callable[..., tuple[int, str, str]]
 CURVE, SPECIMEN = shipped("elastosil_50um_op1.csv"), shipped("elastosil_50um_op1.toml")
 
 
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    monkeypatch.chdir(tmp_path)  # what is not sent elsewhere is stored in chains/ here
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["bayesmembrane", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        out, err = capsys.readouterr()
-        return int(stop.value.code or 0), out, err
-
-    return call
-
-
 def test_force_answers_what_the_solver_answers(run: Run) -> None:
     code, out, _ = run(
         "force", "--material", "yeoh", "--parameters", "8.84,-0.63,0.056", "--deflection-mm", "1,10,35.1", "--json"

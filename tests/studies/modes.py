@@ -1,6 +1,6 @@
 """One energy in several modes: posterior, evidence, two modes that foretell the third, and a published fit beside them.
 
-    python -m tests.studies.modes --out /tmp/modes
+    python -m tests.studies.modes
 
 reads the rubbers of Treloar, Kawabata, Meunier and Kawamura from ../shared/data/constitutive and writes
 docs/studies/modes.md; what is stored in --out is not computed again.
@@ -31,7 +31,7 @@ from bayesmembrane.physics.hypothesis import hypothesis
 
 HERE = Path(__file__).resolve().parents[2]
 TARGET = HERE / "docs" / "studies" / "modes.md"
-DATA = Path("/work/shared/data/constitutive")
+DATA = HERE.parent / "shared" / "data" / "constitutive"
 THICKNESS = 1e-3  # m: stresses are all that was measured, and any film will do
 MPA = 1e6
 RUBBERS = {
@@ -220,7 +220,7 @@ def _beside_published(rows: list[Row], folder: Path) -> list[str]:
 def main() -> None:
     """Compute, and write the page after every rubber."""
     options = argparse.ArgumentParser()
-    options.add_argument("--out", type=Path, default=Path("/tmp/bayesmembrane-modes"))
+    options.add_argument("--out", type=Path, default=HERE / "reports" / "study-modes")
     options.add_argument("--only", default="", help="rubbers by commas")
     options.add_argument("--evidence-on", default="all", help="rubbers by commas, all, or none")
     options.add_argument(

@@ -21,7 +21,7 @@ from bayesmembrane.calibration.fingerprint import code_of
 from bayesmembrane.calibration.joint.claim import WALK, Joint
 from bayesmembrane.calibration.joint.posterior import JointPosterior
 from bayesmembrane.calibration.joint.starts import joint_starts
-from bayesmembrane.calibration.outcome import MOST_DRAWS, outcome
+from bayesmembrane.calibration.outcome import MOST_DRAWS, marginal, outcome, walk_answer
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.resume import check_same
@@ -42,7 +42,6 @@ from bayesmembrane.ground.files import make_folder
 from bayesmembrane.ground.fingerprint import digest
 from bayesmembrane.ground.interrupts import Stop, never
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.ground.sealed import write_toml
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.ground.stored import read, store
@@ -253,30 +252,11 @@ def _seen_from(joint: Joint, number: int, sampled: Sampled) -> Sampled:
 
 
 def _status(joint: Joint, x: Array, lp: Array, sampled: Sampled, how: RunSettings) -> dict[str, Any]:
-    c, prefix = sampled.convergence, f"{joint.material.name}."
+    prefix = f"{joint.material.name}."
     natural = joint.natural(x.reshape(-1, x.shape[-1]))
     best = natural[int(np.argmax(lp))]
-    table = {}
-    for i, name in enumerate(joint.natural_names):
-        low, high = arviz.hdi(natural[:, i], hdi_prob=0.94)  # type: ignore[no-untyped-call]
-        table[name.removeprefix(prefix)] = {
-            "mean": float(np.mean(natural[:, i])),
-            "sd": float(np.std(natural[:, i])),
-            "hdi_94": [float(low), float(high)],
-        }
-    return {
-        "status": sampled.status,
-        "posterior": table,
-        "best": {n.removeprefix(prefix): float(v) for n, v in zip(joint.natural_names, best, strict=True)},
-        "ess_bulk": float(np.min(c.ess)),
-        "ess_wanted": how.sampling.ess,
-        "r_hat": float(np.max(c.r_hat)),
-        "acceptance": c.acceptance,
-        "tau": {n: float(t) for n, t in zip(joint.names, c.tau, strict=True)},
-        "steps": sampled.chains.steps,
-        "burn": c.burn,
-        "walkers": int(sampled.chains.x.shape[2]),
-        "evaluations": sampled.chains.evaluations,
-        "seconds": sampled.chains.seconds,
-        "tally": dict(sampled.chains.counts),
+    short = [name.removeprefix(prefix) for name in joint.natural_names]
+    return walk_answer(sampled, joint.names, how.sampling.ess) | {
+        "posterior": {n: marginal(natural[:, i]) for i, n in enumerate(short)},
+        "best": {n: float(v) for n, v in zip(short, best, strict=True)},
     }

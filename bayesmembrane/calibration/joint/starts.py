@@ -7,9 +7,8 @@ import numpy as np
 from bayesmembrane.calibration.joint.objective import JointObjective, with_fewer_readings
 from bayesmembrane.calibration.joint.posterior import JointPosterior
 from bayesmembrane.calibration.posterior import Outcomes
-from bayesmembrane.calibration.sampling.convergence import effective_draws
+from bayesmembrane.calibration.starts import evolved, tempered
 from bayesmembrane.ground.errors import SettingsError
-from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array
 
 EACH, ROUNDS, AROUND = 256, 5, 96
@@ -17,7 +16,6 @@ MOST = 4  # optima of the largest likelihood
 LIKELY = 40.0  # of |r|^2 above the least: valleys beyond it hold nothing of the posterior
 WIDER, DEGREES = 1.5, 4.0  # than the curvature says, and degrees of freedom of the t-distribution around a valley
 SPARE = 1.5  # effective number of candidates for each walker
-HALVINGS = 40
 
 
 def joint_starts(
@@ -34,7 +32,7 @@ def joint_starts(
     wanted = ensembles * walkers
     for _ in range(ROUNDS):
         good = np.isfinite(lp)
-        more = posterior.prior.draw(rng, EACH) if np.count_nonzero(good) < 4 else _crossed(x[good], lp[good], rng)
+        more = posterior.prior.draw(rng, EACH) if np.count_nonzero(good) < 4 else _better(x[good], lp[good], rng)
         x, lp = np.concatenate([x, more]), np.concatenate([lp, _evaluated(posterior, more, counts)])
     x, lp = x[np.isfinite(lp)], lp[np.isfinite(lp)]
     if len(x) < wanted:
@@ -43,7 +41,7 @@ def joint_starts(
             f'"{posterior.joint.convexity}" fit every test',
             remedy="use shorter ranges, another material or another convexity prior",
         )
-    chosen = _chosen(lp, SPARE * wanted, wanted, rng)
+    chosen = tempered(lp, SPARE * wanted, wanted, rng)
     return np.asarray(x[rng.permutation(chosen)].reshape(ensembles, walkers, -1))
 
 
@@ -96,21 +94,6 @@ def _suited(posterior: JointPosterior, number: int, x: Array, misfit: float, rng
     x[some, at[0]] = fits + 0.5 * rng.standard_normal(int(np.sum(some)))
 
 
-def _crossed(x: Array, lp: Array, rng: np.random.Generator) -> Array:
-    """x_i + g (x_a - x_b) of the better candidates (EACH, K), a little jittered."""
-    parents = x[_chosen(lp, EACH / 2, EACH, rng)]
-    n, k = parents.shape
-    a, b = rng.integers(n, size=(2, n))
-    g = 1.2 / np.sqrt(2 * k) * np.exp(0.3 * rng.standard_normal((n, 1)))
-    jitter = 1e-3 * np.std(parents, axis=0) * rng.standard_normal((n, k))
-    return np.asarray(parents + g * (parents[a] - parents[b]) + jitter)
-
-
-def _chosen(lp: Array, worth: float, count: int, rng: np.random.Generator) -> Array:
-    """Indices (count,) of candidates drawn with weights exp(b lp), without replacement while they last."""
-    lp = lp - np.max(lp)
-    worth = min(worth, 0.9 * len(lp))
-    power, _ = bisected(lambda b: effective_draws(np.exp(b * lp)) >= worth, 0.0, 1.0, HALVINGS)
-    # The largest of ln w + Gumbel noise are a draw without replacement.
-    order = np.argsort(-(power * lp + rng.gumbel(size=lp.size)))
-    return np.asarray(np.resize(order, count) if len(order) < count else order[:count])
+def _better(x: Array, lp: Array, rng: np.random.Generator) -> Array:
+    """(EACH, K) what differential evolution makes of the better candidates."""
+    return evolved(x[tempered(lp, EACH / 2, EACH, rng)], rng)
