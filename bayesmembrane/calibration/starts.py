@@ -128,7 +128,7 @@ def tempered(lp: Array, worth: float, count: int, rng: np.random.Generator) -> A
 
 
 def evolved(parents: Array, rng: np.random.Generator) -> Array:
-    """(n, k) x_i + g (x_a - x_b) of parents (n, k), g about half of what is best for exploring a normal distribution."""
+    """(n, k) x_i + g (x_a - x_b), with g about half of what is best for exploring a normal distribution."""
     n, k = parents.shape
     a, b = rng.integers(n, size=(2, n))
     g = 1.2 / np.sqrt(2 * k) * np.exp(0.3 * rng.standard_normal((n, 1)))
