@@ -198,6 +198,12 @@ class GrowthThresholds:
     """ln of the Bayes factor behind the best set of its size, beyond which one is left as it is: that gains less."""
     energy_reach: float = 30.0
     """ln of the Bayes factor behind the best energy, beyond which one is not tried with further sets of a size."""
+    lessened: int = 12
+    """Hypotheses of each size that are tried without each of their effects, at most."""
+    less_reach: float = 20.0
+    """ln of the Bayes factor behind the best of all, beyond which they are not, nor searched on."""
+    less_gain: float = 3.0
+    """ln of the Bayes factor that such a start may be behind what was found of it before, and be searched on."""
     worth: float = 1e-3
     """Of the probability of all smaller sets: below it, larger sets are not looked at."""
     round_off: float = 3e-6

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects, without_effect
 from bayesmembrane.diagnosis.candidates.search import Search, starts_with
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.standard import expected_size
@@ -102,8 +102,37 @@ def grown(case: OpenCase) -> Grown:
         out.polish(size)
         if not _worth_more(out, size):
             break
+    _with_less(out)
     _with_twins(out)
     return out
+
+
+def _with_less(out: Grown) -> None:
+    """The most probable sets without each of their effects, from where the others are beside it.
+
+    A search from the plain fit may end where the material was bent to imitate what is missing; one from a larger set
+    does not. Without this, effects that do nothing are named for having led the search.
+    """
+    for size in range(BELIEFS.most, 0, -1):
+        best = max(c.log_evidence for c in out.found.values())
+        starts: dict[Key, Candidate] = {}
+        for start in _lessened(out, size, best):
+            key = _key(start)
+            if key not in starts or start.log_evidence > starts[key].log_evidence:
+                starts[key] = start
+        for key, start in starts.items():
+            before = out.found[key].log_evidence if key in out.found else -np.inf
+            if start.log_evidence > max(best - GROWTH.less_reach, before - GROWTH.less_gain):
+                out.add(out.search.polished(start))
+
+
+def _lessened(out: Grown, size: int, best: float) -> Iterator[Candidate]:
+    """The first hypotheses of this size without one of their effects, the others as they are."""
+    given = out.case.null.names
+    for c in out.of_size(size)[: GROWTH.lessened]:
+        for name in [n for n in c.names if n not in given]:
+            if best - c.log_evidence < GROWTH.less_reach and (less := out.search.at(*without_effect(c, name))):
+                yield less
 
 
 def _with_twins(out: Grown) -> None:
