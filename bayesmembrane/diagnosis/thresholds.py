@@ -188,6 +188,10 @@ class GrowthThresholds:
     """Effects that are fitted beside each of these sets, by what their traces promise."""
     refit_reach: float = 40.0
     """ln of the Bayes factor that a trace may promise less than the best one, and still be fitted."""
+    promise: float = 0.0
+    """ln of the Bayes factor that a trace must promise: what promises less counts as the set without it."""
+    least_refits: int = 2
+    """Effects that are fitted beside each of these sets none the less, for a trace knows no more than a little of it."""
     with_other_energies: int = 3
     """Sets of each size that are tried with every energy."""
     further_starts: int = 1

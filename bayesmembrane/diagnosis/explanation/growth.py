@@ -167,7 +167,8 @@ def _promising(out: Grown, base: Candidate, size: int) -> list[Effect]:
     known = {frozenset(c.names) for c in out.of_size(size)}
     rest = [e for e in rest if frozenset((*base.names, e.name)) not in known]
     rest.sort(key=lambda e: -gains[e.name])
-    return [e for e in rest[: GROWTH.refits] if gains[e.name] > gains[rest[0].name] - GROWTH.refit_reach]
+    promising = [e for e in rest if gains[e.name] > max(GROWTH.promise, gains[rest[0].name] - GROWTH.refit_reach)]
+    return promising[: GROWTH.refits] if len(promising) > GROWTH.least_refits else rest[: GROWTH.least_refits]
 
 
 def first_order(search: Search, base: Candidate, effect: Effect) -> float:
@@ -211,9 +212,13 @@ def _bases(out: Grown, base: Candidate) -> list[Array]:
 
 
 def _with_other_energies(out: Grown, size: int) -> None:
-    """The most probable sets with every other energy, from that energy's own fit and the effects of the set's."""
+    """The most probable sets with every other energy, from that energy's own fit and the effects of the set's.
+
+    Sets that are no better than without one of their effects count as those, whatever the energy.
+    """
     names = list(out.case.plain)
-    for best in out.best_of_each_set(size)[: GROWTH.with_other_energies]:
+    tried = [c for c in out.best_of_each_set(size) if size == 1 or _gains(out, c)]
+    for best in tried[: GROWTH.with_other_energies]:
         for name in names:
             if (name, frozenset(best.names)) in out.found:
                 continue
@@ -221,6 +226,12 @@ def _with_other_energies(out: Grown, size: int) -> None:
             out.case.tell(f"trying {best.label} with the energy {plain.hypothesis.material.title}")
             out.add(_transplanted(out, best, plain))
         names = [n for n in names if _behind(out, best, n) < GROWTH.energy_reach]
+
+
+def _gains(out: Grown, c: Candidate) -> bool:
+    """True if a set is more probable than each of those with one effect less that were fitted."""
+    smaller = [f.log_evidence for (_, names), f in out.found.items() if names < frozenset(c.names)]
+    return c.log_evidence > max(smaller, default=-np.inf) + GROWTH.promise
 
 
 def _behind(out: Grown, best: Candidate, energy: str) -> float:
