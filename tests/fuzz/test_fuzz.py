@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.fuzz import calls
 from tests.fuzz.calls import GOOD, Row, call, contradiction, judged
 from tests.fuzz.cases import Case, case
 from tests.fuzz.run import page, run, stored, table
@@ -92,6 +93,25 @@ def test_the_judge_knows_a_contradiction() -> None:
     assert contradiction("diagnose", json.loads(json.dumps(found))) == ""
     assert "mullins" in contradiction("diagnose", found | {"effects": ["mullins"]})
     assert "p-value" in contradiction("diagnose", found | {"p_value": None})
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_call_that_is_given_up_is_no_traceback(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, compiled: bool
+) -> None:
+    """Where compiled code is interrupted, Python raises another error from the one that was meant."""
+
+    def main() -> None:
+        try:
+            raise calls.TimeUpError
+        except calls.TimeUpError as error:
+            if compiled:
+                raise SystemError("returned a result with an exception set") from error
+            raise
+
+    monkeypatch.setattr(calls, "main", main)
+    row = call(Case(7, "fit", (("curve.csv", ""), ("film.toml", "")), (), "empty"), tmp_path)
+    assert (row.outcome, row.sentence.partition(",")[0]) == ("timeout", "no answer in 60 s")
 
 
 def test_a_run_goes_on_where_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
