@@ -126,11 +126,18 @@ def test_a_run_goes_on_where_it_was(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "| fit | 1 | " in table(stored(results).values())
 
 
+def test_no_call_is_begun_once_the_time_is_over(tmp_path: Path) -> None:
+    results = tmp_path / "results.csv"
+    run([Case(7, "fit", (("curve.csv", ""), ("film.toml", "")), (), "empty")], results, 1, seconds=0)
+    assert stored(results) == {}
+
+
 def test_the_page_says_how_many_ran_and_what_failed() -> None:
     rows = [
         Row(7, "fit", "a film", 0, 1.0, "answered", ""),
         Row(8, "sample", "a film", 1, 2.0, "traceback", "ZeroDivisionError: nobody foresaw this"),
     ]
-    told = page(rows, 7, 500)
+    told = page(rows, 7, 500, "The first ran before it was mended.")
+    assert "given up.\n\nThe first ran before it was mended.\n\n| verb |" in told
     assert "2 of 500 seeds were run; 1 calls were answered or refused, 0 given up." in told
     assert "traceback: ZeroDivisionError: nobody foresaw this\n  seeds 8" in told
