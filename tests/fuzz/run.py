@@ -50,7 +50,7 @@ def stored(path: Path) -> dict[int, Row]:
 
 
 def run(cases: Iterable[Case], path: Path, jobs: int, limit: float | None = None, seconds: float = math.inf) -> None:
-    """Run what is not stored yet, at most ``limit`` seconds a call; one process begins none once ``seconds`` have passed."""
+    """Run what is not stored yet, at most ``limit`` seconds a call; one process begins none after ``seconds``."""
     done, end = stored(path), time.monotonic() + seconds
     todo = takewhile(lambda _: time.monotonic() < end, (c for c in cases if c.seed not in done))
     path.parent.mkdir(parents=True, exist_ok=True)
