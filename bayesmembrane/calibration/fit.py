@@ -296,6 +296,7 @@ def _covariance(r: Array, jacobian: Array, held: NDArray[np.bool_]) -> Array:
     if free.size and dof > 0:
         _, s, vt = np.linalg.svd(jacobian[:, free], full_matrices=False)
         with np.errstate(divide="ignore", over="ignore"):
-            root = vt.T / np.maximum(s, 1e-150)
+            # What the data do not see at all has an error beyond all bounds, and yet a number.
+            root = vt.T / np.maximum(s, 1e-150 * max(1.0, float(np.linalg.norm(r))))
         out[np.ix_(free, free)] = root @ root.T * (r @ r) / dof
     return out

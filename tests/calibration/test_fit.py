@@ -227,6 +227,15 @@ def test_where_there_is_no_fit_a_sentence_says_so(film) -> None:  # type: ignore
     assert all(e.sd is None for e in found.parameters.values())
 
 
+def test_what_the_data_do_not_see_has_an_error_beyond_all_bounds_and_no_warning() -> None:
+    """A misfit of kilonewtons: the fuzz, seed 22217, heard an overflow."""
+    slopes = np.column_stack([np.ones(5), np.zeros(5)])
+    with np.errstate(over="raise"):
+        found = searches._covariance(np.full(5, 1e6), slopes, np.zeros(2, bool))
+    assert found[0, 0] == pytest.approx(1e12 / 3)
+    assert 1e100 < found[1, 1] < np.inf
+
+
 def test_valleys_looked_for_with_a_part_lead_to_the_optimum_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(3)
     strip = Uniaxial(0.05, 0.01)
