@@ -340,6 +340,18 @@ class NextTestThresholds:
 
 
 @dataclass(frozen=True)
+class OtherTestsThresholds:
+    """What is predicted of tests that no fit saw."""
+
+    band: float = 0.90
+    """Probability of the band."""
+    members: int = 12
+    """Hypotheses that predict, the most probable first."""
+    draws: int = 4000
+    """Of all of them together."""
+
+
+@dataclass(frozen=True)
 class LoopThresholds:
     """The closed loop."""
 
@@ -405,6 +417,7 @@ DETECTION = DetectionThresholds()
 SEARCH = SearchThresholds()
 SIZES = Sizes()
 FORM = FormThresholds()
+OTHER_TESTS = OtherTestsThresholds()
 GROWTH = GrowthThresholds()
 TWINS = TwinsThresholds()
 FOREIGN = ForeignThresholds()
