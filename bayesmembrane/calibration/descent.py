@@ -25,10 +25,12 @@ class Patience:
 
     behind : times the least sum of squares from which on a search that crawls is not waited for
     slow_below : relative decrease of |r|^2 below which a step counts as slow
+    enough : |r| below which nothing lower is asked for
     """
 
     behind: float = np.inf
     slow_below: float = SLOW
+    enough: float = 0.0
 
 
 def descend(
@@ -46,8 +48,9 @@ def descend(
     with coordinates at a bound left out while the step would leave it, and those in ``held`` (M, k) left out always.
     A row whose |r|^2 is more than ``patience.behind`` times the least is given up when it crawls: films at the edge of
     what can be solved cost most. One whose |r|^2 falls by less than its part ``patience.slow_below`` a few times in a
-    row, or promises no more, is done. Returns x (M, k) and |r| (M,), inf where a start has no residuals or no slopes:
-    neither a start nor a step goes where one of them is not a number.
+    row, or promises no more, is done, and so is one whose |r| is below ``patience.enough``. Returns x (M, k) and |r|
+    (M,), inf where a start has no residuals or no slopes: neither a start nor a step goes where one of them is not a
+    number.
 
     D. W. Marquardt, J. SIAM 11 (1963) 431, with the damping of H. B. Nielsen (IMM-REP-1999-05, Technical University of
     Denmark): it falls as far as the gain is what was promised, and rises faster with every step that gains nothing. A
@@ -61,7 +64,7 @@ def descend(
     size = _square(r, jacobian)
     damping, harder = np.full(len(x), DAMPING), np.full(len(x), HARDER)
     slow, crawl = np.zeros(len(x), int), np.zeros(len(x), int)
-    going = np.isfinite(size)
+    going = np.isfinite(size) & ~(np.sqrt(size) < patience.enough)
     for _ in range(iterations):
         rows = np.flatnonzero(going)
         if not rows.size:
@@ -90,7 +93,8 @@ def descend(
             new_size[better],
         )
         lost = (crawl[rows] >= CRAWLS) & (size[rows] / patience.behind > np.min(size))
-        going[rows] = (damping[rows] < HOPELESS) & (slow[rows] < PATIENCE) & ~lost
+        done = np.sqrt(size[rows]) < patience.enough
+        going[rows] = (damping[rows] < HOPELESS) & (slow[rows] < PATIENCE) & ~lost & ~done
     return x, np.sqrt(size)
 
 

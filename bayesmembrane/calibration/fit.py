@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayesmembrane.calibration.constrained import constrained_optimum
-from bayesmembrane.calibration.descent import descend
+from bayesmembrane.calibration.descent import Patience, descend
 from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.calibration.posterior import enough_points
 from bayesmembrane.data.fixture import Fixture
@@ -26,12 +26,14 @@ from bayesmembrane.physics.materials.neo_hookean import NeoHookean
 from bayesmembrane.physics.mechanics import api
 
 STARTED, POLISHED = 12, 2
+FEWEST, SLOPES = 4, 200  # starts: a step from one costs as many slopes as there are coordinates, of all so many at most
 APART, DISTINCT = 1.5, 0.3  # least distance of starts, and of what they lead to, in prior standard deviations
 HOPEFUL = 10.0  # a start that misses the data by this many times the best one's |r| is not followed
 FEW, ROUGH = 50, 1e-4  # evaluations and tolerance of a first search
 NEAR = 1e-3  # of the width of the bounds: an estimate this close is at the bound
 FLAT = 1e-4  # a loss that rises by less than this part on the way to the bound has no minimum before it
-TO_BOUND = 40  # iterations towards a bound
+TO_BOUND, FEWEST_TO_BOUND = 40, 8  # iterations towards a bound
+MOST_SLOPES = 20_000  # on the way to all lower, or upper, bounds together
 MANY = 5000  # readings with which valleys are looked for: hundreds of films at once are kept in memory
 LOWER = 1e-9  # a simpler energy's optimum is taken where it leads lower by more than this part: less is round-off
 
@@ -143,11 +145,8 @@ def fit(
     enough_points(hypothesis, measurement)
     few = shortened(measurement, MANY)
     objective = Objective(hypothesis, few, loss, solve)
-    rng = np.random.default_rng(seed)
-    pool, size = objective.pool(rng)
-    contained = _contained(objective, seed)
-    published = [np.asarray(s, dtype=float) for s in starts]
-    x, status = _best_of_starts(objective, pool[size < HOPEFUL * size[0]], published, contained)
+    films = [np.asarray(s, dtype=float) for s in starts]
+    pool, contained, (x, status) = _searched(objective, seed, films)
     search = objective
     if few is not measurement:
         objective = Objective(hypothesis, measurement, loss, solve)
@@ -165,15 +164,23 @@ def fit(
     return replace(free, constrained=held)
 
 
+def _searched(objective: Objective, seed: int, published: list[Array]) -> tuple[Array, list[Array], tuple[Array, str]]:
+    """Starts (M, k), the optima of simpler energies, and the optimum (x, status) without the convexity prior."""
+    pool, size = objective.pool(np.random.default_rng(seed))
+    contained = _contained(objective, seed)
+    return pool, contained, _best_of_starts(objective, pool[size < HOPEFUL * size[0]], published, contained)
+
+
 def _contained(objective: Objective, seed: int) -> list[Array]:
     """What the optimum of the neo-Hookean film with the same effects is in coordinates (k,) of this hypothesis."""
     h = objective.hypothesis
     if h.material is NeoHookean or h.material.neo_hookean(1.0) is None:
         return []
     simple = replace(h, material=NeoHookean, convexity=FREE)
-    found = fit(objective.measurement, simple, loss=objective.loss, seed=seed, solve=objective.forward.solve)
-    material = h.material.neo_hookean(float(np.exp(found.coordinates[0])))
-    return [] if material is None else [np.concatenate([material, found.coordinates[1:]])]
+    search = Objective(simple, objective.measurement, objective.loss, objective.forward.solve)
+    _, _, (x, _) = _searched(search, seed, [])
+    material = h.material.neo_hookean(float(np.exp(x[0])))
+    return [] if material is None else [np.concatenate([material, x[1:]])]
 
 
 def _best_of_starts(
@@ -181,7 +188,7 @@ def _best_of_starts(
 ) -> tuple[Array, str]:
     """The best of all polished starts, (x, status)."""
     h = objective.hypothesis
-    starts = separated(pool, objective.spread * APART, STARTED)
+    starts = separated(pool, objective.spread * APART, int(np.clip(SLOPES // h.curve_size, FEWEST, STARTED)))
     for films in published:
         start = h.material.to_coordinates(h.material.from_vector(films).vector)
         if np.all(np.isfinite(start)):
@@ -251,13 +258,15 @@ def _at_bound(objective: Objective, x: Array, size: float) -> NDArray[np.bool_]:
     """(k,) True where the loss falls, or stays flat, up to a bound while the others follow."""
     near = np.minimum(x - objective.low, objective.high - x) < NEAR * (objective.high - objective.low)
     sd = np.sqrt(np.diag(_covariance(*objective(x), np.zeros(x.size, bool))))
-    open_ = np.flatnonzero(~near & ~(sd < 0.5 * objective.spread))
-    if open_.size:
-        moved, held = np.tile(x, (2 * open_.size, 1)), np.zeros((2 * open_.size, x.size), bool)
-        for row, (i, bound) in enumerate((i, b[i]) for i in open_ for b in (objective.low, objective.high)):
-            moved[row, i], held[row, i] = bound, True
-        _, reached = descend(objective.batch, moved, (objective.low, objective.high), TO_BOUND, held)
-        near[open_] = np.min(reached.reshape(-1, 2), axis=1) < size * (1 + FLAT)
+    loose, bounds, enough = ~(sd < 0.5 * objective.spread), (objective.low, objective.high), size * (1 + FLAT)
+    for bound in bounds:
+        # How far below the loss falls does not matter, nor what is at the other bound then.
+        if (open_ := np.flatnonzero(~near & loose)).size:
+            held = np.arange(x.size) == open_[:, None]
+            moved = np.where(held, bound, x)
+            steps = int(np.clip(MOST_SLOPES // moved.size, FEWEST_TO_BOUND, TO_BOUND))
+            _, reached = descend(objective.batch, moved, bounds, steps, held, Patience(enough=enough))
+            near[open_] = reached < enough
     return np.asarray(near)
 
 
@@ -287,6 +296,7 @@ def _covariance(r: Array, jacobian: Array, held: NDArray[np.bool_]) -> Array:
     if free.size and dof > 0:
         _, s, vt = np.linalg.svd(jacobian[:, free], full_matrices=False)
         with np.errstate(divide="ignore", over="ignore"):
-            root = vt.T / np.maximum(s, 1e-150)
+            # What the data do not see at all has an error beyond all bounds, and yet a number.
+            root = vt.T / np.maximum(s, 1e-150 * max(1.0, float(np.linalg.norm(r))))
         out[np.ix_(free, free)] = root @ root.T * (r @ r) / dof
     return out

@@ -20,7 +20,7 @@ from bayesmembrane.physics.rigs.base import rig_of
 LOSSES = ("euclidean", "weighted")
 SCREENED, INFLATED = 1024, 0.25  # draws that are looked at, and the part of them from a wider prior
 INFLATION = 2.5
-MOST = 300  # evaluations of one search
+MOST, SLOPES = 300, 5000  # evaluations of one search, and slopes: an evaluation costs one for each coordinate
 ON_THE_WAY = 24  # states at which a film is looked at before it is solved
 
 
@@ -149,7 +149,10 @@ class Objective:
         return np.array([float(p.prior.distribution().std()) for p in self.parameters])
 
     def polish(self, x: Array, evaluations: int = MOST, tolerance: float = 1e-8) -> tuple[Array, float, str]:
-        """(x, |r|, status) after a trust-region search from x (k,); |r| is inf where x has no curve or no slopes."""
+        """(x, |r|, status) after a trust-region search from x (k,); |r| is inf where x has no curve or no slopes.
+
+        Of many coordinates fewer evaluations are made: `SLOPES` over their number, at least a third of `MOST`.
+        """
         room = 1e-6 * (self.high - self.low)
         start = np.clip(x, self.low + room, self.high - room)
         if not np.all(np.isfinite(self(start)[0])):
@@ -164,7 +167,7 @@ class Objective:
                 ftol=tolerance,
                 xtol=tolerance,
                 gtol=None,
-                max_nfev=evaluations,
+                max_nfev=min(evaluations, max(SLOPES // x.size, MOST // 3)),
             )
         except _LevelError as level:
             return level.x, float(np.linalg.norm(self(level.x)[0])), "converged"

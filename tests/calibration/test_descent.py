@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from bayesmembrane.calibration.descent import descend
+from bayesmembrane.calibration.descent import Patience, descend
 
 LOW, HIGH = np.full(2, -5.0), np.full(2, 5.0)
 
@@ -52,3 +52,22 @@ def test_bounds_and_held_coordinates_are_kept() -> None:
     assert x[0] == pytest.approx([0.5, 0.25], abs=1e-5)
     x, _ = descend(rosenbrock, start, (LOW, HIGH), 200, held=np.array([[True, False]]))
     assert x[0] == pytest.approx([-3.0, 5.0], abs=1e-6)
+
+
+def test_a_search_that_is_low_enough_asks_for_no_more() -> None:
+    asked = []
+
+    def listening(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        asked.append(len(x))
+        return rosenbrock(x)
+
+    start = np.array([[-3.0, 2.0], [1.0, 1.01]])
+    _, size = descend(listening, start, (LOW, HIGH), 200, patience=Patience(enough=0.5))
+    assert np.all(size < 0.5)
+    # The second row begins below, and costs its first look alone.
+    assert asked[0] == 2
+    assert set(asked[1:]) == {1}
+    enough = len(asked)
+    asked.clear()
+    descend(listening, start[:1], (LOW, HIGH), 200)
+    assert enough < len(asked)

@@ -7,15 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bayesmembrane.calibration import fit as searches
 from bayesmembrane.calibration.fit import fit
+from bayesmembrane.calibration.objective import Objective
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.ground.errors import SettingsError
-from bayesmembrane.ground.registry import material
+from bayesmembrane.ground.registry import components, material
 from bayesmembrane.ground.stored import answer, read, store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import Request, request, solve
 from bayesmembrane.physics.mechanics.solution import Curves
+from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.physics.predicting import predict
 
@@ -182,11 +185,55 @@ def test_an_energy_fits_no_worse_than_the_one_inside(film, effects: tuple[str, .
     assert found.constrained.loss_N <= inner.loss_N * (1 + 1e-6)
 
 
+def test_what_is_at_a_bound_is_asked_of_the_fit_and_not_of_the_energy_inside(film, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    asked, at_bound = [], searches._at_bound
+
+    def listening(objective: Objective, *more: Any) -> Any:
+        asked.append(objective.hypothesis.material.name)
+        return at_bound(objective, *more)
+
+    monkeypatch.setattr(searches, "_at_bound", listening)
+    fit(film("yeoh", FILMS["yeoh"], noise=0.02, seed=8), hypothesis("yeoh", convexity="none"))
+    assert asked == ["yeoh"]
+
+
+@pytest.mark.parametrize("all_of_them", [False, True])
+def test_what_the_starts_cost_is_bounded_however_many_effects_there_are(monkeypatch, all_of_them: bool) -> None:  # type: ignore[no-untyped-def]
+    """Each step from a start is worth a curve for each coordinate."""
+    up = np.linspace(0.002, 0.06, 30)
+    d = np.concatenate([up, up[::-1]])
+    rig = Annulus(0.01, 0.035)
+    curve = Measurement(d, d * (1 + 50 * d), rig, Specimen("many", 50e-6), time=np.linspace(0, 59, 60))
+    occur = [n for n, e in components("effects").items() if e().unavailable(rig, curve.path) == ""]
+    effects = tuple(occur) if all_of_them else ("force_offset",)
+    looked_at: list[int] = []
+
+    def polish(objective: Objective, x: np.ndarray, *_: Any) -> tuple[np.ndarray, float, str]:
+        looked_at.append(x.size)
+        return x, float(np.linalg.norm(objective(x)[0])), "converged"
+
+    monkeypatch.setattr(Objective, "polish", polish)
+    monkeypatch.setattr(searches, "_at_bound", lambda _, x, __: np.zeros(x.size, bool))
+    fit(curve, hypothesis("neo_hookean", effects, convexity="none"))
+    cost = sum(looked_at[: -searches.POLISHED])
+    assert cost <= max(searches.SLOPES, searches.FEWEST * looked_at[0])
+    assert all_of_them == (looked_at[0] > 20)
+
+
 def test_where_there_is_no_fit_a_sentence_says_so(film) -> None:  # type: ignore[no-untyped-def]
     found = fit(film("neo_hookean", (7.5,), noise=0.02), hypothesis("yeoh"), solve=without_slopes(-1.0))
     assert np.isnan(found.rmse_N)
     assert "no yeoh film was found that reaches 50 mm with finite forces and slopes" in found.status
     assert all(e.sd is None for e in found.parameters.values())
+
+
+def test_what_the_data_do_not_see_has_an_error_beyond_all_bounds_and_no_warning() -> None:
+    """A misfit of kilonewtons: the fuzz, seed 22217, heard an overflow."""
+    slopes = np.column_stack([np.ones(5), np.zeros(5)])
+    with np.errstate(over="raise"):
+        found = searches._covariance(np.full(5, 1e6), slopes, np.zeros(2, bool))
+    assert found[0, 0] == pytest.approx(1e12 / 3)
+    assert 1e100 < found[1, 1] < np.inf
 
 
 def test_valleys_looked_for_with_a_part_lead_to_the_optimum_of_all(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -62,10 +62,10 @@ def call(case: Case, folder: Path, limit: float | None = None) -> Row:
         try:
             with _limited(limit or LIMIT[case.verb]):
                 code, refused = _exit_status(arguments)
-        except TimeUpError:
-            fault = "timeout", f"no answer in {limit or LIMIT[case.verb]:g} s, at {_place(sys.exc_info()[1])}"
-        except Exception as error:
+        except (TimeUpError, Exception) as error:
             fault = "traceback", f"{type(error).__name__}: {_one_line(str(error))} at {_place(error)}"
+            if _is_time_up(error):
+                fault = "timeout", f"no answer in {limit or LIMIT[case.verb]:g} s, at {_place(error)}"
     seconds = time.process_time() - begun
     if refused is not None and (place := _place(refused)).endswith(SOLVER):
         fault = "inner refusal", f"{_one_line(str(refused))} At {place}"
@@ -106,6 +106,11 @@ def _limited(seconds: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.signal(signal.SIGPROF, before)
+
+
+def _is_time_up(error: BaseException | None) -> bool:
+    """Also where compiled code was interrupted: Python then complains of a result with an exception set."""
+    return isinstance(error, TimeUpError) or (error is not None and _is_time_up(error.__cause__))
 
 
 def _place(error: BaseException | None) -> str:

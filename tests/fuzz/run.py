@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import argparse
 import csv
+import math
 import shlex
 import sys
 import tempfile
+import time
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, fields
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 
 from tests.fuzz.calls import GOOD, LIMIT, Row, call
@@ -46,10 +49,10 @@ def stored(path: Path) -> dict[int, Row]:
     }
 
 
-def run(cases: Iterable[Case], path: Path, jobs: int, limit: float | None = None) -> None:
-    """Run what is not stored yet, at most ``limit`` seconds a call."""
-    done = stored(path)
-    todo = (c for c in cases if c.seed not in done)
+def run(cases: Iterable[Case], path: Path, jobs: int, limit: float | None = None, seconds: float = math.inf) -> None:
+    """Run what is not stored yet, at most ``limit`` seconds a call; one process begins none after ``seconds``."""
+    done, end = stored(path), time.monotonic() + seconds
+    todo = takewhile(lambda _: time.monotonic() < end, (c for c in cases if c.seed not in done))
     path.parent.mkdir(parents=True, exist_ok=True)
     new = not path.exists() or path.stat().st_size == 0
     with path.open("a", encoding="utf-8", newline="") as file:
@@ -90,8 +93,8 @@ def table(rows: Iterable[Row]) -> str:
     return "\n".join(lines)
 
 
-def page(rows: Iterable[Row], first: int, count: int) -> str:
-    """docs/studies/fuzz.md: what was called, and what came of it."""
+def page(rows: Iterable[Row], first: int, count: int, note: str = "") -> str:
+    """docs/studies/fuzz.md: what was called, what came of it, and in ``note`` what else is to be said."""
     rows = list(rows)
     good, given_up = sum(r.outcome in GOOD for r in rows), sum(r.outcome == "timeout" for r in rows)
     return (
@@ -103,7 +106,7 @@ def page(rows: Iterable[Row], first: int, count: int) -> str:
         "says what, where and how to mend it. A call is given up after "
         f"{', '.join(f'{s:g} s ({verb})' for verb, s in LIMIT.items())} of computing.\n\n"
         f"{len(rows)} of {count} seeds were run; {good} calls were answered or refused, {given_up} given up.\n\n"
-        f"{table(rows)}\n"
+        f"{note}{2 * chr(10) if note else ''}{table(rows)}\n"
     )
 
 
@@ -115,19 +118,24 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--only", choices=sorted(set(VERBS)), help="only the calls of this verb")
     parser.add_argument("--limit", type=float, help="seconds of a call; without, those of its verb")
+    parser.add_argument(
+        "--seconds", type=float, default=math.inf, help="no call is begun once they have passed (one process)"
+    )
     parser.add_argument("--results", type=Path, default=RESULTS, help="CSV, one row a call")
     parser.add_argument("--table", type=Path, help="write what came of all calls here, as Markdown")
+    parser.add_argument("--note", default="", help="what else the table is to say, as Markdown")
     parser.add_argument("--write", type=Path, help="write the files of the first call here, and print its command")
     asked = parser.parse_args(arguments)
     if asked.write is not None:
         print(shlex.join(["bayesmembrane", *case(asked.first).arguments(asked.write)]))
         return 0
     seeds = range(asked.first, asked.first + asked.count)
-    run((c for c in map(case, seeds) if asked.only in (None, c.verb)), asked.results, asked.jobs, asked.limit)
+    cases = (c for c in map(case, seeds) if asked.only in (None, c.verb))
+    run(cases, asked.results, asked.jobs, asked.limit, asked.seconds)
     rows = [r for r in stored(asked.results).values() if r.seed in seeds and asked.only in (None, r.verb)]
     print(table(rows))
     if asked.table is not None:
-        asked.table.write_text(page(rows, asked.first, asked.count), encoding="utf-8")
+        asked.table.write_text(page(rows, asked.first, asked.count, asked.note), encoding="utf-8")
     return int(any(r.outcome not in GOOD for r in rows))
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.fuzz import calls
 from tests.fuzz.calls import GOOD, Row, call, contradiction, judged
 from tests.fuzz.cases import Case, case
 from tests.fuzz.run import page, run, stored, table
@@ -40,6 +41,7 @@ FIXED = (
     247,
     21010,
     21035,
+    22217,
 )
 
 
@@ -94,6 +96,25 @@ def test_the_judge_knows_a_contradiction() -> None:
     assert "p-value" in contradiction("diagnose", found | {"p_value": None})
 
 
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_call_that_is_given_up_is_no_traceback(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, compiled: bool
+) -> None:
+    """Where compiled code is interrupted, Python raises another error from the one that was meant."""
+
+    def main() -> None:
+        try:
+            raise calls.TimeUpError
+        except calls.TimeUpError as error:
+            if compiled:
+                raise SystemError("returned a result with an exception set") from error
+            raise
+
+    monkeypatch.setattr(calls, "main", main)
+    row = call(Case(7, "fit", (("curve.csv", ""), ("film.toml", "")), (), "empty"), tmp_path)
+    assert (row.outcome, row.sentence.partition(",")[0]) == ("timeout", "no answer in 60 s")
+
+
 def test_a_run_goes_on_where_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     results = tmp_path / "results.csv"
     refused = Case(7, "fit", (("curve.csv", ""), ("film.toml", "")), ("--material", "gent"), "empty")
@@ -106,11 +127,18 @@ def test_a_run_goes_on_where_it_was(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "| fit | 1 | " in table(stored(results).values())
 
 
+def test_no_call_is_begun_once_the_time_is_over(tmp_path: Path) -> None:
+    results = tmp_path / "results.csv"
+    run([Case(7, "fit", (("curve.csv", ""), ("film.toml", "")), (), "empty")], results, 1, seconds=0)
+    assert stored(results) == {}
+
+
 def test_the_page_says_how_many_ran_and_what_failed() -> None:
     rows = [
         Row(7, "fit", "a film", 0, 1.0, "answered", ""),
         Row(8, "sample", "a film", 1, 2.0, "traceback", "ZeroDivisionError: nobody foresaw this"),
     ]
-    told = page(rows, 7, 500)
+    told = page(rows, 7, 500, "The first ran before it was mended.")
+    assert "given up.\n\nThe first ran before it was mended.\n\n| verb |" in told
     assert "2 of 500 seeds were run; 1 calls were answered or refused, 0 given up." in told
     assert "traceback: ZeroDivisionError: nobody foresaw this\n  seeds 8" in told

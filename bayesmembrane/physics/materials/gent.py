@@ -33,7 +33,7 @@ class Gent(Material):
     scales: ClassVar[tuple[int, ...]] = (1, 0)
     coordinates: ClassVar[tuple[Parameter, ...]] = (
         LN_GD,
-        Parameter("ln_jm", "-", "logarithm of the limit of I1 - 3", Normal(np.log(50.0), 1.5), (-3.0, 16.0)),
+        Parameter("ln_jm", "-", "logarithm of the limit of I1 - 3", Normal(np.log(50.0), 1.5), (-3.0, 23.0)),
     )
 
     @staticmethod

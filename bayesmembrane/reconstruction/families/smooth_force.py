@@ -8,14 +8,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.reconstruction.families.base import CurveFamily
-from bayesmembrane.reconstruction.families.wiener import LENGTH, wiener_basis
-from bayesmembrane.reconstruction.simulations import Simulations
+from bayesmembrane.reconstruction.families.wiener import LENGTH, Spanned, wiener_basis
 
 LEVEL = 0.05  # N, prior standard deviation of the force at zero
 
 
-class SmoothForce(CurveFamily):
+class SmoothForce(Spanned):
     """g = a line plus an integrated Wiener process; nothing is known at zero, neither its place nor a cubic start.
 
     The slope changes in proportion to a typical one: root mean square of the slopes of the simulated curves, the
@@ -25,9 +23,6 @@ class SmoothForce(CurveFamily):
 
     name = "smooth_force"
     title = "smooth force"
-
-    def __init__(self, simulations: Simulations) -> None:
-        self.simulations = simulations
 
     @cached_property
     def _basis(self) -> CubicSpline:
@@ -47,22 +42,8 @@ class SmoothForce(CurveFamily):
     def middle(self) -> float:
         return 0.4
 
-    @property
-    def size(self) -> int:
-        return int(self._basis.c.shape[-1])
-
-    @property
-    def free(self) -> slice:
-        return slice(2, self.size)
-
     def force(self, c: Array, size: Array, x: Array) -> tuple[Array, Array, Array]:
-        scaled = c.copy()
-        scaled[:, self.free] *= size[:, None]
-        shape = self._basis(x)
-        force = np.einsum("bnj,bj->bn", shape, scaled)
-        slope = np.einsum("bnj,bj->bn", self._basis(x, 1), scaled)
-        shape[:, :, self.free] *= size[:, None, None]
-        return force, slope, shape
+        return self.spanned(c, size, x)
 
     def stride(self, moved: Array, force: Array, step: Array) -> float:
         """All of it: the forces are linear in the unknowns."""

@@ -132,3 +132,26 @@ def test_next_to_a_film_that_is_lost_slopes_are_those_of_the_side_that_is_there(
     assert np.all(np.isfinite(curves.sensitivity))
     # The force is linear in all constants together: sum c_i dF/dc_i = F, to first order in the step.
     assert (curves.sensitivity @ film)[0] == pytest.approx(curves.force[0], rel=0.05)
+
+
+def test_slopes_are_sought_where_there_is_a_force_and_nowhere_else(monkeypatch):
+    """A lost deflection costs as much as many that are found, and would again for every step of every parameter."""
+    lost, radii = [16.94, -4.9, 0.70933148], (0.008318723918681005, 0.04223791947291318)
+    film = [16.94512975, -4.12303456, 0.70933148]
+    d = np.linspace(0.0, 0.0225, 9)[1:]
+    question = request(Yeoh, [film, lost], d, *radii, sensitivities=True)
+    forces = shooting.solve(replace(question, sensitivities=False))
+    assert forces.ok[0].all()
+    assert 0 < np.count_nonzero(forces.ok[1]) < d.size
+    solved, one_film = [], shooting._film
+
+    def listening(asked, film, *more):
+        solved.append(set(asked.deflection[film]))
+        return one_film(asked, film, *more)
+
+    monkeypatch.setattr(shooting, "_film", listening)
+    curves = shooting.solve(question)
+    assert set().union(*solved[3::2]) == set(d[forces.ok[1]])
+    np.testing.assert_array_equal(np.isfinite(curves.sensitivity).all(axis=2), forces.ok)
+    alone = shooting.solve(question.of([0]))
+    np.testing.assert_array_equal(curves.sensitivity[:1], alone.sensitivity)

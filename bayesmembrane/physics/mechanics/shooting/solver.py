@@ -37,13 +37,13 @@ def solve(request: Request, rtol: float = RTOL) -> Curves:
 
         F = 2 pi R1 P1 sin(theta) at R = R1, with (l1, theta)(R1) such that l2 = l0 and h = delta at the ring.
 
-    Sensitivities, if asked for, are differences in each parameter: central, or one-sided next to a film that is lost.
-    No film is spared.
+    Sensitivities, if asked for, are differences in each parameter, where there is a force: central, or one-sided next
+    to a film that is lost. No film is spared.
     """
     locks = locking_deflection(extensibility(request), request.prestretch, request.ratio)
     lines = np.stack([_film(request, i, float(locks[i]), rtol) for i in range(request.parameters.shape[0])])
     curves = _curves(request, lines)
-    return replace(curves, sensitivity=_differences(request, rtol)) if request.sensitivities else curves
+    return replace(curves, sensitivity=_where_ok(request, curves, rtol)) if request.sensitivities else curves
 
 
 def _film(request: Request, film: int, lock: float, rtol: float) -> Array:
@@ -105,6 +105,18 @@ def _curves(request: Request, lines: Array) -> Curves:
         convexity=column(k.CONVEX),
         energy=column(k.STORED, 2 * np.pi * length**2),
     )
+
+
+def _where_ok(request: Request, curves: Curves, rtol: float) -> Array:
+    """dF/dp (B, N, n) where the forces are, else nan: what cannot be solved costs most, and would for every step."""
+    out = np.full((*curves.force.shape, request.parameters.shape[1]), np.nan)
+    films = np.flatnonzero(np.any(curves.ok, axis=1))
+    if films.size:
+        some, ok = request.of(films), curves.ok[films]
+        first = np.take_along_axis(some.deflection, np.argmax(ok, axis=1)[:, None], axis=1)
+        there = _differences(replace(some, deflection=np.where(ok, some.deflection, first)), rtol)
+        out[films] = np.where(ok[:, :, None], there, np.nan)
+    return out
 
 
 def _differences(request: Request, rtol: float) -> Array:
