@@ -250,6 +250,20 @@ def diagnose(measurement: Measurement, claim: Hypothesis | Question, work: Work)
     return kept("diagnosis", found, document(found), what, work.out)
 
 
+@dataclass(frozen=True)
+class Foretold:
+    """Other tests of the same material, of which a loop predicts the readings.
+
+    scatter : relative standard deviation by which forces of two specimens differ
+    """
+
+    tests: tuple[Measurement, ...] = ()
+    scatter: float = 0.0
+
+
+NOTHING_FORETOLD = Foretold()
+
+
 def loop(
     measurement: Measurement,
     claim: Hypothesis | Question,
@@ -258,17 +272,23 @@ def loop(
     adapt_noise: bool = True,
     runs: Path | None = None,
     rivals: int = 0,
+    foretold: Foretold = NOTHING_FORETOLD,
 ) -> Answer[Loop]:
     """Diagnose, add what is missing, calibrate again; its runs lie in ``runs``, or where the answers do.
 
-    Of an ambiguous answer the first ``rivals`` members are sampled, too.
+    Of an ambiguous answer the first ``rivals`` members are sampled, too; other tests are predicted from the first.
     """
-    how = LoopSettings(work.seed, runs or work.out, work.ess, adapt_noise, leaders=rivals)
+    tests, scatter = foretold.tests, foretold.scatter
+    how = LoopSettings(
+        work.seed, runs or work.out, work.ess, adapt_noise, leaders=rivals, predict=tests, scatter=scatter
+    )
     question = claim if isinstance(claim, Question) else Question(claim)
     label = question.hypothesis.label()
     settings = {"seed": work.seed, "ess": work.ess, "adapt_noise": adapt_noise, "declared": question.declared}
     settings |= {"rivals": rivals} if rivals else {}
-    what = asked("loop", run_loop, [measurement], [question.hypothesis], settings, library())
+    settings |= {"scatter": scatter} if tests else {}
+    what = asked("loop", run_loop, [measurement, *tests], [question.hypothesis], settings, library())
+    what = replace(what, specimen=measurement.specimen.name, end=float(np.max(measurement.deflection)))
     if (stored := held("loop", what, work.out)) is not None:
         return stored
     found = run_loop(measurement, question, how, tell=lambda text: work.tell(label, text))

@@ -227,15 +227,20 @@ def loop(
     ess: float = 1000.0,
     seed: int = 0,
     adapt_noise: bool = True,
+    predict: Sequence[Measurement] = (),
+    scatter: float = 0.0,
     out: Folder | None = None,
 ) -> Loop:
     """Diagnose, sample, add what is missing, and again, until adequate or abstaining.
 
     Without a ``hypothesis`` it begins with the most probable energy. ``adapt_noise`` samples with correlated noise
     where neighbouring readings turn out to be correlated. Of an ambiguous answer nothing more is sampled: its members
-    are hypotheses that `sample` takes.
+    are hypotheses that `sample` takes. ``predict`` are other tests of the same material, which are not fitted but
+    predicted; forces of two specimens differ by ``scatter``, a relative standard deviation.
     """
-    return analyses.loop(measurement, _asked(hypothesis), _work(seed, out, ess), adapt_noise=adapt_noise).result
+    foretold = analyses.Foretold(tuple(predict), scatter)
+    work = _work(seed, out, ess)
+    return analyses.loop(measurement, _asked(hypothesis), work, adapt_noise=adapt_noise, foretold=foretold).result
 
 
 def _asked(hypothesis: Hypothesis | None) -> Question:

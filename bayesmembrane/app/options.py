@@ -113,6 +113,19 @@ class CurveOptions(OptionGroup):
         return measurement
 
 
+def curves_with_specimens(words: Sequence[str] | None, option: str) -> list[Measurement]:
+    """The measurements of CURVE:SPECIMEN; raises `SettingsError` where a colon is missing."""
+    found = []
+    for word in words or []:
+        curve, _, specimen = word.rpartition(":")
+        if not curve:
+            raise SettingsError(
+                f'"{word}" is no curve with its specimen file', option, f"write {option} strip.csv:strip.toml"
+            )
+        found.append(CurveOptions(Path(curve), Path(specimen)).read())
+    return found
+
+
 @dataclass(frozen=True)
 class TestsOptions(OptionGroup):
     """A measured curve, or several tests of one material."""
@@ -161,13 +174,7 @@ class TestsOptions(OptionGroup):
         if self._is_project and self.then:
             raise SettingsError("a project lists its tests itself", "--then", "leave it out")
         found = list(read_project(self.curve)) if self._is_project else [Listed("", used.of(self.read()))]
-        for words in self.others or []:
-            curve, _, specimen = words.rpartition(":")
-            if not curve:
-                raise SettingsError(
-                    f'"{words}" is no curve with its specimen file', "--with", "write --with strip.csv:strip.toml"
-                )
-            found.append(Listed("", CurveOptions(Path(curve), Path(specimen)).read()))
+        found += [Listed("", measurement) for measurement in curves_with_specimens(self.others, "--with")]
         if self._is_project:
             for test in found:
                 for left_aside in test.measurement.provenance.notes:

@@ -20,6 +20,7 @@ from bayesmembrane.data.thinning import thinned
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.explanation.case import Question, Tell
 from bayesmembrane.diagnosis.left.discrepancy import Discrepancy, discrepancy
+from bayesmembrane.diagnosis.other_tests import OtherTest, check, predicted
 from bayesmembrane.diagnosis.reference.outliers import without_outliers
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned, thinning
 from bayesmembrane.diagnosis.thresholds import LOOP, TINY
@@ -76,11 +77,13 @@ class Loop(Showable):
     """All rounds, the last one being adequate or abstaining; ``left`` is kept, unnamed, where it abstains.
 
     thinned : what was taken of a measurement with too many readings; else None
+    others : tests that no fit saw, with what the first diagnosis predicts of them
     """
 
     rounds: tuple[Round, ...]
     left: Discrepancy | None
     thinned: Thinned | None = None
+    others: tuple[OtherTest, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,8 @@ class LoopSettings:
     most_rounds : after which it stops
     leaders : members of an ambiguous answer that are sampled, the most probable first; the others are fitted only
     solve : what solves films
+    predict : other tests of the same material, which are predicted
+    scatter : relative standard deviation by which forces of two specimens differ
     """
 
     seed: int = 0
@@ -104,6 +109,8 @@ class LoopSettings:
     most_rounds: int = LOOP.most_rounds
     leaders: int = LOOP.leaders
     solve: Solve = api.solve
+    predict: tuple[Measurement, ...] = ()
+    scatter: float = 0.0
 
 
 def loop(
@@ -121,10 +128,13 @@ def loop(
     there before. Of an ambiguous answer as many are sampled as the settings say. More readings than `thinning.MOST`
     are thinned and single outliers set aside, for all of it. Raises what `sample` and `diagnose` raise.
     """
+    how = settings or LoopSettings()
+    for other in how.predict:
+        check(measurement, other, how.scatter)
     part = thinned(measurement)
     question = hypothesis if isinstance(hypothesis, Question) else Question(hypothesis)
     kept, aside = without_outliers(part)
-    closing = _Closing(kept, settings or LoopSettings(), tell or (lambda _: None), watch)
+    closing = _Closing(kept, how, tell or (lambda _: None), watch)
     found = closing.diagnosed(question)
     noise = _noise_for(found, question.hypothesis) if closing.settings.adapt_noise else question.hypothesis.noise
     stage = closing.sampled(replace(found.null.hypothesis, noise=noise))
@@ -141,7 +151,8 @@ def loop(
             break
         seen.add(following.label())
         stage, found = after, closing.diagnosed(replace(question, hypothesis=following, declared=True))
-    return Loop(tuple(rounds), closing.left(rounds[-1].diagnosis), thinning(measurement, part))
+    others = closing.foretold(rounds[0].diagnosis)
+    return Loop(tuple(rounds), closing.left(rounds[-1].diagnosis), thinning(measurement, part), others)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +179,11 @@ class _Closing:
         if run.interrupted:
             raise KeyboardInterrupt
         return _stage(run, s.solve, s.seed)
+
+    def foretold(self, first: Diagnosis) -> tuple[OtherTest, ...]:
+        """The other tests, by all that the first diagnosis holds probable."""
+        s = self.settings
+        return tuple(predicted(first, other, s.scatter, s.seed) for other in s.predict)
 
     def left(self, last: Diagnosis) -> Discrepancy | None:
         """What is kept without a name, where the loop abstains."""

@@ -6,6 +6,7 @@ from typing import Any
 
 from bayesmembrane.diagnosis.left.discrepancy import Discrepancy
 from bayesmembrane.diagnosis.loop import Loop, Round, Stage, moved
+from bayesmembrane.diagnosis.other_tests import OtherTest
 from bayesmembrane.words import diagnosis as words
 from bayesmembrane.words.seen import Seen, seen
 
@@ -16,7 +17,32 @@ def document(found: Loop) -> dict[str, Any]:
         "rounds": [round_document(r) for r in found.rounds],
         "sentence": sentence(found),
         "left": None if found.left is None else left_sentence(found.left, seen(found.rounds[0].diagnosis.measurement)),
+        "predicted": [other_document(other) for other in found.others],
     }
+
+
+def other_document(found: OtherTest) -> dict[str, Any]:
+    """What was predicted of a test that no fit saw."""
+    return {
+        "specimen": found.measurement.specimen.name,
+        "points": len(found.measurement),
+        "rmse_before_N": found.rmse_before,
+        "rmse_after_N": found.rmse_after,
+        "inside_90": found.covered,
+        "scatter": found.scatter,
+        "sentence": other_sentence(found),
+    }
+
+
+def other_sentence(found: OtherTest) -> str:
+    """The same in words."""
+    how = seen(found.measurement)
+    apart = f" (specimens {found.scatter:.0%} apart)" if found.scatter else ""
+    return (
+        f"{found.measurement.specimen.name}, which no fit saw, is predicted to {how.error(found.rmse_after)} root mean "
+        f"square ({how.error(found.rmse_before)} by the model as given); the 90 % band{apart} holds "
+        f"{found.covered:.0%} of its points."
+    )
 
 
 def round_document(found: Round) -> dict[str, Any]:

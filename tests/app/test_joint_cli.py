@@ -98,6 +98,20 @@ def test_what_cannot_be_is_said_in_a_sentence(run: Run, words: tuple[str, ...], 
     assert match in err + out
 
 
+@pytest.mark.parametrize(
+    ("words", "match"),
+    [
+        (("--predict", "sheet.csv"), "is no curve with its specimen file"),
+        (("--predict", "sheet.csv:sheet.toml"), "another kind of rig"),
+        (("--predict", "strip.csv:strip.toml", "--scatter", "-1"), "scatter of -1"),
+    ],
+)
+def test_a_loop_says_which_test_it_cannot_predict(run: Run, words: tuple[str, ...], match: str) -> None:
+    code, _, err = run("loop", "strip.csv", "--specimen", "strip.toml", *words)
+    assert code == 1
+    assert match in err
+
+
 def test_runs_of_specimens_make_a_population(run: Run, short_walks: None) -> None:
     runs = []
     for name in ("strip", "sheet"):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.result import Diagnosis
@@ -15,12 +14,13 @@ DRAWS, INTERVAL = 400, (0.05, 0.95)
 PLACES = (0.5, 1.0)  # of the largest deflection
 
 
-def covered(found: Diagnosis, candidate: Candidate, measurement: Measurement, data: Dataset) -> dict[str, bool]:
+def covered(found: Diagnosis, candidate: Candidate, data: Dataset) -> dict[str, bool]:
     """{parameter, or "force at half" and "force at the end": True if its interval holds the truth}.
 
-    Intervals are those of Laplace's approximation. Ogden's terms may change places, so only its forces are judged.
+    Intervals are those of Laplace's approximation, of the readings that were not set aside. Ogden's terms may change
+    places, so only its forces are judged.
     """
-    covariance = Search(measurement, found.noise).covariance(candidate)
+    covariance = Search(found.measurement, found.noise).covariance(candidate)
     rng = np.random.default_rng(data.truth["seed"])
     draws = rng.multivariate_normal(candidate.x, covariance, DRAWS, method="eigh")
     films = candidate.hypothesis.films(draws)

@@ -54,10 +54,7 @@ def run_case(case: Case) -> dict[str, Any]:
     seconds = time.process_time() - begun
     answer = {"seconds": seconds} | answer_of(found, data)
     if found.verdict == "named" and data.truth["family"] == case.material:
-        answer |= {
-            f"covered_{k}": covered(found, c, measurement, data)
-            for k, c in (("null", found.null), ("best", found.best))
-        }
+        answer |= {f"covered_{k}": covered(found, c, data) for k, c in (("null", found.null), ("best", found.best))}
     return head | truth_of(data) | answer
 
 

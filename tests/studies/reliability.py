@@ -90,7 +90,7 @@ def run_case(case: Case, energy: str, source: str, half: str) -> Row:
     except BayesmembraneError as error:
         return head | {"verdict": "error", "effects": [], "sentence": str(error), "probabilities": None}
     row = head | {"seconds": time.process_time() - begun} | answer_row(document(found)) | {"terms": terms(found)}
-    return row | intervals(row, found, measurement, data)
+    return row | intervals(row, found, data)
 
 
 def diagnosed(measurement: Measurement, material: str | None) -> Diagnosis:
@@ -108,11 +108,11 @@ def terms(found: Diagnosis) -> list[tuple[str, str, float]]:
     ]
 
 
-def intervals(row: Row, found: Diagnosis, measurement: Measurement, data: Dataset | SecondDataset) -> dict[str, Any]:
+def intervals(row: Row, found: Diagnosis, data: Dataset | SecondDataset) -> dict[str, Any]:
     """Whether the 90 % intervals hold the film that was put in, where the truth is named with its energy."""
     if not right_name(row) or found.best.hypothesis.material.name != row["family"]:
         return {}
-    return {"covered": covered(found, found.best, measurement, data)}
+    return {"covered": covered(found, found.best, data)}
 
 
 def key(case: Case, energy: str) -> str:

@@ -15,6 +15,7 @@ from bayesmembrane.app.options import (
     RangeOption,
     SamplingOptions,
     StoredOutputOptions,
+    curves_with_specimens,
 )
 from bayesmembrane.app.terminal import answer, lines, resumable, say
 from bayesmembrane.app.verbs.diagnose import say_thinning
@@ -33,6 +34,15 @@ class EndOptions(StoredOutputOptions):
     rivals: Annotated[
         int, typer.Option("--rivals", min=0, help="Members of an ambiguous answer that are sampled, too.")
     ] = 0
+    predict: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--predict", help="Another test, CURVE:SPECIMEN, that is not fitted but predicted; may be given again."
+        ),
+    ] = None
+    scatter: Annotated[
+        float, typer.Option("--scatter", help="By how much forces of two specimens differ, relative: 0.05.")
+    ] = 0.0
     report_folder: Annotated[Path, typer.Option("--report", help="Folder of the page.")] = Path("reports/loop")
 
 
@@ -56,7 +66,8 @@ def verb(
     with resumable(output.folder), lines() as tell:
         work = analyses.Work(output.seed, output.folder, sampling.ess, tell)
         question = Question(claim, material.declared)
-        found = analyses.loop(measurement, question, work, adapt_noise=adapt, rivals=output.rivals)
+        foretold = analyses.Foretold(tuple(curves_with_specimens(output.predict, "--predict")), output.scatter)
+        found = analyses.loop(measurement, question, work, adapt_noise=adapt, rivals=output.rivals, foretold=foretold)
     page = write_report([*analyses.loop_runs(found.result), found.result], output.report_folder)
     document = {**found.document, "report": str(page)}
     answer(document, output.as_json, lambda: show(document, measurement))
@@ -67,4 +78,6 @@ def show(document: dict[str, Any], measurement: Measurement) -> None:
     for number, round_ in enumerate(document["rounds"], 1):
         say(f"Round {number}")
         show_diagnosis(round_, measurement)
+    for other in document["predicted"]:
+        say(other["sentence"])
     say(f"The report lies in {document['report']}")

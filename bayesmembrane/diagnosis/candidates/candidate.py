@@ -91,6 +91,15 @@ def with_effects(hypothesis: Hypothesis, effects: Sequence[Effect]) -> Hypothesi
     return replace(hypothesis, effects=(*hypothesis.effects, *effects))
 
 
+def without_effect(candidate: Candidate, name: str) -> tuple[Hypothesis, Array]:
+    """The hypothesis of a candidate without one of its effects, and the coordinates of the rest where they are."""
+    h = candidate.hypothesis
+    owner = np.repeat(candidate.names, [len(e.coordinates) for e in h.effects])
+    keep = np.ones(candidate.x.size, dtype=bool)
+    keep[h.material_size : h.material_size + owner.size] = owner != name
+    return replace(h, effects=tuple(e for e in h.effects if e.name != name)), candidate.x[keep]
+
+
 def available(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
     """Effects of the library that can be seen in this test, can be told from the material, and are not there yet."""
     thin = measurement.specimen.thickness

@@ -103,6 +103,14 @@ class Search:
             return None
         return self._candidate(objective, axes, u[int(np.argmin(size))])
 
+    def at(self, hypothesis: Hypothesis, x: Array) -> Candidate | None:
+        """The hypothesis weighed at the coordinates x (k,), without a search; None if no film gets there."""
+        objective = Objective(hypothesis, self.measurement, "euclidean", self.quick)
+        if not np.all(np.isfinite(objective.batch(x[None, :])[0])):
+            return None
+        axes = standard(hypothesis, self.measurement)
+        return self._candidate(objective, axes, axes.to_u(x))
+
     def polished(self, found: Candidate) -> Candidate:
         """The same hypothesis, searched on from where it is with the form error that it shows.
 

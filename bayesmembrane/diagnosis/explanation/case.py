@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,6 +60,7 @@ class OpenCase:
     null : the one of these that was asked about: with the declared energy, or else the most probable
     effects : of the library, that could be at work
     signatures : of these effects beside the null model, without the invisible ones
+    elsewhere : names of those that are invisible there, and leave a trace beside another energy
     detection : tests of the null model
     rng : draws of the tests
     tell : what is being done
@@ -72,6 +73,7 @@ class OpenCase:
     null: Candidate
     effects: tuple[Effect, ...]
     signatures: tuple[Signature, ...]
+    elsewhere: frozenset[str]
     detection: Detection
     rng: np.random.Generator
     tell: Tell
@@ -82,8 +84,11 @@ class OpenCase:
 
     @property
     def visible(self) -> list[Effect]:
-        """Those of the effects that leave a trace in this test."""
-        names = {s.effect for s in self.signatures}
+        """Those of the effects that leave a trace in this test, beside one energy at least.
+
+        An energy with many parameters may follow an effect wholly, and be an unlikely one for it.
+        """
+        names = {s.effect for s in self.signatures} | self.elsewhere
         return [e for e in self.effects if e.name in names]
 
     @property
@@ -118,9 +123,21 @@ def opened(measurement: Measurement, question: Question, seed: int, solve: Solve
     effects = tuple(available(measurement, hypothesis))
     rng = np.random.default_rng([seed, 7])
     found = signatures(search, null, effects)
+    elsewhere = _seen_elsewhere(search, plain, effects, {s.effect for s in found})
     seen = whitened(null.residual, null.slopes, smooth, search.noise.cautious())
     detection = detect(measurement, seen, found, rng)
-    return OpenCase(question, search, smooth, plain, null, effects, tuple(found), detection, rng, tell)
+    return OpenCase(question, search, smooth, plain, null, effects, tuple(found), elsewhere, detection, rng, tell)
+
+
+def _seen_elsewhere(
+    search: Search, plain: Mapping[str, Candidate], effects: Sequence[Effect], seen: Collection[str]
+) -> frozenset[str]:
+    """Names of the effects that are not ``seen``, and leave a trace beside one of the plain fits."""
+    hidden = {e.name: e for e in effects if e.name not in seen}
+    for c in sorted(plain.values(), key=lambda c: c.x.size):
+        for s in signatures(search, c, list(hidden.values())):
+            hidden.pop(s.effect, None)
+    return frozenset(e.name for e in effects if e.name not in seen and e.name not in hidden)
 
 
 def renewed(search: Search, smooth: Array, best: Candidate) -> Search:

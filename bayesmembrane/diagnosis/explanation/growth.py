@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects, without_effect
 from bayesmembrane.diagnosis.candidates.search import Search, starts_with
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.standard import expected_size
@@ -102,8 +102,37 @@ def grown(case: OpenCase) -> Grown:
         out.polish(size)
         if not _worth_more(out, size):
             break
+    _with_less(out)
     _with_twins(out)
     return out
+
+
+def _with_less(out: Grown) -> None:
+    """The most probable sets without each of their effects, from where the others are beside it.
+
+    A search from the plain fit may end where the material was bent to imitate what is missing; one from a larger set
+    does not. Without this, effects that do nothing are named for having led the search.
+    """
+    for size in range(BELIEFS.most, 0, -1):
+        best = max(c.log_evidence for c in out.found.values())
+        starts: dict[Key, Candidate] = {}
+        for start in _lessened(out, size, best):
+            key = _key(start)
+            if key not in starts or start.log_evidence > starts[key].log_evidence:
+                starts[key] = start
+        for key, start in starts.items():
+            before = out.found[key].log_evidence if key in out.found else -np.inf
+            if start.log_evidence > max(best - GROWTH.less_reach, before - GROWTH.less_gain):
+                out.add(out.search.polished(start))
+
+
+def _lessened(out: Grown, size: int, best: float) -> Iterator[Candidate]:
+    """The first hypotheses of this size without one of their effects, the others as they are."""
+    given = out.case.null.names
+    for c in out.of_size(size)[: GROWTH.lessened]:
+        for name in [n for n in c.names if n not in given]:
+            if best - c.log_evidence < GROWTH.less_reach and (less := out.search.at(*without_effect(c, name))):
+                yield less
 
 
 def _with_twins(out: Grown) -> None:
@@ -138,7 +167,8 @@ def _promising(out: Grown, base: Candidate, size: int) -> list[Effect]:
     known = {frozenset(c.names) for c in out.of_size(size)}
     rest = [e for e in rest if frozenset((*base.names, e.name)) not in known]
     rest.sort(key=lambda e: -gains[e.name])
-    return [e for e in rest[: GROWTH.refits] if gains[e.name] > gains[rest[0].name] - GROWTH.refit_reach]
+    promising = [e for e in rest if gains[e.name] > max(GROWTH.promise, gains[rest[0].name] - GROWTH.refit_reach)]
+    return promising[: GROWTH.refits] if len(promising) > GROWTH.least_refits else rest[: GROWTH.least_refits]
 
 
 def first_order(search: Search, base: Candidate, effect: Effect) -> float:
@@ -182,9 +212,13 @@ def _bases(out: Grown, base: Candidate) -> list[Array]:
 
 
 def _with_other_energies(out: Grown, size: int) -> None:
-    """The most probable sets with every other energy, from that energy's own fit and the effects of the set's."""
+    """The most probable sets with every other energy, from that energy's own fit and the effects of the set's.
+
+    Sets that are no better than without one of their effects count as those, whatever the energy.
+    """
     names = list(out.case.plain)
-    for best in out.best_of_each_set(size)[: GROWTH.with_other_energies]:
+    tried = [c for c in out.best_of_each_set(size) if size == 1 or _gains(out, c)]
+    for best in tried[: GROWTH.with_other_energies]:
         for name in names:
             if (name, frozenset(best.names)) in out.found:
                 continue
@@ -192,6 +226,12 @@ def _with_other_energies(out: Grown, size: int) -> None:
             out.case.tell(f"trying {best.label} with the energy {plain.hypothesis.material.title}")
             out.add(_transplanted(out, best, plain))
         names = [n for n in names if _behind(out, best, n) < GROWTH.energy_reach]
+
+
+def _gains(out: Grown, c: Candidate) -> bool:
+    """True if a set is more probable than each of those with one effect less that were fitted."""
+    smaller = [f.log_evidence for (_, names), f in out.found.items() if names < frozenset(c.names)]
+    return c.log_evidence > max(smaller, default=-np.inf) + GROWTH.promise
 
 
 def _behind(out: Grown, best: Candidate, energy: str) -> float:

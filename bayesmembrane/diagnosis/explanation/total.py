@@ -15,7 +15,7 @@ from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown
-from bayesmembrane.diagnosis.explanation.twins import levelled, twins
+from bayesmembrane.diagnosis.explanation.twins import Stands, levelled, twins
 from bayesmembrane.diagnosis.thresholds import FOREIGN, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
 
@@ -148,13 +148,14 @@ def _raised(grown: Grown, weights: Mapping[int, float]) -> dict[frozenset[str], 
     """
     plain = grown.found[(grown.case.null.hypothesis.material.name, frozenset(grown.case.null.names))]
     before = max(grown.search.excess(plain), 1e-300)
-    total, left = {}, {}
+    total, stands = {}, {}
     for names in {names for _, names in grown.found}:
         same = [c for (_, own), c in grown.found.items() if own == names]
         total[names] = float(np.logaddexp.reduce([weights[id(c)] for c in same]))
         best = max(same, key=lambda c: weights[id(c)])
-        left[names] = grown.search.excess(best) / before if _plausible(best, grown.case.measurement) else np.inf
-    return levelled(total, left, twins(grown.case))
+        left = grown.search.excess(best) / before if _plausible(best, grown.case.measurement) else np.inf
+        stands[names] = Stands(left, best.log_evidence)
+    return levelled(total, stands, twins(grown.case))
 
 
 def _plausible(candidate: Candidate, measurement: Measurement) -> bool:

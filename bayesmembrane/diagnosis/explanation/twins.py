@@ -3,12 +3,13 @@
 Two effects are twins on a measurement where both change the curve by functions of the deflection alone that nearly
 coincide beside the plain model (`confounded`), or where one follows time and the other the way, and the disc moved at
 one speed without a hold. Laws of a library are close to what happens, not the same: of two sets that differ by twins,
-and leave nearly as little, none is told to be more than `BELIEFS.apart` times as probable as the other.
+and stand nearly as well, none is told to be more than `BELIEFS.apart` times as probable as the other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,16 +20,38 @@ from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.thresholds import TWINS
 
 Set = frozenset[str]
-Pairs = Mapping[Set, float]
-"""Pairs of effects, and which part of the misfit beyond noise the one may leave beyond the other and still be alike."""
+
+
+@dataclass(frozen=True)
+class Near:
+    """How nearly as well as the one a set with the other of two twins must stand, to be alike.
+
+    left : part of the squares beyond noise of the plain model that it may leave more
+    behind : ln of the Bayes factor by which it may be behind
+    """
+
+    left: float
+    behind: float = np.inf
+
+
+@dataclass(frozen=True)
+class Stands:
+    """How well a set of effects stands: the part of the squares beyond noise that it leaves, and its ln Z."""
+
+    left: float
+    log_evidence: float = 0.0
+
+
+Pairs = Mapping[Set, Near]
 
 
 def twins(case: OpenCase) -> Pairs:
     """The pairs that this test cannot tell apart."""
     still = {e.name for e in case.effects if not e.remembers}
-    out = {frozenset((a, b)): TWINS.alike for a, b, _ in confounded(case.signatures) if {a, b} <= still}
+    alike = Near(TWINS.alike, TWINS.behind)
+    out = {frozenset((a, b)): alike for a, b, _ in confounded(case.signatures) if {a, b} <= still}
     if one_speed(case.measurement):
-        out |= {frozenset((e.name, o)): TWINS.alike_in_time for e in case.effects for o in e.twins_at_one_speed}
+        out |= {frozenset((e.name, o)): Near(TWINS.alike_in_time) for e in case.effects for o in e.twins_at_one_speed}
     return out
 
 
@@ -51,11 +74,11 @@ def swapped(names: Set, pairs: Iterable[Set]) -> Iterator[tuple[str, str, Set]]:
             yield out, new, (names - {out}) | {new}
 
 
-def levelled(weights: Mapping[Set, float], left: Mapping[Set, float], pairs: Pairs) -> dict[Set, float]:
+def levelled(weights: Mapping[Set, float], stands: Mapping[Set, Stands], pairs: Pairs) -> dict[Set, float]:
     """By how much ln of a set's probability rises, so that none is `BELIEFS.apart` times less than a twin of it.
 
     weights : by set, ln of its probability, whatever the constant
-    left : by set, the part of the squares beyond noise that it leaves
+    stands : by set, how well it stands
     """
     out = {}
     for names, weight in weights.items():
@@ -63,9 +86,13 @@ def levelled(weights: Mapping[Set, float], left: Mapping[Set, float], pairs: Pai
             (
                 weights[other]
                 for old, new, other in swapped(names, pairs)
-                if other in weights and left[names] - left[other] < pairs[frozenset((old, new))]
+                if other in weights and _near(stands[names], stands[other], pairs[frozenset((old, new))])
             ),
             default=-np.inf,
         )
         out[names] = max(best - float(np.log(BELIEFS.apart)) - weight, 0.0)
     return out
+
+
+def _near(one: Stands, other: Stands, pair: Near) -> bool:
+    return one.left - other.left < pair.left and other.log_evidence - one.log_evidence < pair.behind

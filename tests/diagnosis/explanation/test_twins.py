@@ -5,14 +5,14 @@ import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.twins import levelled, one_speed, swapped
+from bayesmembrane.diagnosis.explanation.twins import Near, Stands, levelled, one_speed, swapped
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 
 A, B, C, D = (frozenset(names) for names in (["a"], ["b"], ["a", "c"], ["b", "c"]))
-PAIRS = {frozenset(("a", "b")): 0.05}
+PAIRS = {frozenset(("a", "b")): Near(0.05, behind=8.0)}
 UP = np.linspace(0.0, 0.03, 31)
 LEG = np.concatenate([UP, UP[-2::-1]])
 
@@ -22,7 +22,7 @@ def curve(deflection: np.ndarray, time: np.ndarray | None) -> Measurement:
 
 
 def odds(weights: dict[frozenset[str], float], left: dict[frozenset[str], float]) -> dict[frozenset[str], float]:
-    raised = levelled(weights, left, PAIRS)
+    raised = levelled(weights, {names: Stands(part) for names, part in left.items()}, PAIRS)
     return {names: weights[names] + raised[names] for names in weights}
 
 
@@ -38,11 +38,17 @@ def test_a_twin_that_leaves_much_more_is_told_apart() -> None:
     assert found[B] == -60.0
 
 
+@pytest.mark.parametrize(("behind", "told"), [(7.9, 0.0 - np.log(BELIEFS.apart)), (8.1, -60.0)])
+def test_a_twin_that_is_far_behind_is_told_apart(behind: float, told: float) -> None:
+    weights, stands = {A: 0.0, B: -60.0}, {A: Stands(0.01, -100.0), B: Stands(0.01, -100.0 - behind)}
+    assert weights[B] + levelled(weights, stands, PAIRS)[B] == pytest.approx(told)
+
+
 def test_levels_are_those_of_a_first_look_whoever_is_raised() -> None:
     """b is raised by a, and c by b as it was: no chain of twins lifts what nobody near has."""
-    pairs = {frozenset(("a", "b")): 0.05, frozenset(("b", "c")): 0.05}
+    pairs = {frozenset(("a", "b")): Near(0.05), frozenset(("b", "c")): Near(0.05)}
     weights = {A: 0.0, B: -60.0, frozenset(["c"]): -90.0}
-    raised = levelled(weights, dict.fromkeys(weights, 0.0), pairs)
+    raised = levelled(weights, dict.fromkeys(weights, Stands(0.0)), pairs)
     assert weights[frozenset(["c"])] + raised[frozenset(["c"])] == pytest.approx(-60.0 - np.log(BELIEFS.apart))
 
 

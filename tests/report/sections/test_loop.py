@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bayesmembrane.diagnosis.loop import Loop
+from bayesmembrane.diagnosis.other_tests import predicted
 from bayesmembrane.ground.stored import store
 from bayesmembrane.next_test.further import FurtherTest, Kind
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -20,6 +21,7 @@ from bayesmembrane.report.sections.diagnosis import place_of
 from bayesmembrane.report.sections.diagnosis.figures import Place, Residual, discrepancy_picture, residual_picture
 from bayesmembrane.report.sections.diagnosis.tables import confounded_table, power_table, ranking_table
 from bayesmembrane.report.sections.loop import LoopSection, residual_rows
+from bayesmembrane.report.sections.loop.others import others
 from bayesmembrane.report.sections.loop.tables import errors_table, moved_table, scores_table
 from bayesmembrane.report.sections.loop.way import waypoints
 from bayesmembrane.words import diagnosis as diagnosis_words
@@ -303,3 +305,22 @@ def test_a_stored_diagnosis_gives_the_same_page(tmp_path: Path, named: Loop) -> 
     store(tmp_path / "answer", "diagnosis", d, {})
     stored, held = (write_report([found], tmp_path / "page").read_text() for found in (tmp_path / "answer", d))
     assert without_pictures(stored) == without_pictures(held)
+
+
+# ---- tests that no fit saw -------------------------------------------------------------------------------------------
+
+
+def test_other_tests_stand_with_their_errors_and_their_band(named: Loop) -> None:
+    other = predicted(only(named, "named"), named.rounds[0].before.run.measurement)
+    blocks = others([other, other, other], "")
+    (table,) = [b for b in blocks if isinstance(b, Table)]
+    record = table.records()[0]
+    assert record["after"] == pytest.approx(1e3 * other.rmse_after)
+    assert record["before"] == pytest.approx(1e3 * other.rmse_before)
+    assert record["inside_90"] == other.covered
+    assert other.rmse_after < 0.5 * other.rmse_before, "friction was named, and is in the prediction"
+    assert len([b for b in blocks if isinstance(b, Figure)]) == 1
+    assert others([], "") == []
+    told = loop_words.document(replace(named, others=(other,)))["predicted"]
+    assert [t["inside_90"] for t in told] == [other.covered]
+    assert "no fit saw" in told[0]["sentence"]

@@ -15,6 +15,7 @@ from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
 from bayesmembrane.report.sections.diagnosis import explanations, finding, limits, place_of, residuals_figure
 from bayesmembrane.report.sections.diagnosis.figures import Place, Residual, discrepancy_picture
 from bayesmembrane.report.sections.diagnosis.lead import Step, lead
+from bayesmembrane.report.sections.loop.others import others
 from bayesmembrane.report.sections.loop.tables import errors_table, moved_table, scores_table
 from bayesmembrane.report.sections.loop.way import Waypoint, waypoints
 from bayesmembrane.words.brief import of_loop
@@ -102,6 +103,7 @@ def _part(found: Loop, number: int) -> Part:
     for i, d in enumerate(rounds, 1):
         of, which = (f", round {i}", f" round {i}") if len(rounds) > 1 else ("", "")
         blocks += explanations(d, f"What could explain it{of}", f"loop candidates{end}{which}")
+    blocks += others(found.others, end)
     blocks += limits(deciding(found), last, (f"loop confounded{end}", f"loop power{end}"))
     return Part(f"loop{end.strip()}", f"What was missing: {subject(found)}", tuple(blocks))
 

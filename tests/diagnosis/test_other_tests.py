@@ -1,0 +1,71 @@
+"""Tests that no fit saw are predicted with bands that hold, as far as specimens are alike."""
+
+import numpy as np
+import pytest
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.other_tests import predicted
+from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from tests.diagnosis.curves import measured, triangle
+
+SD = 0.01
+STIFFNESS = 8.0  # N/m
+
+
+def film(deflection: np.ndarray, seed: int, times: float = 1.0) -> Measurement:
+    """A neo-Hookean film by the other solver, with forces ``times`` as large, and independent noise."""
+    blank = measured(np.ones(deflection.size), deflection)
+    forward = Forward(hypothesis("neo_hookean"), blank, deflection)
+    force = forward(np.array([[np.log(STIFFNESS)]]), reached=False, solver="shooting").force[0]
+    return measured(times * force + SD * np.random.default_rng(seed).standard_normal(force.size), deflection)
+
+
+@pytest.fixture(scope="module")
+def found() -> Diagnosis:
+    answer = diagnose(film(triangle(80, (0.02, 0.03)), 3), hypothesis("neo_hookean"))
+    assert answer.verdict == "adequate"
+    return answer
+
+
+LONGER = triangle(400, (0.04,))
+
+
+def test_the_band_holds_a_longer_test_of_the_same_film(found: Diagnosis) -> None:
+    """Nine of ten readings, but for what the stiffness, the same in all of them, is off."""
+    other = predicted(found, film(LONGER, 4))
+    assert 0.75 < other.covered < 0.99
+    assert other.rmse_after == pytest.approx(SD, rel=0.4)
+    assert np.all(other.low <= other.after)
+    assert np.all(other.after <= other.high)
+
+
+def test_another_specimen_is_held_where_specimens_are_said_to_differ(found: Diagnosis) -> None:
+    stiffer = film(LONGER, 5, times=1.08)
+    alike, apart = predicted(found, stiffer), predicted(found, stiffer, scatter=0.08)
+    assert alike.covered < 0.5 < apart.covered
+    assert np.mean(apart.high - apart.low) > 1.5 * np.mean(alike.high - alike.low)
+
+
+def test_what_the_model_as_given_says_is_what_its_fit_says(found: Diagnosis) -> None:
+    """Where nothing was added, before and after are one, but for draws."""
+    other = predicted(found, film(LONGER, 6))
+    assert other.after == pytest.approx(other.before, abs=4 * SD)
+
+
+def test_the_same_seed_predicts_the_same(found: Diagnosis) -> None:
+    m = film(LONGER, 7)
+    assert np.array_equal(predicted(found, m, 0.05, 2).high, predicted(found, m, 0.05, 2).high)
+    assert not np.array_equal(predicted(found, m, 0.05, 2).high, predicted(found, m, 0.05, 3).high)
+
+
+def test_what_cannot_be_predicted_is_said(found: Diagnosis) -> None:
+    with pytest.raises(SettingsError, match=r"scatter of -0\.1"):
+        predicted(found, film(LONGER, 8), scatter=-0.1)
+    strip = Measurement(np.linspace(1e-3, 0.02, 9), np.ones(9), Uniaxial(0.05, 0.01), Specimen("strip", 1e-3))
+    with pytest.raises(SettingsError, match="another kind of rig"):
+        predicted(found, strip)
