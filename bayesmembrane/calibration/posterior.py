@@ -140,6 +140,14 @@ class Posterior:
         traces = curves[:, n:].reshape(len(curves), -1, n) if self.noise.traced else None
         return self.prior.log_density(x) + self._likelihood(curves[:, :n], traces, x)
 
+    def along(self, axes: Array) -> Along | None:
+        """`given` for curves in the span of orthonormal ``axes`` (R, N), which hold the measured one, too.
+
+        None where the noise does not weigh all readings alike.
+        """
+        noise = self.noise.along(axes)
+        return None if noise is None else Along(self, axes @ self.measurement.force, noise)
+
     def pointwise(self, x: Array, force: Array) -> Array:
         """ln p(y_i | other y, x) of draws x (B, k) with curves ``force`` (B, N), shape (B, N)."""
         residual, noise = self.measurement.force - force, self.noise_at(x, force)
@@ -155,6 +163,20 @@ class Posterior:
     def _likelihood(self, force: Array, shown: Array | None, x: Array) -> Array:
         noise = self.noise.at(force, shown)
         return noise.log_likelihood(self.measurement.force - force, self.hypothesis.noise_coordinates(x))
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """A posterior asked with the coordinates of curves along R axes: ``force`` (R,) N are those of the measured one."""
+
+    posterior: Posterior
+    force: Array
+    noise: NoiseLikelihood
+
+    def given(self, curves: Array, x: Array) -> Array:
+        """As `Posterior.given` of the curves with the coordinates ``curves`` (B, R)."""
+        noise = self.posterior.hypothesis.noise_coordinates(x)
+        return self.posterior.prior.log_density(x) + self.noise.log_likelihood(self.force - curves, noise)
 
 
 def _outcome(status: NDArray[np.int8], inside: NDArray[np.bool_]) -> NDArray[np.int8]:

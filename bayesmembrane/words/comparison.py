@@ -11,9 +11,10 @@ from bayesmembrane.comparison.convexity_modes import WITHIN, ByMode, Missing
 from bayesmembrane.comparison.evidence.estimate import WIDEST, Disagreement, Evidence
 from bayesmembrane.comparison.prior_widths import Unknown, Widened
 from bayesmembrane.comparison.result import Comparison, Row
+from bayesmembrane.ground.registry import components
 from bayesmembrane.words import noises
 from bayesmembrane.words.hypothesis import spoken
-from bayesmembrane.words.language import percent
+from bayesmembrane.words.language import percent, spoken_parameter
 from bayesmembrane.words.noises import best_noise
 from bayesmembrane.words.sampling import sentences as quality_sentences
 
@@ -263,16 +264,24 @@ def survival(found: Comparison) -> str:
     )
     worst = lead - max(fall, rise)
     which = down if fall >= rise else up
+    whose = f"{spoken_parameter(which.parameter)} of {_owner(which.parameter)}"
     rest = f" {unknown} of the changes cannot be told from these draws." if unknown else ""
     if worst > 0:
         return (
             f"{called(first)} stays first when any one prior is half or twice as wide: its lead of {lead:.1f} in ln Z "
-            f"falls to {worst:.1f} at worst, with the prior of {which.parameter} {which.factor:g} times as wide.{rest}"
+            f"falls to {worst:.1f} at worst, with the prior of {whose} {which.factor:g} times as wide.{rest}"
         )
     return (
-        f"The first place depends on the priors: with the prior of {which.parameter} {which.factor:g} times as wide, "
+        f"The first place depends on the priors: with the prior of {whose} {which.factor:g} times as wide, "
         f"the lead of {called(first)} of {lead:.1f} in ln Z is lost by {-worst:.1f}.{rest}"
     )
+
+
+def _owner(parameter: str) -> str:
+    """The material or effect whose parameter ``yeoh.c3_c1`` is."""
+    name = parameter.partition(".")[0]
+    known = {**components("materials"), **components("effects")}
+    return str(known[name].title) if name in known else name
 
 
 def _best(row: Row) -> tuple[float, float]:

@@ -32,7 +32,7 @@ VOID = {"meta", "img", "link", "br", "hr", "input"}
 
 
 class Page(HTMLParser):
-    """Tags with their attributes, text, and whether everything that opens closes."""
+    """Tags with their attributes, text as it was before it was set in type, and whether all that opens closes."""
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
@@ -51,6 +51,8 @@ class Page(HTMLParser):
         assert self.open.pop() == tag, f"</{tag}> closes nothing"
 
     def handle_data(self, data: str) -> None:
+        for typed, plain in (("\u00b1", "+-"), ("\u2212", "-"), ("\u00b5", "u")):
+            data = data.replace(typed, plain)
         self.text += data
 
     def all(self, tag: str) -> list[dict[str, Any]]:

@@ -70,6 +70,13 @@ class NoiseLikelihood(ABC):
         """The same for draws whose curves are ``force`` (B, N) N, with ``traces`` (B, E, N) N of their effects."""
         return self
 
+    def along(self, axes: Array) -> NoiseLikelihood | None:
+        """The same for residuals that lie in the span of orthonormal ``axes`` (R, N), told by their coordinates (B, R).
+
+        None where the noise does not weigh all readings alike and independently.
+        """
+        return None
+
     @abstractmethod
     def log_likelihood(self, residual: Array, x: Array) -> Array:
         """ln N(residual; 0, Sigma(x)), shape (B,)."""

@@ -65,6 +65,11 @@ class WhiteLikelihood(NoiseLikelihood):
         elif measurement.force_sd is not None:
             self.variance = measurement.force_sd**2
 
+    def along(self, axes: Array) -> NoiseLikelihood | None:
+        if self.axes is not None or np.ptp(self.variance) > 0:
+            return None
+        return _Alike(self)
+
     def log_likelihood(self, residual: Array, x: Array) -> Array:
         r = residual if self.axes is None else residual @ self.axes
         variance = self._total(x)
@@ -93,3 +98,22 @@ class WhiteLikelihood(NoiseLikelihood):
         """Variances (B, N) along the axes; never below what a double can hold."""
         tau = np.exp(x[:, :1]) * self.scale if self.extra else np.zeros((len(x), 1))
         return np.maximum(self.variance + tau * tau, 1e-300)
+
+
+class _Alike(NoiseLikelihood):
+    """White noise of one size for all N readings, of residuals told by R coordinates: a rotation changes no square."""
+
+    def __init__(self, whole: WhiteLikelihood) -> None:
+        self.whole = whole
+
+    def log_likelihood(self, residual: Array, x: Array) -> Array:
+        variance = self._variance(x)
+        square = np.einsum("br,br->b", residual, residual)
+        return np.asarray(-0.5 * (square / variance + self.whole.variance.size * np.log(2 * np.pi * variance)))
+
+    def covariance(self, x: Array) -> Array:
+        return self._variance(x[None, :])[0] * np.eye(self.whole.variance.size)
+
+    def _variance(self, x: Array) -> Array:
+        tau = np.exp(x[:, 0]) * self.whole.scale if self.whole.extra else np.zeros(len(x))
+        return np.maximum(self.whole.variance[0] + tau * tau, 1e-300)

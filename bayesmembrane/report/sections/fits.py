@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.ground.stored import read
@@ -40,8 +41,8 @@ class FitsSection(Section):
         figure = Figure(
             curves_picture(fits),
             alt=f"Fitted {how.load} against {how.travel} by {listed(_names(fits))}",
-            caption=f"Fitted {how.load_label} against {how.travel_label} at the measured points; the legend tells the "
-            f"root mean square of measured minus fitted {how.load}.",
+            caption=f"Fitted {how.load_label} against {how.travel_label} at the points of the test, one panel for each "
+            f"range; the legend tells the root mean square of {how.origin} minus fitted {how.load}.",
         )
         tables = [parameters_table(f, number if len(fits) > 1 else 0) for number, f in enumerate(fits, 1)]
         return [*points([fit_sentence(f) for f in fits]), optima_table(fits), figure, *tables]
@@ -109,8 +110,8 @@ def optima_table(fits: Sequence[Fit]) -> Table:
         for f in fits
     )
     caption = (
-        "Optima of each model: losses are Euclidean norms of measured minus computed "
-        f"{how.load_label}. Convex: whether the energy meets the convexity prior where the film goes."
+        f"Optima of each model: losses are Euclidean norms of {how.origin} minus computed {how.load_label}."
+        " Convex: whether the energy meets the convexity prior where the film goes."
     )
     return Table("optima", caption, columns, rows).without_empty()
 
@@ -142,25 +143,34 @@ def parameters_table(f: Fit, number: int) -> Table:
 
 
 def curves_picture(fits: Sequence[Fit], kind: str = "svg") -> Picture:
-    """The fitted curves."""
+    """The fitted curves, one panel for each range: curves over different points do not belong into one."""
     how = _seen(fits)
+    ends = list(dict.fromkeys(_end(f) for f in fits))
     with style():
-        figure = new_figure(4.2)
-        ax = figure.subplots()
-        for name, f in zip(spoken_apart([f.hypothesis for f in fits]), fits, strict=True):
-            material = f.hypothesis.material.name
-            ax.plot(
-                how.along(f.deflection),
-                how.carried(f.force),
-                color=colour(material),
-                linestyle=linestyle(material),
-                marker=marker(material) if f.deflection.size <= 60 else "",
-                markersize=4,
-                label=f"{name} (rms {how.force(f.rmse_N)})",
-            )
-        ax.set_xlabel(how.travel_label)
-        ax.set_ylabel(how.load_label)
-        ax.set_xlim(left=how.rest)
-        ax.grid(color=FAINT, linewidth=0.6)
-        ax.legend(loc="upper left")
+        figure = new_figure(4.2 * len(ends))
+        panels = figure.subplots(len(ends), 1, squeeze=False)[:, 0]
+        for ax, end in zip(panels, ends, strict=True):
+            own = [f for f in fits if _end(f) == end]
+            _curves(ax, own, how)
+            if len(ends) > 1:
+                ax.set_title(f"Fitted up to {end}")
+            ax.set_ylabel(how.load_label)
+            ax.set_xlim(left=how.rest)
+            ax.grid(color=FAINT, linewidth=0.6)
+            ax.legend(loc="upper left")
+        panels[-1].set_xlabel(how.travel_label)
         return encoded(figure, kind)
+
+
+def _curves(ax: Axes, fits: Sequence[Fit], how: Seen) -> None:
+    for name, f in zip(spoken_apart([f.hypothesis for f in fits]), fits, strict=True):
+        material = f.hypothesis.material.name
+        ax.plot(
+            how.along(f.deflection),
+            how.carried(f.force),
+            color=colour(material),
+            linestyle=linestyle(material),
+            marker=marker(material) if f.deflection.size <= 60 else "",
+            markersize=4,
+            label=f"{name} (rms {how.force(f.rmse_N)})",
+        )

@@ -72,10 +72,10 @@ def _blocks(found: Reconstruction) -> list[Block]:
         Text(origin(found)),
         Figure(
             reconstruction_picture(recovered, bars),
-            alt=f"Recovered force curve over {names}, probabilities of the number of points, and loss residuals",
-            caption="The measured curve behind the published losses: recovered forces (N) and their standard "
+            alt=f"Reconstructed force curve over {names}, probabilities of the number of points, and loss residuals",
+            caption="The measured curve behind the published losses: reconstructed forces (N) and their standard "
             "deviations (mN) against deflection (mm), probability of the number of points, and distance of the "
-            "recovered curve to each printed loss (mN). Suspect rows are red and hatched.",
+            "reconstructed curve to each printed loss (mN). Suspect rows are red and hatched.",
         ),
     ]
     if found.suspects:
@@ -86,7 +86,7 @@ def _blocks(found: Reconstruction) -> list[Block]:
         blocks.append(facts_table("reconstruction families", caption, kinds))
     influence = {i.changed: f"{1e3 * float(np.max(np.abs(i.force - found.force))):.3g} mN" for i in found.influence}
     if influence:
-        caption = "Largest change of any recovered force (mN) when one assumption of the reconstruction is changed."
+        caption = "Largest change of any reconstructed force (mN) when one assumption of the reconstruction is changed."
         blocks.append(facts_table("reconstruction influence", caption, influence))
     return blocks
 
@@ -138,7 +138,7 @@ def _recovered(axes: Sequence[Axes], ranges: Sequence[Recovered]) -> None:
         if r.points.sd is not None:
             axes[1].plot(x, 1e3 * r.points.sd, mark, color=c, markersize=4.5)
     axes[0].set_ylabel("force (N)")
-    axes[0].set_title("Recovered curve")
+    axes[0].set_title("Reconstructed curve")
     axes[0].legend(loc="upper left")
     axes[1].set_ylabel("sd (mN)")
     axes[1].set_xlabel("deflection (mm)")

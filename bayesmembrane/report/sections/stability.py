@@ -28,14 +28,16 @@ class StabilitySection(Section):
             return ()
         text = (
             "Stretches at which the material loses stability (Drucker's criterion, as finite element programs print "
-            "it), whatever the film reaches: median and 90 % interval of the draws that lose it, and their share. A "
-            f"dash: none does between stretches of {min(SIDES.values()):g} and {max(SIDES.values()):g}."
+            "it), whatever the film reaches, on both sides of rest: median and 90 % interval of the draws that lose "
+            f"it, and their share. What is not in the table loses it nowhere between {min(SIDES.values()):g} "
+            f"and {max(SIDES.values()):g} of stretch."
         )
-        return [Text(text), limits_table(shown)]
+        table = limits_table(shown)
+        return [Text(text), table] if table.rows else [Text(f"{text} That is all of them.")]
 
 
 def limits_table(shown: Sequence[Shown]) -> Table:
-    """One row for each run, mode and side."""
+    """One row for each run, mode and side where some draw loses stability."""
     columns = (
         Column("run", "material"),
         Column("range", "fitted up to"),
@@ -52,6 +54,8 @@ def limits_table(shown: Sequence[Shown]) -> Table:
         found = stability(s.hypothesis.material, s.hypothesis.films(some))
         for (mode, side), limits in found.limits.items():
             known = limits[np.isfinite(limits)]
-            q = np.quantile(known, (0.5, 0.05, 0.95)).tolist() if known.size else [None] * 3
+            if not known.size:
+                continue
+            q = np.quantile(known, (0.5, 0.05, 0.95)).tolist()
             rows.append((s.name, reach(s, shown), mode, side, *q, found.share(mode, side)))
     return Table("stability limits", "Stability limits by mode, on both sides of rest.", columns, tuple(rows))

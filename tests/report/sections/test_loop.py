@@ -273,7 +273,7 @@ def test_a_single_loading_without_times_is_drawn() -> None:
         np.linspace(0.001, 0.02, n), None, ones.astype(np.int8), ones.astype(int), ones > 1, 0.004 * ones, DISC
     )
     big, small = Residual("Before", 0.5 * np.sin(np.arange(n))), Residual("After", 0.004 * np.cos(np.arange(n)))
-    assert place.along[1] == "point (-)"
+    assert place.along[1] == "number of the point (-)"
     assert height(residual_picture(place, [big, small]).data) > 0
     assert height(discrepancy_picture(place, big.residual, 0.4 * ones, 0.1 * ones).data) > 0
 

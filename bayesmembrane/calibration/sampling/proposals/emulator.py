@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesmembrane.calibration.posterior import Evaluation
+from bayesmembrane.calibration.posterior import Evaluation, Posterior
 from bayesmembrane.ground.parameters import Array
 
 LEARN_FROM, LEAST_DRAWS, HELD_OUT = 4000, 60, 0.25
@@ -21,16 +21,21 @@ DOUBT = 0.02  # weight of the wide density for what the draws have not seen
 TAIL, WIDE = 4.0, 2.0  # its degrees of freedom, and its spread relative to the draws
 INNER = 100  # steps of a walk on the emulator
 FAR = 0.1  # part of them that jump the whole difference between two draws
+SHORT, FAINT = 0.5, 1e-8  # axes that must do for so many readings, and directions of curves that are left out
 
 
-class Emulated(Protocol):
+class Given(Protocol):
+    """A posterior that is told the curves."""
+
+    def given(self, curves: Array, x: Array, /) -> Array:
+        """(B,) ln prior + ln likelihood of x (B, k) if theirs were ``curves`` (B, N), as an `Evaluation` has them."""
+
+
+class Emulated(Given, Protocol):
     """What a posterior must offer to be emulated."""
 
     def evaluate(self, x: Array) -> Evaluation:
         """Prior, likelihood, force and outcome of x (B, k)."""
-
-    def given(self, curves: Array, x: Array, /) -> Array:
-        """(B,) ln prior + ln likelihood of x (B, k) if theirs were ``curves`` (B, N), as an `Evaluation` has them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +45,13 @@ class Emulator:
     posterior : turns curves into densities
     centre, root, inverse : x = centre + root z whitens the draws
     terms : (T, degree) indices of the factors of each monomial; k stands for a factor one
-    coefficients : (T, N) F^ = monomials(z) coefficients, of all curves that the likelihood is made of
+    coefficients : (T, N) F^ = monomials(z) coefficients, of all curves that the likelihood is made of, or (T, R) of
+        their coordinates along a few axes
     level : ln of the height that the wide density is given at the centre
     archive : (M, k) draws whose differences are steps
     """
 
-    posterior: Emulated
+    posterior: Given
     centre: Array
     root: Array
     inverse: Array
@@ -98,9 +104,24 @@ def emulate(posterior: Emulated, x: Array, rng: np.random.Generator) -> Emulator
     inverse: Array = np.asarray(np.linalg.inv(root), dtype=float)
     z = (x - centre) @ inverse.T
     terms, coefficients = _best(z, curves, lambda f, held: _misfit(posterior.given(f, x[held]), truth[held]))
-    emulator = Emulator(posterior, centre, root, inverse, terms, coefficients, -np.inf, x)
+    given, shorter = _shortened(posterior, coefficients)
+    emulator = Emulator(given, centre, root, inverse, terms, shorter, -np.inf, x)
     level = float(np.median(emulator.log_density(x) - _log_t(z)) + np.log(DOUBT))
-    return Emulator(posterior, centre, root, inverse, terms, coefficients, level, x)
+    return replace(emulator, level=level)
+
+
+def _shortened(posterior: Emulated, coefficients: Array) -> tuple[Given, Array]:
+    """A posterior asked along the few axes that its curves span, and the coefficients there: of long curves a part.
+
+    All curves are sums of T; where noise weighs every reading alike, nothing but their T + 1 products with each other
+    and with the data counts, however many readings there are.
+    """
+    if not isinstance(posterior, Posterior):
+        return posterior, coefficients
+    _, size, axes = np.linalg.svd(np.vstack([coefficients, posterior.measurement.force]), full_matrices=False)
+    axes = axes[size > FAINT * size[0]]
+    along = posterior.along(axes) if len(axes) <= SHORT * coefficients.shape[1] else None
+    return (posterior, coefficients) if along is None else (along, coefficients @ axes.T)
 
 
 def monomials(z: Array, terms: NDArray[np.intp]) -> Array:

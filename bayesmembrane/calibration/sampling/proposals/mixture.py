@@ -13,7 +13,8 @@ from bayesmembrane.ground.parameters import Array
 
 COUNTS = (1, 2, 4, 7, 11, 16, 24)
 DEGREES = (4.0, 10.0, 50.0)
-ROUNDS, ENOUGH = 60, 1e-4
+ROUNDS, ENOUGH = 60, 1e-4  # of expectation maximisation: a round that gains less ln density a draw is the last
+ROUGH = 1e-3  # the same of a fit that is only to be judged, by gains ten times as large
 RIDGE, PULL = 1e-6, 1e-3  # of the draws' variance; the latter for a component that holds one draw only
 PER_COMPONENT = 6  # draws for each free number
 GAIN = 0.01  # of held-out ln density a draw, for which twice the components are worth it
@@ -124,10 +125,10 @@ def _whitening(x: Array) -> tuple[Array, Array]:
 
 def _score(z: Array, test: NDArray[np.bool_], count: int, degrees: float, rng: np.random.Generator) -> float:
     """Mean held-out ln density of a fit to the others."""
-    return float(np.mean(_maximise(z[~test], count, degrees, rng).log_density(z[test])))
+    return float(np.mean(_maximise(z[~test], count, degrees, rng, ROUGH).log_density(z[test])))
 
 
-def _maximise(z: Array, count: int, degrees: float, rng: np.random.Generator) -> Mixture:
+def _maximise(z: Array, count: int, degrees: float, rng: np.random.Generator, enough: float = ENOUGH) -> Mixture:
     """Expectation maximisation from k-means."""
     k = z.shape[1]
     _, label = kmeans2(z, count, minit="++", rng=rng) if count > 1 else (z, np.zeros(len(z), dtype=int))
@@ -140,7 +141,7 @@ def _maximise(z: Array, count: int, degrees: float, rng: np.random.Generator) ->
         parts = g._log_t(distance) + g.log_weights
         total = logsumexp(parts, axis=1)
         now = float(np.mean(total))
-        if now < before + ENOUGH:
+        if now < before + enough:
             break
         before = now
         g = _step(z, np.exp(parts - total[:, None]), (degrees + k) / (degrees + distance), degrees)

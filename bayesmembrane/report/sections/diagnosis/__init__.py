@@ -14,7 +14,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.stored import read
 from bayesmembrane.report.blocks import Block, Figure, Heading, Lead, Part, Text, points
 from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
-from bayesmembrane.report.sections.diagnosis.figures import Place, Residual, residual_picture
+from bayesmembrane.report.sections.diagnosis.figures import PARTS, Place, Residual, residual_picture
 from bayesmembrane.report.sections.diagnosis.lead import lead, steps_of
 from bayesmembrane.report.sections.diagnosis.tables import (
     before_and_after,
@@ -118,16 +118,19 @@ def _residuals(d: Diagnosis) -> Figure:
 def residuals_figure(place: Place, rows: Sequence[Residual]) -> Figure:
     """What models leave, the first one above."""
     how = place.how
-    against = [how.travel, place.along[1].partition(" ")[0]]
+    against = [how.travel, place.along[1].rpartition(" (")[0]]
     against += ["by cycle"] if np.unique(place.cycle).size > 1 else []
     order = "; the model as given above, the one with what was found below" if len(rows) > 1 else ""
     hollow = ""
     if np.any(place.held_out):
         hollow = " All points were fitted here; the hollow ones are those held out for the errors of the table."
+    lines = ""
+    if place.leg.size >= PARTS:
+        lines = " The lines are means of neighbours: where they leave the middle of the band, or loading and unloading "
+        lines += "part, something is missing."
     caption = (
         f"{how.origin.capitalize()} less fitted {how.load} ({how.small[1]}) against {listed(against)}{order}. Grey: "
-        "what noise does. The lines are means of neighbours: where they leave the middle of the band, or loading and "
-        f"unloading part, something is missing.{hollow}"
+        f"what noise does.{lines}{hollow}"
     )
     alt = "Residuals " + " and ".join(f"{r.title[0].lower()}{r.title[1:]}" for r in rows)
     return Figure(residual_picture(place, rows), alt, caption)

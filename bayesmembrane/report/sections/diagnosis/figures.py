@@ -58,7 +58,7 @@ class Place:
     def along(self) -> tuple[Array, str]:
         """Time, or the number of the point where there are no times, with the label of its axis."""
         if self.time is None:
-            return np.arange(1.0, self.sd.size + 1), "point (-)"
+            return np.arange(1.0, self.sd.size + 1), "number of the point (-)"
         return self.time, "time (s)"
 
 
@@ -151,7 +151,7 @@ def _against_deflection(ax: Axes, place: Place, residual: Array) -> None:
     _points(ax, x, place, residual)
     for sign, _, colour, _ in LEGS:
         own = place.leg == sign
-        if np.count_nonzero(own) >= 2 * PARTS:
+        if np.count_nonzero(own) >= PARTS:
             _mean_line(ax, x[own], place.how.left(residual)[own], colour)
 
 
@@ -159,7 +159,7 @@ def _along(ax: Axes, place: Place, residual: Array) -> None:
     x = place.along[0]
     _noise(ax, x, place)
     _points(ax, x, place, residual)
-    if x.size >= 2 * PARTS:
+    if x.size >= PARTS:
         _mean_line(ax, x, place.how.left(residual), INK)
 
 
@@ -206,7 +206,8 @@ def _points(ax: Axes, x: Array, place: Place, residual: Array) -> None:
 def _mean_line(ax: Axes, x: Array, residual: Array, colour: str) -> None:
     """Means of neighbours along x: what the eye should follow through the noise."""
     order = np.argsort(x, kind="stable")
-    at, value = zip(*((x[p].mean(), residual[p].mean()) for p in np.array_split(order, PARTS)), strict=True)
+    parts = np.array_split(order, min(PARTS, x.size // 2))
+    at, value = zip(*((x[p].mean(), residual[p].mean()) for p in parts), strict=True)
     ax.plot(at, value, color="white", linewidth=4.0, zorder=4)
     ax.plot(at, value, color=colour, linewidth=2.0, zorder=5)
 
@@ -229,9 +230,9 @@ def _handles(place: Place) -> list[Line2D | Patch]:
             handles.append(Line2D([], [], color=colour, marker=symbol, linewidth=0, markersize=5, label=name))
     if np.any(place.held_out):
         hollow = Line2D([], [], color=MUTED, marker="o", linewidth=0, markersize=6, markerfacecolor="white")
-        hollow.set_label("set aside for the check")
+        hollow.set_label("held out")
         handles.append(hollow)
-    if place.leg.size >= 2 * PARTS:
+    if place.leg.size >= PARTS:
         handles.append(Line2D([], [], color=INK, linewidth=2.0, label="mean of neighbours"))
     cyclic = " (by cycle: 1 sd)" if np.unique(place.cycle).size > 1 else ""
     return [*handles, Patch(color=BAND, label=f"noise, 2 sd{cyclic}")]

@@ -116,8 +116,8 @@ def modes_table(found: Mapping[str, Comparison]) -> Table | None:
         return None
     caption = (
         "Evidence if the prior asked for convexity elsewhere: on the states reached, on the box of stretches from 1 "
-        "to 8, for ellipticity alone, or not at all; each divided by the mass of its own prior. A dash: next to no "
-        "film near the data meets the mode, or its mass is not known."
+        "to 8, for ellipticity alone, or not at all; each divided by the mass of its own prior. A dash: too few "
+        "draws, or films near the data, meet the mode to tell."
     )
     return Table("evidence by convexity mode", caption, tuple(columns), tuple(rows))
 

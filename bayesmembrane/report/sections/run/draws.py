@@ -216,7 +216,7 @@ def calibration_picture(replicas: Replicas, look: str, kind: str = "svg") -> Pic
         ax.set_ylabel("place minus\nits rank (-)")
         ax.tick_params(labelsize=10)
         handles = [
-            Line2D([], [], color=colour(look), linewidth=1.8, label="measured points"),
+            Line2D([], [], color=colour(look), linewidth=1.8, label="points of the test"),
             Patch(color=FAINT, label="what chance does (90 %)"),
         ]
         figure.legend(handles=handles, loc="outside upper center", ncols=2)

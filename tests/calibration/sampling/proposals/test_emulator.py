@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from bayesmembrane.calibration.posterior import Evaluation, Outcome
+from bayesmembrane.calibration.posterior import Evaluation, Outcome, Posterior
 from bayesmembrane.calibration.sampling.proposals.emulator import DOUBT, emulate, monomials
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 
 
 class Cubic:
@@ -56,3 +59,27 @@ def test_monomials_are_products() -> None:
     z = np.array([[2.0, 3.0]])
     terms = np.array([[0, 0], [0, 1], [1, 2], [2, 2]])
     assert monomials(z, terms).tolist() == [[4.0, 6.0, 3.0, 1.0]]
+
+
+def test_along_the_axes_of_its_curves_a_posterior_is_the_same() -> None:
+    """A long curve with noise of one size is told by few coordinates, without asking for all readings."""
+    d = np.linspace(5e-4, 0.03, 140)
+    # Whatever the readings: the identity holds for all.
+    force = 40 * d + 0.004 * np.random.default_rng(1).standard_normal(d.size)
+    posterior = Posterior(hypothesis("yeoh"), Measurement(d, force, Uniaxial(0.05, 0.01), Specimen("strip", 5e-4)))
+    z = np.random.default_rng(2).standard_normal((200, 4))
+    x = np.array([5.0, -0.08, 0.006, -4.0]) + z * [0.01, 0.005, 0.001, 0.1]
+    found = emulate(posterior, x, np.random.default_rng(3))
+    assert found is not None
+    assert found.coefficients.shape[1] < d.size / 2
+    full = posterior.evaluate(x)
+    axes = np.linalg.svd(np.vstack([full.force, force]), full_matrices=False)[2]
+    along = posterior.along(axes)
+    assert along is not None
+    np.testing.assert_allclose(along.given(full.force @ axes.T, x), full.log_posterior, rtol=1e-9)
+
+
+def test_readings_that_weigh_differently_have_no_such_axes() -> None:
+    d = np.linspace(5e-4, 0.03, 40)
+    m = Measurement(d, 40 * d, Uniaxial(0.05, 0.01), Specimen("strip", 5e-4), force_sd=1e-3 * (1 + d / d[-1]))
+    assert Posterior(hypothesis("yeoh"), m).along(np.eye(3, d.size)) is None
