@@ -112,8 +112,8 @@ class _Alike(NoiseLikelihood):
         return np.asarray(-0.5 * (square / variance + self.whole.variance.size * np.log(2 * np.pi * variance)))
 
     def covariance(self, x: Array) -> Array:
-        return self._variance(x[None, :])[0] * np.eye(self.whole.variance.size)
+        return np.asarray(self._variance(x[None, :])[0] * np.eye(self.whole.variance.size))
 
     def _variance(self, x: Array) -> Array:
         tau = np.exp(x[:, 0]) * self.whole.scale if self.whole.extra else np.zeros(len(x))
-        return np.maximum(self.whole.variance[0] + tau * tau, 1e-300)
+        return np.asarray(np.maximum(self.whole.variance[0] + tau * tau, 1e-300))

@@ -17,10 +17,8 @@ from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mi
 from bayesmembrane.calibration.sampling.proposals.walking import walking
 
 FIRST_LESSON, NEXT_LESSON = 100, 2
-SETTLED, LATER_LESSON = 400, 4
-"""The proposal is learned from the chains after so many steps, and anew whenever there are twice as many, from 400 on
-four times: until the run converges. What came before the last lesson never counts, for only a fixed proposal makes a
-chain, and a lesson that comes too soon throws away a chain that was nearly long enough."""
+"""The proposal is learned from the chains after so many steps, and anew whenever there are so many times as many,
+until the run converges. What came before the last lesson never counts: only a fixed proposal makes a chain."""
 WALK_SHARE, JUMP_SHARE, LEARN_FROM = 0.4, 0.3, 2000
 
 
@@ -65,7 +63,4 @@ def learn(posterior: Posterior, chains: Chains) -> Learned:
 
 def next_lesson(chains: Chains) -> int:
     """Steps after which the proposal may be learned (anew)."""
-    if not chains.lessons:
-        return FIRST_LESSON
-    last = chains.lessons[-1]
-    return int(last * (NEXT_LESSON if last < SETTLED else LATER_LESSON))
+    return int(NEXT_LESSON * chains.lessons[-1]) if chains.lessons else FIRST_LESSON
