@@ -251,17 +251,25 @@ def diagnose(measurement: Measurement, claim: Hypothesis | Question, work: Work)
 
 
 @dataclass(frozen=True)
-class Foretold:
-    """Other tests of the same material, of which a loop predicts the readings.
+class AtTheEnd:
+    """What a loop makes at its end, beside its answer.
 
+    rivals : members of an ambiguous answer that are sampled, the first ones
+    predict : other tests of the same material, whose readings are predicted from the first diagnosis
     scatter : relative standard deviation by which forces of two specimens differ
     """
 
-    tests: tuple[Measurement, ...] = ()
+    rivals: int = 0
+    predict: tuple[Measurement, ...] = ()
     scatter: float = 0.0
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What a stored answer depends on."""
+        return ({"rivals": self.rivals} if self.rivals else {}) | ({"scatter": self.scatter} if self.predict else {})
 
-NOTHING_FORETOLD = Foretold()
+
+NOTHING_MORE = AtTheEnd()
 
 
 def loop(
@@ -271,23 +279,17 @@ def loop(
     *,
     adapt_noise: bool = True,
     runs: Path | None = None,
-    rivals: int = 0,
-    foretold: Foretold = NOTHING_FORETOLD,
+    end: AtTheEnd = NOTHING_MORE,
 ) -> Answer[Loop]:
-    """Diagnose, add what is missing, calibrate again; its runs lie in ``runs``, or where the answers do.
-
-    Of an ambiguous answer the first ``rivals`` members are sampled, too; other tests are predicted from the first.
-    """
-    tests, scatter = foretold.tests, foretold.scatter
+    """Diagnose, add what is missing, calibrate again; its runs lie in ``runs``, or where the answers do."""
     how = LoopSettings(
-        work.seed, runs or work.out, work.ess, adapt_noise, leaders=rivals, predict=tests, scatter=scatter
+        work.seed, runs or work.out, work.ess, adapt_noise, leaders=end.rivals, predict=end.predict, scatter=end.scatter
     )
     question = claim if isinstance(claim, Question) else Question(claim)
     label = question.hypothesis.label()
     settings = {"seed": work.seed, "ess": work.ess, "adapt_noise": adapt_noise, "declared": question.declared}
-    settings |= {"rivals": rivals} if rivals else {}
-    settings |= {"scatter": scatter} if tests else {}
-    what = asked("loop", run_loop, [measurement, *tests], [question.hypothesis], settings, library())
+    settings |= end.settings
+    what = asked("loop", run_loop, [measurement, *end.predict], [question.hypothesis], settings, library())
     what = replace(what, specimen=measurement.specimen.name, end=float(np.max(measurement.deflection)))
     if (stored := held("loop", what, work.out)) is not None:
         return stored

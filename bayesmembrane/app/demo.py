@@ -142,8 +142,8 @@ def close_loop(name: str, stem: str, work: Work) -> None:
     measurement, *others = (_curve(s) for s in (stem, *FORETOLD.get(stem, ())))
     well = replace(work, ess=min(work.ess, LOOP_ESS))
     question = Question(hypothesis(name or VALLEYS[0]), declared=name != OPEN)
-    foretold = analyses.Foretold(tuple(others), SCATTER)
-    analyses.loop(measurement, question, well, runs=_folder(work) / "loops", foretold=foretold)
+    end = analyses.AtTheEnd(predict=tuple(others), scatter=SCATTER)
+    analyses.loop(measurement, question, well, runs=_folder(work) / "loops", end=end)
 
 
 def _curve(stem: str) -> Measurement:

@@ -26,6 +26,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.sequence import read_one_after_another
 from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.loop import Loop
+from bayesmembrane.diagnosis.other_tests import OtherTest, predicted
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import materials
@@ -227,20 +228,29 @@ def loop(
     ess: float = 1000.0,
     seed: int = 0,
     adapt_noise: bool = True,
-    predict: Sequence[Measurement] = (),
-    scatter: float = 0.0,
     out: Folder | None = None,
 ) -> Loop:
     """Diagnose, sample, add what is missing, and again, until adequate or abstaining.
 
     Without a ``hypothesis`` it begins with the most probable energy. ``adapt_noise`` samples with correlated noise
     where neighbouring readings turn out to be correlated. Of an ambiguous answer nothing more is sampled: its members
-    are hypotheses that `sample` takes. ``predict`` are other tests of the same material, which are not fitted but
-    predicted; forces of two specimens differ by ``scatter``, a relative standard deviation.
+    are hypotheses that `sample` takes.
     """
-    foretold = analyses.Foretold(tuple(predict), scatter)
-    work = _work(seed, out, ess)
-    return analyses.loop(measurement, _asked(hypothesis), work, adapt_noise=adapt_noise, foretold=foretold).result
+    return analyses.loop(measurement, _asked(hypothesis), _work(seed, out, ess), adapt_noise=adapt_noise).result
+
+
+@one_thread
+def predict(
+    found: Diagnosis | Loop, other: Measurement | Sequence[Measurement], *, scatter: float = 0.0, seed: int = 0
+) -> list[OtherTest]:
+    """What all that a diagnosis, or the first of a loop, holds probable predicts of other tests of the same material.
+
+    ``scatter`` : relative standard deviation by which forces of two specimens differ. Each has the curves before and
+    after (N), the ends of the 90 % band, and which part of the readings it holds.
+    """
+    first = found.rounds[0].diagnosis if isinstance(found, Loop) else found
+    others = [other] if isinstance(other, Measurement) else other
+    return [predicted(first, o, scatter, seed) for o in others]
 
 
 def _asked(hypothesis: Hypothesis | None) -> Question:

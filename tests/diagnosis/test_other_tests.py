@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import bayesmembrane as bm
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.other_tests import predicted
@@ -61,6 +62,13 @@ def test_the_same_seed_predicts_the_same(found: Diagnosis) -> None:
     m = film(LONGER, 7)
     assert np.array_equal(predicted(found, m, 0.05, 2).high, predicted(found, m, 0.05, 2).high)
     assert not np.array_equal(predicted(found, m, 0.05, 2).high, predicted(found, m, 0.05, 3).high)
+
+
+def test_the_door_predicts_one_test_or_several(found: Diagnosis) -> None:
+    m = film(LONGER, 9)
+    (one,), several = bm.predict(found, m, scatter=0.05, seed=4), bm.predict(found, [m, m], scatter=0.05, seed=4)
+    assert np.array_equal(one.high, predicted(found, m, 0.05, 4).high)
+    assert [np.array_equal(o.high, one.high) for o in several] == [True, True]
 
 
 def test_what_cannot_be_predicted_is_said(found: Diagnosis) -> None:

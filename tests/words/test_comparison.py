@@ -141,6 +141,6 @@ def test_the_ranking_is_said_to_survive_other_priors_or_not():
     widths = (Widened("gent.ln_jm", 2.0, -1.0, 0.1, 500.0, 0.1, None),)
     one, other = replace(row("one", -10, 5), widths=widths), row("other", -15, 3)
     assert "stays first" in survival(ranked([one, other]))
-    assert "falls to 4.0 at worst, with the prior of gent.ln_jm 2 times as wide" in survival(ranked([one, other]))
+    assert "falls to 4.0 at worst, with the prior of ln Jm of Gent 2 times as wide" in survival(ranked([one, other]))
     rising = replace(other, widths=(replace(widths[0], change=6.0),))
     assert "is lost by 1.0" in survival(ranked([one, rising]))

@@ -66,8 +66,9 @@ def verb(
     with resumable(output.folder), lines() as tell:
         work = analyses.Work(output.seed, output.folder, sampling.ess, tell)
         question = Question(claim, material.declared)
-        foretold = analyses.Foretold(tuple(curves_with_specimens(output.predict, "--predict")), output.scatter)
-        found = analyses.loop(measurement, question, work, adapt_noise=adapt, rivals=output.rivals, foretold=foretold)
+        others = tuple(curves_with_specimens(output.predict, "--predict"))
+        end = analyses.AtTheEnd(output.rivals, others, output.scatter)
+        found = analyses.loop(measurement, question, work, adapt_noise=adapt, end=end)
     page = write_report([*analyses.loop_runs(found.result), found.result], output.report_folder)
     document = {**found.document, "report": str(page)}
     answer(document, output.as_json, lambda: show(document, measurement))
