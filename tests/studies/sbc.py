@@ -30,6 +30,7 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import BayesmembraneError
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
+from bayesmembrane.physics.noise.base import force_scale
 from bayesmembrane.physics.rigs.annulus import Annulus
 from tests.studies.sbc_table import RANKED, report
 
@@ -43,6 +44,7 @@ WALK = Settings(ess=250.0, chunk=100)
 POINTS, FARTHEST = 14, 0.012  # m: short and mild, so that films of the whole prior get there
 GIVEN = 4e-3  # noise that a measurement states, of a force of 1 N
 BASELINES, VARIATIONS = 300, 100
+SCALED = "noise.ln_sd"
 
 
 @dataclass(frozen=True)
@@ -104,8 +106,11 @@ def replicate(design: Design, number: int) -> dict[str, Any]:
     # Plain films come from the other solver; effects and form errors are put on top by the only code that knows them.
     solver = "ritz" if h.effects else "shooting"
     force = asked.forward(x, reached=False, solver=solver).force
-    noise = asked.noise_at(x, force).draw(h.noise_coordinates(x), rng)
+    # Inferred noise is relative to the largest reading: drawn for that of this film, told in that of its readings.
+    film = replace(blank, force=force[0])
+    noise = Posterior(h, film).noise_at(x, force).draw(h.noise_coordinates(x), rng)
     measured = replace(blank, force=(force + noise)[0])
+    x = np.where(np.array(h.names) == SCALED, x + np.log(force_scale(film) / force_scale(measured)), x)
     begun = time.process_time()
     run = sample(measured, h, RunSettings(seed=number, settings=WALK, predictions=False))
     draws = run.draws()
