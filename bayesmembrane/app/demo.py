@@ -47,7 +47,7 @@ LOOPS = (
 LOOP_ESS = 400.0
 # The same tape at other rates, which no fit sees. Its strips differ by about five per cent: loading legs of nine pairs
 # at one rate are 3.3 kPa apart (root mean square; docs/studies/vhb.md), thus 2.3 kPa each, of some 45 kPa.
-FORETOLD = {"vhb4910_0d03": ("vhb4910_0d01", "vhb4910_0d05")}
+PREDICTED = {"vhb4910_0d03": ("vhb4910_0d01", "vhb4910_0d05")}
 SCATTER = 0.05
 
 
@@ -139,7 +139,7 @@ def follow_valleys(name: str, work: Work) -> None:
 
 def close_loop(name: str, stem: str, work: Work) -> None:
     """The loop on one curve that ships; its runs lie deeper, for the page shows them with their loop."""
-    measurement, *others = (_curve(s) for s in (stem, *FORETOLD.get(stem, ())))
+    measurement, *others = (_curve(s) for s in (stem, *PREDICTED.get(stem, ())))
     well = replace(work, ess=min(work.ess, LOOP_ESS))
     question = Question(hypothesis(name or VALLEYS[0]), declared=name != OPEN)
     end = analyses.AtTheEnd(predict=tuple(others), scatter=SCATTER)

@@ -136,6 +136,7 @@ def loop(
     kept, aside = without_outliers(part)
     closing = _Closing(kept, how, tell or (lambda _: None), watch)
     found = closing.diagnosed(question)
+    others = closing.predicted(found)  # before anything is sampled: a test that no film follows ends it here
     noise = _noise_for(found, question.hypothesis) if closing.settings.adapt_noise else question.hypothesis.noise
     stage = closing.sampled(replace(found.null.hypothesis, noise=noise))
     seen, rounds = {stage.run.hypothesis.label()}, list[Round]()
@@ -151,7 +152,6 @@ def loop(
             break
         seen.add(following.label())
         stage, found = after, closing.diagnosed(replace(question, hypothesis=following, declared=True))
-    others = closing.foretold(rounds[0].diagnosis)
     return Loop(tuple(rounds), closing.left(rounds[-1].diagnosis), thinning(measurement, part), others)
 
 
@@ -180,7 +180,7 @@ class _Closing:
             raise KeyboardInterrupt
         return _stage(run, s.solve, s.seed)
 
-    def foretold(self, first: Diagnosis) -> tuple[OtherTest, ...]:
+    def predicted(self, first: Diagnosis) -> tuple[OtherTest, ...]:
         """The other tests, by all that the first diagnosis holds probable."""
         s = self.settings
         return tuple(predicted(first, other, s.scatter, s.seed) for other in s.predict)
