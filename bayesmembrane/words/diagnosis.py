@@ -95,12 +95,24 @@ def document(found: Diagnosis) -> dict[str, Any]:
 
 def sentence(found: Diagnosis) -> str:
     """What to read first: how probable, the verdict, how large, what remains, what to do; in the units of the rig."""
+    return f"{probability_sentence(found)} {_with_the_rest(_ANSWERS[found.verdict](found), found)}"
+
+
+def finding_sentence(found: Diagnosis) -> str:
+    """The same for those who have read the probabilities and the rivals: what was seen, how far the error falls."""
+    if found.verdict != "ambiguous":
+        return _with_the_rest(_ANSWERS[found.verdict](found), found)
+    count = len(found.members)
+    told = f"{_misses(found)}{_common(found)}any of {count} explanations may be right. {_error(found)}{_beside(found)}"
+    return _with_the_rest(told, found)
+
+
+def _with_the_rest(answer: str, found: Diagnosis) -> str:
+    """An answer with what it leaves, and what is to be known of noise and readings."""
     thinned = "" if found.thinned is None else f" {thinning_sentence(found.thinned)}"
     aside = "" if found.set_aside is None else f" {set_aside_sentence(found.set_aside)}"
-    parts = [probability_sentence(found), _ANSWERS[found.verdict](found).strip()]
-    if found.verdict != "adequate":
-        parts.append(remaining_sentence(found))
-    return " ".join(p for p in parts if p) + _noise(found) + aside + thinned
+    left = "" if found.verdict == "adequate" else f" {remaining_sentence(found)}"
+    return f"{answer.strip()}{left}{_noise(found)}{aside}{thinned}"
 
 
 def probability_sentence(found: Diagnosis) -> str:
