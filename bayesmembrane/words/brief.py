@@ -19,7 +19,7 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words import language
-from bayesmembrane.words.diagnosis import percent, set_title
+from bayesmembrane.words.diagnosis import percent, set_title, why_not
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.moved import MATTERS, modulus_of
@@ -212,9 +212,8 @@ def _unknown(course: Course) -> str:
     if (strange := _strange(d)) is not None:
         beside = listed(effect_title(n) for n in strange.base.names)
         return f"{start}{_foreign(strange, d.measurement)}{f', beside {beside}' if beside and not sure else ''}"
-    if d.members and d.validation is not None:
-        covered = language.percent(d.validation.covered_after)
-        return f"nothing{further} is named, for this predicts only {covered} of the points held out"
+    if d.members:
+        return f"nothing{further} is named, for {why_not(d)}"
     if d.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{start}none of the energies has this form"
     return f"{start}too many explanations fit, and nothing{further} is named"
@@ -292,12 +291,12 @@ def noise_alone(d: Diagnosis) -> bool:
     r = d.remaining
     if d.verdict == "adequate" and d.detection.adequate:
         return True
-    return d.verdict != "unknown" and r.reduced_chi2 < WORDS.little_chi2 and r.share < WORDS.little_share
+    return d.verdict != "unknown" and r.noise
 
 
 def _kind(d: Diagnosis) -> str:
     r = d.remaining
-    if r.carried < WORDS.carried:
+    if r.carried < VERDICT.form_carries:
         return "of no kind that is known here"
     laws = [f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in r.law_errors.items() if e > WORDS.law_error]
     return f"smooth as if {listed([f'the energy were {100 * r.energy_error:.2g} %', *laws])} off"

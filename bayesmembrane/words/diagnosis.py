@@ -16,7 +16,7 @@ from bayesmembrane.diagnosis.left.heldout import HeldOut
 from bayesmembrane.diagnosis.reference.outliers import SetAside
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
-from bayesmembrane.diagnosis.thresholds import WORDS
+from bayesmembrane.diagnosis.thresholds import VERDICT, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed, spoken_parameter
@@ -146,11 +146,11 @@ def remaining_sentence(found: Diagnosis) -> str:
     text = f"Remaining: reduced chi-square {left.reduced_chi2:.2f}"
     if left.share < WORDS.all_of_it:
         text += f", {100 * left.share:.2g} % of the misfit beyond noise"
-    if left.reduced_chi2 < WORDS.little_chi2 and left.share < WORDS.little_share:
+    if left.noise:
         return f"{text}: noise."
     laws = [f"of {100 * e:.2g} % in {effect_title(n)}" for n, e in left.law_errors.items() if e > WORDS.law_error]
     forms = [f"an error of {100 * left.energy_error:.2g} % in the energy", *(f"one {w}" for w in laws)]
-    if left.carried >= WORDS.carried:
+    if left.carried >= VERDICT.form_carries:
         return f"{text}; {' and '.join(forms)} would carry it ({factor * left.rms:.2g} {unit})."
     return f"{text}; not even {' and '.join(forms)} would carry all of it."
 
@@ -324,11 +324,9 @@ def _unknown(found: Diagnosis) -> str:
         )
     shape = shape_in_words(found.shape, waves, found.rig, units)
     if found.members:
-        held, covered = set_aside(found.validation), found.validation
-        part = "" if covered is None else f"{100 * covered.covered_after:.0f} %"
         return (
             f"{_misses(found)}{_certain(found)}{_added(found.members[0].candidate, found)} would be the most probable, "
-            f"but its 90 % band holds only {part} of the points that were set aside ({held}): no name is given. {shape}"
+            f"but {why_not(found)}: no name is given. {shape}"
         )
     if found.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{_misses(found)}no effect is needed, and none of the energies has this form. {shape}"
@@ -336,6 +334,16 @@ def _unknown(found: Diagnosis) -> str:
         f"{_misses(found)}{_certain(found)}more explanations are about as probable than this measurement can part. "
         f"{shape}"
     )
+
+
+def why_not(found: Diagnosis) -> str:
+    """Why the most probable explanation is not named, as a clause."""
+    v = found.validation
+    if v is not None and v.covered_after < VERDICT.least_coverage:
+        return (
+            f"its 90 % band holds only {100 * v.covered_after:.0f} % of the points that were set aside ({set_aside(v)})"
+        )
+    return f"it leaves {100 * found.remaining.share:.2g} % of the misfit, and no small error of the forms carries that"
 
 
 def _certain(found: Diagnosis) -> str:
