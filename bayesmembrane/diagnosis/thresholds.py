@@ -304,8 +304,8 @@ class VerdictThresholds:
     law_small: float = 0.1
     """Relative error of a law, twice what is expected, up to which it may carry what a name leaves."""
     chance: float = 3.0
-    """Standard deviations of reduced chi-square above 1 from which what a name leaves is no chance. Of 54 names on
-    239 synthetic cases, 2 left more than that and `noise_chi2`, and both were wrong, as were 4 of the others."""
+    """Standard deviations of reduced chi-square above 1 from which what a name leaves is no chance. Of 53 names on 260
+    synthetic cases, 2 left more than that and `noise_chi2`; both were wrong, and 3 of the others."""
     least_coverage: float = 0.45
     """Of held-out points inside the 90 % band: a model that covers fewer predicts nothing, and is not named."""
 
