@@ -43,7 +43,7 @@ def test_so_has_one_of_several_energies_that_are_sampled_well(run: Run) -> None:
 
 
 def test_a_yeoh_film_has_starts_for_nested_sampling_by_the_default_seed() -> None:
-    """What nested sampling begins with, alone: each is a film that the posterior knows."""
+    """What it begins with, alone: each is a film that exists."""
     posterior = Posterior(hypothesis("yeoh"), read_measurement(OP1[0], OP1[2]))
     starts = starting_points(posterior, np.random.default_rng([0, 7]), 2, STARTS, Outcomes())
     assert starts.shape == (2, STARTS, posterior.size)
