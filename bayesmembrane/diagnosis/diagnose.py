@@ -64,9 +64,9 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
     """The answer, with what was not needed to find it: power, errors on other points, what to measure next."""
     case.tell("checking on points that were set aside")
     validation = _validated(case, search, found)
-    found = _predicting(found, validation)
+    found = _finished(search, _predicting(found, validation), _null(case, found))
     known = found.verdict in ("named", "ambiguous", "material")
-    answer = found.members[0].candidate if known else _nearest(found, _null(case, found))
+    answer = found.members[0].candidate if found.members else _nearest(found, _null(case, found))
     left = remaining(search, answer, _null(case, found))
     found = replace(found, members=_adapted(search, found.members), ranking=_adapted(search, found.ranking))
     null = _null(case, found)
@@ -125,6 +125,13 @@ def _predicting(found: Verdict, validation: HeldOut | None) -> Verdict:
     if validation.covered_after >= VERDICT.least_coverage:
         return found
     return replace(found, verdict="unknown")
+
+
+def _finished(search: Search, found: Verdict, null: Candidate) -> Verdict:
+    """An effect that leaves structure, which no small error of the forms carries, is not the whole of it: no name."""
+    if found.verdict == "named" and remaining(search, found.members[0].candidate, null).strange:
+        return replace(found, verdict="unknown")
+    return found
 
 
 def _validated(case: OpenCase, search: Search, found: Verdict) -> HeldOut | None:

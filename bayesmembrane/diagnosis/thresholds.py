@@ -287,6 +287,13 @@ class VerdictThresholds:
     """Probability of something foreign from which on it is told beside what is more probable."""
     foreign_carries: float = 0.1
     """Of the misfit beyond noise: if something foreign takes more of it than that, effects are not named beside it."""
+    noise_chi2: float = 1.2
+    """Reduced chi-square up to which what is left is noise, if it is little of what was there too."""
+    noise_share: float = 0.1
+    """Share of the misfit up to which that holds."""
+    form_carries: float = 0.5
+    """Of what is left beyond noise: then the form error is said to carry it. Nothing is named that leaves more than
+    noise of more than that share, which no form error carries."""
     least_coverage: float = 0.45
     """Of held-out points inside the 90 % band: a model that covers fewer predicts nothing, and is not named."""
 
@@ -384,12 +391,6 @@ class WordsThresholds:
     """Probability from which a third digit is told."""
     all_of_it: float = 0.995
     """Share of the misfit: nothing was taken away."""
-    little_chi2: float = 1.2
-    """Reduced chi-square up to which what is left is noise, if it is little of what was there too."""
-    little_share: float = 0.1
-    """Share of the misfit up to which that holds."""
-    carried: float = 0.5
-    """Of what is left beyond noise: then the form error is said to carry it."""
     law_error: float = 0.03
     """Relative error of a law from which on it is told."""
     uneven: float = 1.5

@@ -6,9 +6,12 @@ import base64
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bayesmembrane.words.language import percent, three_digits, without_exponent
+
+if TYPE_CHECKING:
+    from bayesmembrane.words.brief import Brief
 
 PLAIN = "three digits"
 """Form of a column: three digits without an exponent."""
@@ -119,22 +122,16 @@ def _finite(value: Value) -> Value:
 
 @dataclass(frozen=True)
 class Lead:
-    """The first screen of a page: what was tested, the answer with what it leaves, errors, what to do; one picture.
+    """The first screen of a page: what was tested, the answer with what it leaves, errors, what to do; one picture."""
 
-    answer : a sentence without its end, and ``left`` that end
-    """
-
-    tested: str
-    answer: str
-    left: str
+    brief: Brief
     table: Table
-    following: str
     figure: Figure
 
     @property
     def lines(self) -> list[str]:
         """Its sentences."""
-        return [self.tested, f"{self.answer}, {self.left}.", self.following]
+        return self.brief.lines
 
     @property
     def words(self) -> int:

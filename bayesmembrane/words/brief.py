@@ -5,7 +5,7 @@ Made of a diagnosis or a loop alone. The table and the picture that belong to it
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words import language
-from bayesmembrane.words.diagnosis import percent, set_title
+from bayesmembrane.words.diagnosis import percent, set_title, why_not
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.moved import MATTERS, modulus_of
@@ -43,15 +43,27 @@ class Brief:
     """The sentences of a first screen.
 
     tested : film, readings, range, model
-    answer : probabilities and verdict, a sentence without its end
+    probable : what each round named, then the most probable explanations of the last, each with its probability
+    verdict : what that comes to, a clause without its end
     left : that end: how much the answer leaves, where, of what kind
     following : what to do next
     """
 
     tested: str
-    answer: str
+    probable: tuple[str, ...]
+    verdict: str
     left: str
     following: str
+
+    @property
+    def answer(self) -> str:
+        """Probabilities and verdict, a sentence without its end."""
+        return f"{'; '.join(self.probable)}: {self.verdict}"
+
+    @property
+    def spoken_verdict(self) -> str:
+        """The verdict with a capital, for a line of its own."""
+        return f"{self.verdict[:1].upper()}{self.verdict[1:]}"
 
     @property
     def lines(self) -> list[str]:
@@ -61,11 +73,15 @@ class Brief:
 
 @dataclass(frozen=True)
 class Course:
-    """The diagnoses that a first screen is about: the ``first``, those that ``named`` something, and the ``last``."""
+    """The diagnoses that a first screen is about: the ``first``, those that ``named`` something, and the ``last``.
+
+    sized : False: sizes are told elsewhere
+    """
 
     first: Diagnosis
     named: tuple[Diagnosis, ...]
     last: Diagnosis
+    sized: bool = True
 
     @property
     def telling(self) -> Diagnosis:
@@ -78,9 +94,9 @@ def of_diagnosis(d: Diagnosis) -> Brief:
     return _brief(Course(d, (d,) if d.explains else (), d), _next(d))
 
 
-def of_loop(found: Loop) -> Brief:
-    """Of a closed loop: what all rounds came to."""
-    course = course_of(found)
+def of_loop(found: Loop, *, sized: bool = True) -> Brief:
+    """Of a closed loop: what all rounds came to, with the sizes of what is probable or without."""
+    course = replace(course_of(found), sized=sized)
     following = _next(course.last)
     before, after = found.rounds[0].before, found.rounds[-1].after
     if course.named and course.last.verdict == "adequate":
@@ -98,9 +114,7 @@ def course_of(found: Loop) -> Course:
 
 def _brief(course: Course, following: str) -> Brief:
     d = course.telling
-    return Brief(
-        tested(course.first), f"{_probabilities(course)}: {_ANSWERS[d.verdict](course)}", left(course), following
-    )
+    return Brief(tested(course.first), _probabilities(course), _ANSWERS[d.verdict](course), left(course), following)
 
 
 # ---- what was tested -------------------------------------------------------------------------------------------------
@@ -122,12 +136,12 @@ def tested(d: Diagnosis) -> str:
 # ---- the answer ------------------------------------------------------------------------------------------------------
 
 
-def _probabilities(course: Course) -> str:
-    """``98 % friction in the guide (level 12 mN), 1 % no effect``: what each round named, then the telling one's."""
+def _probabilities(course: Course) -> tuple[str, ...]:
+    """``98 % friction in the guide (level 12 mN)``, ``1 % no effect``: what each round named, then the last answer."""
     d = course.telling
     earlier = [_told(x, set_name(x.best, x.null.names), course) for x in course.named if x is not d]
-    start = f"{', '.join(earlier)}, then " if earlier else ""
-    return start + ", ".join(_every(course))
+    first, *others = _every(course)
+    return *earlier, f"then {first}" if earlier else first, *others
 
 
 def _every(course: Course) -> list[str]:
@@ -148,7 +162,7 @@ def _told(d: Diagnosis, name: str, course: Course, sized: bool = True) -> str:
     """A set of effects with its probability; where the answer rests on it with the sizes, as they were fitted last."""
     p = percent(d.probabilities.effects.get(name, 0.0))
     of = next((j.candidate for j in d.members if set_name(j.candidate, d.null.names) == name), None)
-    if of is None or name == NOTHING or not sized:
+    if of is None or name == NOTHING or not (sized and course.sized):
         return f"{p} {set_title(name)}"
     if course.last is not d and set(name.split("+")) <= set(course.last.null.names):
         of = course.last.null
@@ -198,9 +212,8 @@ def _unknown(course: Course) -> str:
     if (strange := _strange(d)) is not None:
         beside = listed(effect_title(n) for n in strange.base.names)
         return f"{start}{_foreign(strange, d.measurement)}{f', beside {beside}' if beside and not sure else ''}"
-    if d.members and d.validation is not None:
-        covered = language.percent(d.validation.covered_after)
-        return f"nothing{further} is named, for this predicts only {covered} of the points held out"
+    if d.members:
+        return f"nothing{further} is named, for {why_not(d)}"
     if d.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{start}none of the energies has this form"
     return f"{start}too many explanations fit, and nothing{further} is named"
@@ -278,12 +291,12 @@ def noise_alone(d: Diagnosis) -> bool:
     r = d.remaining
     if d.verdict == "adequate" and d.detection.adequate:
         return True
-    return d.verdict != "unknown" and r.reduced_chi2 < WORDS.little_chi2 and r.share < WORDS.little_share
+    return d.verdict != "unknown" and r.noise
 
 
 def _kind(d: Diagnosis) -> str:
     r = d.remaining
-    if r.carried < WORDS.carried:
+    if r.carried < VERDICT.form_carries:
         return "of no kind that is known here"
     laws = [f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in r.law_errors.items() if e > WORDS.law_error]
     return f"smooth as if {listed([f'the energy were {100 * r.energy_error:.2g} %', *laws])} off"

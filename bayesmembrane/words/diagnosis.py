@@ -16,7 +16,7 @@ from bayesmembrane.diagnosis.left.heldout import HeldOut
 from bayesmembrane.diagnosis.reference.outliers import SetAside
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
-from bayesmembrane.diagnosis.thresholds import WORDS
+from bayesmembrane.diagnosis.thresholds import VERDICT, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed, spoken_parameter
@@ -95,12 +95,24 @@ def document(found: Diagnosis) -> dict[str, Any]:
 
 def sentence(found: Diagnosis) -> str:
     """What to read first: how probable, the verdict, how large, what remains, what to do; in the units of the rig."""
+    return f"{probability_sentence(found)} {_with_the_rest(_ANSWERS[found.verdict](found), found)}"
+
+
+def finding_sentence(found: Diagnosis) -> str:
+    """The same for those who have read the probabilities and the rivals: what was seen, how far the error falls."""
+    if found.verdict != "ambiguous":
+        return _with_the_rest(_ANSWERS[found.verdict](found), found)
+    count = len(found.members)
+    told = f"{_misses(found)}{_common(found)}any of {count} explanations may be right. {_error(found)}{_beside(found)}"
+    return _with_the_rest(told, found)
+
+
+def _with_the_rest(answer: str, found: Diagnosis) -> str:
+    """An answer with what it leaves, and what is to be known of noise and readings."""
     thinned = "" if found.thinned is None else f" {thinning_sentence(found.thinned)}"
     aside = "" if found.set_aside is None else f" {set_aside_sentence(found.set_aside)}"
-    parts = [probability_sentence(found), _ANSWERS[found.verdict](found).strip()]
-    if found.verdict != "adequate":
-        parts.append(remaining_sentence(found))
-    return " ".join(p for p in parts if p) + _noise(found) + aside + thinned
+    left = "" if found.verdict == "adequate" else f" {remaining_sentence(found)}"
+    return f"{answer.strip()}{left}{_noise(found)}{aside}{thinned}"
 
 
 def probability_sentence(found: Diagnosis) -> str:
@@ -134,11 +146,11 @@ def remaining_sentence(found: Diagnosis) -> str:
     text = f"Remaining: reduced chi-square {left.reduced_chi2:.2f}"
     if left.share < WORDS.all_of_it:
         text += f", {100 * left.share:.2g} % of the misfit beyond noise"
-    if left.reduced_chi2 < WORDS.little_chi2 and left.share < WORDS.little_share:
+    if left.noise:
         return f"{text}: noise."
     laws = [f"of {100 * e:.2g} % in {effect_title(n)}" for n, e in left.law_errors.items() if e > WORDS.law_error]
     forms = [f"an error of {100 * left.energy_error:.2g} % in the energy", *(f"one {w}" for w in laws)]
-    if left.carried >= WORDS.carried:
+    if left.carried >= VERDICT.form_carries:
         return f"{text}; {' and '.join(forms)} would carry it ({factor * left.rms:.2g} {unit})."
     return f"{text}; not even {' and '.join(forms)} would carry all of it."
 
@@ -312,11 +324,9 @@ def _unknown(found: Diagnosis) -> str:
         )
     shape = shape_in_words(found.shape, waves, found.rig, units)
     if found.members:
-        held, covered = set_aside(found.validation), found.validation
-        part = "" if covered is None else f"{100 * covered.covered_after:.0f} %"
         return (
             f"{_misses(found)}{_certain(found)}{_added(found.members[0].candidate, found)} would be the most probable, "
-            f"but its 90 % band holds only {part} of the points that were set aside ({held}): no name is given. {shape}"
+            f"but {why_not(found)}: no name is given. {shape}"
         )
     if found.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{_misses(found)}no effect is needed, and none of the energies has this form. {shape}"
@@ -324,6 +334,16 @@ def _unknown(found: Diagnosis) -> str:
         f"{_misses(found)}{_certain(found)}more explanations are about as probable than this measurement can part. "
         f"{shape}"
     )
+
+
+def why_not(found: Diagnosis) -> str:
+    """Why the most probable explanation is not named, as a clause."""
+    v = found.validation
+    if v is not None and v.covered_after < VERDICT.least_coverage:
+        return (
+            f"its 90 % band holds only {100 * v.covered_after:.0f} % of the points that were set aside ({set_aside(v)})"
+        )
+    return f"it leaves {100 * found.remaining.share:.2g} % of the misfit, and no small error of the forms carries that"
 
 
 def _certain(found: Diagnosis) -> str:

@@ -8,7 +8,7 @@ from bayesmembrane.diagnosis.loop import Loop, Round, Stage
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import WORDS
 from bayesmembrane.words.candidates import bounds, validation_sentence
-from bayesmembrane.words.diagnosis import sentence
+from bayesmembrane.words.diagnosis import finding_sentence
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.moved import modulus_fitted, modulus_of, moved_sentences
@@ -17,7 +17,7 @@ from bayesmembrane.words.seen import seen
 
 def answer(found: Loop) -> list[str]:
     """What was found and added, with the size, and how it ended."""
-    told = [sentence(r.diagnosis) for r in found.rounds]
+    told = [finding_sentence(r.diagnosis) for r in found.rounds]
     told = [told[0], *(f"With that: {s}" for s in told[1:])]
     last = found.rounds[-1]
     if last.changed:
@@ -78,7 +78,7 @@ def _fitted_rivals(last: Round) -> list[str]:
     fitted = listed(f"{g:.4g} MPa in {spoken(c.hypothesis)}" for g, c in zip(moduli, told, strict=True))
     (mean, sd), model = modulus_of(last.before.run), spoken(last.before.run.hypothesis)
     spread = (
-        "" if len(told) == 1 else f" They lie {100 * np.ptp(moduli) / np.mean(moduli):.2g} % apart from end to end."
+        "" if len(told) == 1 else f" They lie {100 * np.ptp(moduli) / np.mean(moduli):.0f} % apart from end to end."
     )
     return [f"The shear modulus is {mean:.4g} +- {sd:.2g} MPa in {model}; as fitted, not sampled, {fitted}.{spread}"]
 

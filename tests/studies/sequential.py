@@ -54,6 +54,8 @@ class Film:
         """All of it as an instrument writes it."""
         noise = Noise(**self.data.truth["noise"])
         force = response(self.data.film, self.path, self._at_work()) + noise.draw(rng, self.path.deflection)
+        if not np.all(np.isfinite(force)):
+            raise NoSolutionError("the film has no force somewhere on the way of the further test")
         told = replace(
             self.data,
             time_s=self.path.time,
@@ -84,6 +86,7 @@ class Film:
         up = np.diff(where, prepend=done.deflection[-1]) >= 0
         leg = int(done.leg[-1]) + np.cumsum(np.diff(up, prepend=bool(done.leg[-1] % 2 == 0)))
         speed = np.abs(np.diff(where, prepend=done.deflection[-1])) / np.diff(when, prepend=done.time[-1])
+        speed[speed == 0.0] = np.median(speed)  # a turning point is read twice, and the drive stood at no time
         peak = np.array([max(np.max(where[leg == n]), where[leg == n][0]) for n in leg])
         joined = [np.concatenate(pair) for pair in zip(_arrays(done), (when, where, leg, speed, peak), strict=True)]
         return Film(self.data, Way(*joined))
@@ -128,8 +131,11 @@ def run_case(case: Case) -> Row:
         if trial is None:
             break
         row["tests"].append(trial.test.kind.value)
-        film = film.moved(trial)
-        measurement = film.measurement(np.random.default_rng([case.seed, 91, turn]))
+        try:
+            film = film.moved(trial)
+            measurement = film.measurement(np.random.default_rng([case.seed, 91, turn]))
+        except NoSolutionError as error:
+            return row | {"error": str(error)}
     return row
 
 

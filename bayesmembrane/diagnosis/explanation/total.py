@@ -134,7 +134,9 @@ def summed(grown: Grown) -> Total:
     owners = _owners(grown, [c for c, kind, _ in terms if kind == NOTHING])
     joint, energies = defaultdict[tuple[str, str], float](float), defaultdict[str, float](float)
     for (c, kind, _), q in zip(terms, p, strict=True):
-        joint[owners[set_name(c, given)], kind] += float(q)
+        name = set_name(c, given)
+        joint[owners[name], kind] += BELIEFS.unseen * float(q)
+        joint[name, kind] += (1.0 - BELIEFS.unseen) * float(q)
         energies[c.hypothesis.material.name] += float(q)
     both = _falling(joint)
     marginal = Probabilities(_summed_out(both, 0), _falling(energies), _summed_out(both, 1))
@@ -201,7 +203,7 @@ def _owners(grown: Grown, every: Sequence[Candidate]) -> dict[str, str]:
     """{set of effects: the part of it that the data speak for}.
 
     A further effect that the data do not support, and that takes nothing away, is not seen to be there, nor seen to be
-    absent: such a set says no more than the set without it.
+    absent: such a set says little more than the set without it (`BELIEFS.unseen`).
     """
     given = set(grown.case.null.names)
     best: dict[frozenset[str], Candidate] = {}

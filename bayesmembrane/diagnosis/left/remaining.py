@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search, beyond_noise
+from bayesmembrane.diagnosis.thresholds import VERDICT
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,20 @@ class Remaining:
     rms: float
     energy_error: float
     law_errors: Mapping[str, float]
+
+    @property
+    def noise(self) -> bool:
+        """True if that is noise alone."""
+        return self.reduced_chi2 < VERDICT.noise_chi2 and self.share < VERDICT.noise_share
+
+    @property
+    def strange(self) -> bool:
+        """True if it is neither noise, nor a little of what was there, nor what a small error of the forms carries."""
+        return (
+            self.reduced_chi2 >= VERDICT.noise_chi2
+            and self.share >= VERDICT.noise_share
+            and self.carried < VERDICT.form_carries
+        )
 
 
 def remaining(search: Search, model: Candidate, plain: Candidate) -> Remaining:

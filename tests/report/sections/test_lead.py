@@ -80,10 +80,10 @@ def test_a_first_screen_has_fewer_than_120_words_and_begins_with_probabilities(r
     for name, result in every_end(request).items():
         lead = lead_of(result)
         assert lead.words < WORDS, name
-        assert re.match(r"[<>] |\d", lead.answer), name
-        assert "%" in lead.answer.partition(":")[0], name
-        assert lead.left.startswith("leaving "), name
-        assert lead.following.endswith("."), name
+        assert re.match(r"[<>] |\d", lead.brief.answer), name
+        assert all("%" in line for line in lead.brief.probable), name
+        assert lead.brief.left.startswith("leaving "), name
+        assert lead.brief.following.endswith("."), name
 
 
 def test_every_part_of_a_page_is_made_once(named: Loop, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,7 +136,7 @@ def test_what_was_not_measured_is_called_so_in_title_legend_and_axes(named: Loop
     content = compose([other])
     assert content.lead is not None
     assert content.title.startswith("What the reconstructed force curve of ")
-    assert "(reconstructed, not measured)" in content.lead.tested
+    assert "(reconstructed, not measured)" in content.lead.brief.tested
     assert handles(steps_of(other), seen(other.measurement))[0].get_label() == "reconstructed"
     assert "reconstructed less fitted" in content.lead.figure.caption
     assert not any(re.match("Measured less fitted", s) for s in told(content))
@@ -152,14 +152,14 @@ def test_an_estimate_at_its_bound_and_an_implausible_size_are_flagged_where_they
     x[place] *= 30
     far = replace(c, x=x, at_bound=("friction.level", "friction.travel"))
     flagged = replace(d, members=(replace(member, candidate=far),), best=far)
-    size = re.search(r"friction in the guide \((.*?)\)", lead_of(flagged).answer)
+    size = re.search(r"friction in the guide \((.*?)\)", lead_of(flagged).brief.answer)
     assert size is not None
     assert re.fullmatch(r"level [\d.]+ mN, implausible: usual [\d.]+ mN, at its bound, travel at its bound", size[1]), (
         size[1]
     )
     assert sizes(far, d) == [size[1]]
-    assert "implausible" not in lead_of(d).answer
-    assert "bound" not in lead_of(d).answer
+    assert "implausible" not in lead_of(d).brief.answer
+    assert "bound" not in lead_of(d).brief.answer
 
 
 def test_a_strip_is_told_in_stretch_and_stress(strip: Diagnosis, tmp_path: Path) -> None:
@@ -232,7 +232,7 @@ def test_where_loops_share_a_page_each_part_begins_with_its_own_first_screen(nam
     content = compose([named, unknown])
     assert content.lead is None
     first = [p.blocks[0] for p in content.parts if p.key.startswith("loop")]
-    assert [b.answer for b in first if isinstance(b, Lead)] == [lead_of(x).answer for x in (named, unknown)]
+    assert [b.brief for b in first if isinstance(b, Lead)] == [lead_of(x).brief for x in (named, unknown)]
     assert sum(t.name.startswith("first screen") for t in content.tables) == 2
 
 

@@ -143,8 +143,17 @@ def test_a_modulus_that_moves_by_many_standard_deviations_was_bent() -> None:
 def test_the_answer_tells_every_round(named: Loop) -> None:
     first, second = answer(named)
     assert "misses something (p < 0.0001): friction in the guide" in first
-    assert second.startswith("With that: Probability: no effect ")
-    assert "neo-Hookean with friction in the guide describes the curve" in second
+    assert second.startswith("With that: neo-Hookean with friction in the guide describes the curve")
+
+
+def test_what_the_first_screen_tells_is_not_told_again(ambiguous: Loop) -> None:
+    """Probabilities, rivals and the next test stand there and in the list of what could explain it."""
+    d = ambiguous.rounds[-1].diagnosis
+    (told,) = answer(ambiguous)
+    assert f"any of {len(d.members)} explanations may be right" in told
+    assert "Probability" not in told
+    assert "To tell them apart" not in told
+    assert "root mean square" in told
 
 
 def test_what_was_changed_is_said_before_how_it_ended(named: Loop, unknown: Loop) -> None:

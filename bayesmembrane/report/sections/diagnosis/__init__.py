@@ -84,7 +84,7 @@ def _part(d: Diagnosis, end: str) -> Part:
     told = [*(s for s in [validation_sentence(d)] if s), *bounds(d)]
     blocks: list[Block] = [
         *([lead_of(d)] if end else []),
-        Text(words.sentence(d)),
+        Text(words.finding_sentence(d)),
         *points(told),
         _residuals(d),
         before_and_after(d, f"diagnosis errors{end}"),

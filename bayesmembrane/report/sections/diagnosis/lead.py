@@ -47,7 +47,7 @@ class Step:
 
 def lead(brief: Brief, steps: Sequence[Step], last: Diagnosis) -> Lead:
     """The first screen; one step where nothing was found, else the first and the last. Noise is as ``last`` has it."""
-    return Lead(brief.tested, brief.answer, brief.left, errors(steps, last), brief.following, _figure(steps, last))
+    return Lead(brief, errors(steps, last), _figure(steps, last))
 
 
 def errors(steps: Sequence[Step], last: Diagnosis) -> Table:

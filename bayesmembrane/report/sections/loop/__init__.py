@@ -55,11 +55,13 @@ class LoopSection(Section):
         return [_part(found, number if len(loops) > 1 else 0) for number, found in enumerate(loops, 1)]
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
-        """A paragraph for each round and one for the modulus; one for each loop where there are several."""
+        """A paragraph for each round and one for the modulus; one for each loop where there are several, whose first
+        screens tell the sizes.
+        """
         loops = of_kind(results, Loop)
         if len(loops) == 1:
             return [*answer(loops[0]), *moved(loops[0])[:1]]
-        return [f"{subject(found)}: {' '.join(of_loop(found).lines[1:])}" for found in loops]
+        return [f"{subject(found)}: {' '.join(of_loop(found, sized=False).lines[1:])}" for found in loops]
 
     def lead(self, results: Sequence[Any]) -> Lead | None:
         loops = of_kind(results, Loop)

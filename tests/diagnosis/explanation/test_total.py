@@ -1,0 +1,71 @@
+"""The sum over hypotheses: what a further effect that the data do not speak for is worth."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
+from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.explanation import total
+from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
+from bayesmembrane.diagnosis.explanation.case import OpenCase
+from bayesmembrane.diagnosis.explanation.growth import Grown
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.hypothesis import hypothesis
+from tests.diagnosis.curves import measured
+
+LEFT = 100.0
+
+
+def candidate(*effects: str, log_evidence: float) -> Candidate:
+    claim = with_effects(hypothesis("gent"), [components("effects")[n]() for n in effects])
+    nothing, x = np.zeros(3), np.zeros(claim.curve_size)
+    return Candidate(claim, x, nothing, nothing[:, None], log_evidence, (), nothing[None], np.zeros(2), nothing)
+
+
+def effects(monkeypatch: pytest.MonkeyPatch, takes: float, gain: float) -> dict[str, float]:
+    """Probabilities where friction explains the curve, and Mullins beside it ``takes`` squares and ``gain`` in ln Z."""
+    monkeypatch.setattr(total, "twins", lambda _: frozenset())
+    monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
+    monkeypatch.setattr(total, "foreign", lambda *_: [])
+    squares = {frozenset(): LEFT, frozenset({"friction"}): 20.0, frozenset({"friction", "mullins"}): 20.0 - takes}
+    search = SimpleNamespace(excess=lambda c: squares[frozenset(c.names)])
+    plain = candidate(log_evidence=-60.0)
+    case = SimpleNamespace(
+        null=plain,
+        plain={"gent": plain},
+        visible=[None] * 4,
+        question=SimpleNamespace(energy=None),
+        measurement=measured(np.ones(3)),
+        tell=lambda _: None,
+    )
+    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
+    for c in (
+        plain,
+        candidate("friction", log_evidence=-10.0),
+        candidate("friction", "mullins", log_evidence=-10.0 + gain),
+    ):
+        grown.add(c)
+    return dict(total.summed(grown).probabilities.effects)
+
+
+def test_an_effect_that_is_not_seen_keeps_a_part_of_its_probability(monkeypatch: pytest.MonkeyPatch) -> None:
+    p = effects(monkeypatch, takes=0.5, gain=0.0)
+    odds = np.exp(BELIEFS.log_set(2, 4) - BELIEFS.log_set(1, 4))
+    alone = odds / (1 + odds)
+    assert p["friction+mullins"] == pytest.approx((1 - BELIEFS.unseen) * alone, rel=1e-6)
+    assert p["friction"] == pytest.approx(1 - p["friction+mullins"], abs=1e-9)
+
+
+@pytest.mark.parametrize(("takes", "gain"), [(0.5, 2 * BELIEFS.supported), (1.1 * BELIEFS.takes, 0.0)])
+def test_one_that_is_seen_keeps_all_of_it(monkeypatch: pytest.MonkeyPatch, takes: float, gain: float) -> None:
+    p = effects(monkeypatch, takes, gain)
+    counted = BELIEFS.counts(50.0 + gain) * gain
+    odds = np.exp(counted + BELIEFS.log_set(2, 4) - BELIEFS.log_set(1, 4))
+    assert p["friction+mullins"] == pytest.approx(odds / (1 + odds), rel=1e-6)
+
+
+def test_probabilities_add_up_to_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert sum(effects(monkeypatch, takes=3.0, gain=-1.0).values()) == pytest.approx(1.0)
