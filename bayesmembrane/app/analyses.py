@@ -256,12 +256,13 @@ def loop(
 ) -> Answer[Loop]:
     """Diagnose, add what is missing, calibrate again; its runs lie where ``how`` says, or where the answers do.
 
-    ``how`` has what ``work`` does not say: seed and draws are those of ``work``.
+    ``how`` has what ``work`` does not say: seed and ESS are those of ``work``.
     """
     how = replace(how, seed=work.seed, ess=work.ess, out=how.out or work.out)
     question = claim if isinstance(claim, Question) else Question(claim)
     label = question.hypothesis.label()
-    settings = {"seed": work.seed, "ess": work.ess, "adapt_noise": how.adapt_noise, "declared": question.declared}
+    settings: dict[str, Any] = {"seed": work.seed, "ess": work.ess, "adapt_noise": how.adapt_noise}
+    settings["declared"] = question.declared
     if how.leaders:
         settings["rivals"] = how.leaders
     if how.predict:
