@@ -142,8 +142,9 @@ def close_loop(name: str, stem: str, work: Work) -> None:
     measurement, *others = (_curve(s) for s in (stem, *PREDICTED.get(stem, ())))
     well = replace(work, ess=min(work.ess, LOOP_ESS))
     question = Question(hypothesis(name or VALLEYS[0]), declared=name != OPEN)
-    end = analyses.AtTheEnd(predict=tuple(others), scatter=SCATTER)
-    analyses.loop(measurement, question, well, runs=_folder(work) / "loops", end=end)
+    runs = _folder(work) / "loops"
+    how = replace(analyses.ADAPTING, out=runs, predict=tuple(others), scatter=SCATTER)
+    analyses.loop(measurement, question, well, how)
 
 
 def _curve(stem: str) -> Measurement:

@@ -212,6 +212,8 @@ def _band(surface: Surface, line: LossProfile, least: float, normal: NormalPoste
     r, j = surface.batch(z)
     rise = ((1 + WIDER) * 1.3 * least) ** 2 - np.sum(r * r, axis=1)
     half = np.sqrt(np.maximum(rise, 0.1 * least**2) / np.sum(j[:, :, o] ** 2, axis=1))
+    if np.any(known := np.isfinite(half)):  # a film without slopes, among others that have them, has a width like them
+        half = np.interp(at, at[known], half[known])
     # Where the posterior weighs the points otherwise than the loss does, its ridge runs beside the floor.
     slope = covariance[o, i] / covariance[i, i]
     ridge = normal.z[o] + slope * (at - normal.z[i]) - z[:, o]
