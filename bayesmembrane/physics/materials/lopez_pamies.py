@@ -42,7 +42,8 @@ class LopezPamies(Material):
     coordinates: ClassVar[tuple[Parameter, ...]] = (
         LN_GD,
         Parameter("ln_r2", "-", "ln(c2 / c1), stiffness of term 2 to term 1", Normal(-1.0, 2.0), (-25.0, 15.0)),
-        Parameter("a1", "-", "the lower exponent", Normal(0.5, 1.5), (-6.0, 7.0)),
+        # Films with nothing but negative exponents soften until they give way: few draws are such.
+        Parameter("a1", "-", "the lower exponent", Normal(0.7, 0.8), (-6.0, 7.0)),
         Parameter("ln_a21", "-", "logarithm of a2 - a1", Normal(np.log(2.5), 0.7), (-5.0, 5.0)),
     )
 
