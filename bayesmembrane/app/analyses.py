@@ -41,7 +41,7 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.interrupts import Stop, never
 from bayesmembrane.ground.jobs import Tell, silent
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.registry import components, materials
+from bayesmembrane.ground.registry import components, ordinary_materials
 from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.forward import Solve
@@ -276,7 +276,7 @@ def loop(
 
 def library() -> list[type[Any]]:
     """Every effect and every material: what a search for something missing may try, and thus depends on."""
-    return [*components("effects").values(), *materials().values()]
+    return [*components("effects").values(), *ordinary_materials().values()]
 
 
 def _mark(draws: Array) -> str:

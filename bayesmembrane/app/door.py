@@ -29,7 +29,7 @@ from bayesmembrane.diagnosis.loop import Loop, LoopSettings
 from bayesmembrane.diagnosis.other_tests import OtherTest, predicted
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.errors import SettingsError
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.ground.threads import one_thread
 from bayesmembrane.physics import hypothesis as hypotheses
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -258,7 +258,7 @@ def _asked(hypothesis: Hypothesis | None) -> Question:
     """The question of a diagnosis, about an energy that is preferred or about none."""
     if hypothesis is not None:
         return Question(hypothesis)
-    return Question(hypotheses.hypothesis(min(materials())), declared=False)
+    return Question(hypotheses.hypothesis(min(ordinary_materials())), declared=False)
 
 
 @one_thread

@@ -15,7 +15,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.physics.convexity import FREE, MODES
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -261,7 +261,7 @@ def _limit(surface: Surface, line: LossProfile, seed: int) -> str:
     ends = [e for e in line.ends if e.open]
     if not ends or surface.hypothesis.effects:
         return ""
-    for name, kind in materials().items():
+    for name, kind in ordinary_materials().items():
         if len(kind.field_names()) >= surface.chart.size or name == surface.hypothesis.material.name:
             continue
         simple = fit(surface.measurement, replace(surface.hypothesis, material=kind, convexity=FREE), seed=seed)

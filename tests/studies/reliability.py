@@ -26,7 +26,7 @@ from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.explanation.total import set_name
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.errors import BayesmembraneError
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import materials, ordinary_materials
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.words.diagnosis import document
 from tests.generator.datasets import Dataset, generate
@@ -94,7 +94,7 @@ def run_case(case: Case, energy: str, source: str, half: str) -> Row:
 
 def diagnosed(measurement: Measurement, material: str | None) -> Diagnosis:
     """The answer with an energy declared, or with none."""
-    asked = Hypothesis(materials()[material or min(materials())])
+    asked = Hypothesis(materials()[material or min(ordinary_materials())])
     return diagnose(measurement, Question(asked, declared=material is not None))
 
 
