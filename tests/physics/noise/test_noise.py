@@ -11,7 +11,7 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.form_error import MIXED, MOST_MIXED
-from bayesmembrane.physics.noise.ar1 import AR1
+from bayesmembrane.physics.noise.ar1 import AR1, AR1Likelihood
 from bayesmembrane.physics.noise.ar1_readings import AR1Readings
 from bayesmembrane.physics.noise.base import SD, Elsewhere, Noise, NoiseLikelihood
 from bayesmembrane.physics.noise.form import Form
@@ -294,3 +294,19 @@ def test_twenty_thousand_readings_need_no_square_of_that() -> None:
     found = bound.log_likelihood(np.full((1, n), 1e-3), np.array([[-6.0, -6.0]]))
     assert np.isfinite(found[0])
     assert sum(a.nbytes for a in (bound.factors.state, bound.factors.progress)) < 40 * 8 * n
+
+
+def test_a_memory_of_many_times_the_test_beside_a_given_covariance_has_a_likelihood() -> None:
+    """Such a covariance is of rank one but for round-off: no factor of it can be taken as it is."""
+    n = 12
+    m = Measurement(
+        np.linspace(0.001, 0.01, n),
+        np.ones(n),
+        Annulus(0.010, 0.035),
+        Specimen("film", 50e-6),
+        time=np.arange(1.0, n + 1),
+        covariance=1e-22 * np.eye(n),
+    )
+    x = np.array([[0.0, 45.0], [np.log(1e-3), 1.0]])
+    found = AR1Likelihood(m).log_likelihood(np.full((2, n), 1e-3), x)
+    assert np.all(np.isfinite(found))

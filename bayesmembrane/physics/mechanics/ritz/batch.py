@@ -130,8 +130,9 @@ def run(
         return np.ascontiguousarray(rows[:, pad].reshape(len(rows), blocks, LANES).transpose(1, 0, 2))
 
     gd = np.broadcast_to(shear_modulus(request), (1, count))
-    result = np.empty((blocks, LANES, kernels.RESULTS + (fields if sensitivities else 0), n))
-    trace = np.empty((blocks, LANES, start.unknowns.shape[1] + start.gains.shape[1], n))
+    # Not whatever lay in memory: what is reckoned with cells that no film reaches must be the same every time.
+    result = np.full((blocks, LANES, kernels.RESULTS + (fields if sensitivities else 0), n), np.nan)
+    trace = np.full((blocks, LANES, start.unknowns.shape[1] + start.gains.shape[1], n), np.nan)
     given = (request.parameters.T, gd, request.prestretch[None], grid, start.unknowns.T, start.ends.T)
     rows, tables = (blocked(v) for v in given), basis(*LEVELS[level])
     compiled(request.material).follow(*rows, tables, (most, *LIMITS), keep, sensitivities, result, trace)
