@@ -25,7 +25,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayesmembrane.physics.mechanics.compiled import inlined
 from bayesmembrane.physics.mechanics.ritz.simd import LANES, greatest, least, load, load_all, splat, store, where
 
 if TYPE_CHECKING:
@@ -465,7 +464,6 @@ def spread(rows, films, first, column):
             films[k, first + r, column] = rows[r, k]
 
 
-@inlined
 def follow_block(p_rows, gd, l0, grid, q, ends, tables, limits, keep, wanted, result, trace):
     """`follow` for one block; q (2n, LANES) is overwritten."""
     nodes, weights, value, rate, extra, low, width = tables
