@@ -39,7 +39,7 @@ from bayesmembrane.diagnosis.loop import Loop, LoopSettings
 from bayesmembrane.diagnosis.loop import loop as run_loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.interrupts import Stop, never
-from bayesmembrane.ground.jobs import Tell, silent
+from bayesmembrane.ground.jobs import Submit, Tell, silent
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components, ordinary_materials
 from bayesmembrane.ground.stored import store
@@ -149,9 +149,17 @@ def _keep_phases(measurement: Measurement, folder: Path) -> None:
 
 
 def compare(
-    ranges: Mapping[str, Range], claims: Sequence[Hypothesis], work: Work, *, workers: int | None = None
+    ranges: Mapping[str, Range],
+    claims: Sequence[Hypothesis],
+    work: Work,
+    *,
+    workers: int | None = None,
+    submit: Submit | None = None,
 ) -> Answer[dict[str, Comparison]]:
-    """The evidence for each hypothesis on each range; the result is by the names of the ranges."""
+    """The evidence for each hypothesis on each range; the result is by the names of the ranges.
+
+    ``submit`` takes the jobs, if there are workers already.
+    """
     parts = [r.measurement for r in ranges.values()]
     wholes = [None if r.whole is None else r.whole.data_hash for r in ranges.values()]
     settings = {"seed": work.seed, "ess": work.ess, "names": list(ranges), "wholes": wholes}
@@ -159,7 +167,7 @@ def compare(
     if (stored := held("comparison", what, work.out)) is not None:
         return stored
     judging = Judging(work.seed, work.ess, out=work.out, processes=workers)
-    found = compare_ranges(ranges, claims, judging, progress=work.tell)
+    found = compare_ranges(ranges, claims, judging, progress=work.tell, submit=submit)
     return kept("comparison", found, document(found), what, work.out)
 
 

@@ -6,7 +6,8 @@ Five materials on both ranges of the paper are fitted, sampled and compared, val
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -26,7 +27,7 @@ from bayesmembrane.data.published import read_published_table
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.diagnosis.explanation.case import Question
-from bayesmembrane.ground.jobs import Tell, silent, workers
+from bayesmembrane.ground.jobs import Submit, Tell, silent, workers
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.ground.stored import answer, answer_folders, store
@@ -44,6 +45,8 @@ LOOPS = (
     *(("yeoh", "elastosil_50um_first_loading"), ("yeoh", "elastosil_50um_op1")),
     *((OPEN, "vhb4910_0d03"), ("yeoh", "synthetic_cyclic")),
 )
+LONGEST = "synthetic_cyclic"
+"""The loop that takes most of the time; it is begun first, so that nobody waits for it alone."""
 LOOP_ESS = 400.0
 # The same tape at other rates, which no fit sees. Its strips differ by about five per cent: loading legs of nine pairs
 # at one rate are 3.3 kPa apart (root mean square; docs/studies/vhb.md), thus 2.3 kPa each, of some 45 kPa.
@@ -52,6 +55,7 @@ SCATTER = 0.05
 
 
 Verb = Callable[[Work], None]
+Verbs = dict[str, Verb]
 
 
 def order() -> list[tuple[str, str]]:
@@ -63,12 +67,15 @@ def order() -> list[tuple[str, str]]:
     return [(name, range_name) for pair in pairs for range_name in RANGES for name in pair]
 
 
-def stages() -> tuple[dict[str, Verb], ...]:
-    """The verbs by the label that their progress has; those of one stage do not need each other."""
-    first: dict[str, Verb] = {f"{name}, {where}": partial(calibrate, name, where) for name, where in order()}
-    then: dict[str, Verb] = {f"loop, {stem}": partial(close_loop, name, stem) for name, stem in LOOPS}
-    then |= {f"valleys, {name}": partial(follow_valleys, name) for name in VALLEYS}
-    return {**first, "reconstruct": reconstruct}, then
+def verbs() -> tuple[Verbs, Verbs, Verbs]:
+    """The verbs by the label that their progress has: calibrations and the reconstruction; loops, which need none of
+    these, the longest first; and valleys, which need the calibrations.
+    """
+    runs: Verbs = {f"{name}, {where}": partial(calibrate, name, where) for name, where in order()}
+    loops = sorted(LOOPS, key=lambda loop: loop[1] != LONGEST)
+    closed: Verbs = {f"loop, {stem}": partial(close_loop, name, stem) for name, stem in loops}
+    valleys: Verbs = {f"valleys, {name}": partial(follow_valleys, name) for name in VALLEYS}
+    return {**runs, "reconstruct": reconstruct}, closed, valleys
 
 
 def demo(page_folder: Path, work: Work) -> dict[str, Any]:
@@ -78,11 +85,21 @@ def demo(page_folder: Path, work: Work) -> dict[str, Any]:
     with the same data, settings and code are read back. Raises `StorageError` if a folder cannot be written.
     """
     began, folder = time.perf_counter(), _folder(work)
+    runs, loops, valleys = verbs()
     with workers(work.tell) as submit:
-        for stage in stages():
-            for job in [submit(_done, label, verb, replace(work, tell=silent)) for label, verb in stage.items()]:
-                job.result()
-    compare(work)
+
+        def begin(some: Verbs) -> list[Future[None]]:
+            return [submit(_done, label, verb, replace(work, tell=silent)) for label, verb in some.items()]
+
+        # One queue, so that no core waits: the longest first, and last the comparisons, which are many and short.
+        longest = next(iter(loops), "")
+        first = begin({label: loops[label] for label in loops if label == longest})
+        calibrated = begin(runs)
+        others = begin({label: loops[label] for label in loops if label != longest})
+        _wait(calibrated)
+        others += begin(valleys)
+        compare(work, submit)
+        _wait(first + others)
     page = write_report([folder], page_folder, TITLE, note)
     return {
         "report": str(page),
@@ -92,6 +109,11 @@ def demo(page_folder: Path, work: Work) -> dict[str, Any]:
         "stored": str(folder),
         "seconds": time.perf_counter() - began,
     }
+
+
+def _wait(jobs: Sequence[Future[None]]) -> None:
+    for job in jobs:
+        job.result()
 
 
 def _done(label: str, verb: Verb, work: Work, tell: Tell) -> None:
@@ -151,10 +173,10 @@ def _curve(stem: str) -> Measurement:
     return read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
 
 
-def compare(work: Work) -> None:
+def compare(work: Work, submit: Submit) -> None:
     """The five materials on each range of the paper, from the runs that are there."""
     ranges = {name: shipped_ranges()[name] for name in RANGES}
-    analyses.compare(ranges, [hypothesis(name) for name in ordinary_materials()], work)
+    analyses.compare(ranges, [hypothesis(name) for name in ordinary_materials()], work, submit=submit)
 
 
 def run_of(name: str, range_name: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import as_completed
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -88,16 +89,18 @@ def compare_ranges(
     judging: Judging = AS_USUAL,
     *,
     progress: Tell = silent,
+    submit: Submit | None = None,
 ) -> dict[str, Comparison]:
-    """`compare` on several measurements, by name, in one queue of jobs."""
+    """`compare` on several measurements, by name, in one queue of jobs: that of ``submit``, if there is one already."""
     labels = _labels(hypotheses)
     jobs: dict[Key, Job] = {
         (name, label): Job(", ".join(n for n in (label, name) if n), r.measurement, h, judging, r.whole)
         for name, r in ranges.items()
         for label, h in zip(labels, hypotheses, strict=True)
     }
-    with workers(progress, min(judging.processes or cores(), len(jobs))) as submit:
-        rows = _judged(jobs, submit)
+    own = workers(progress, min(judging.processes or cores(), len(jobs)))
+    with own if submit is None else nullcontext(submit) as queue:
+        rows = _judged(jobs, queue)
     return {name: ranked([rows[name, label] for label in labels]) for name in ranges}
 
 

@@ -7,7 +7,7 @@ ends in a traceback. Here the code comes first, under a name that nothing has, a
 
 from __future__ import annotations
 
-import itertools
+import hashlib
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -34,14 +34,11 @@ class _File(IndexDataCacheFile):  # type: ignore[misc]
     """The index of a function, and the files with its code."""
 
     def save(self, key: Any, data: Any) -> None:
-        overloads = self._load_index()
-        if key in overloads and Path(self._data_path(overloads[key])).exists():
-            self._save_data(overloads[key], data)
-            return
-        names = map(self._data_name, itertools.count(1))
-        name = next(n for n in names if not Path(self._data_path(n)).exists())
+        # A name that nothing else has, so that processes that compile side by side cannot take each other's code.
+        stamp = repr((key, self._source_stamp)).encode()
+        name = self._data_name(int.from_bytes(hashlib.sha256(stamp).digest()[:8], "big"))
         self._save_data(name, data)
-        self._save_index({**overloads, key: name})
+        self._save_index({**self._load_index(), key: name})
 
     def load(self, key: Any) -> Any:
         try:

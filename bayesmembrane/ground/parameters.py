@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 
 Array = NDArray[np.float64]
 
@@ -39,6 +38,13 @@ class Prior(ABC):
         return np.asarray(frozen(self).rvs(size=size, random_state=rng), dtype=float)
 
 
+def _stats() -> Any:
+    """``scipy.stats``, on demand: importing it takes half a second, and a force needs no prior's quantiles."""
+    from scipy import stats
+
+    return stats
+
+
 @lru_cache(maxsize=1024)
 def frozen(prior: Prior) -> Any:
     """The distribution of a prior, made once: SciPy takes 3 ms to make one."""
@@ -53,7 +59,7 @@ class Normal(Prior):
     sd: float
 
     def distribution(self) -> Any:
-        return stats.norm(self.mean, self.sd)
+        return _stats().norm(self.mean, self.sd)
 
     def log_density(self, x: ArrayLike) -> Array:
         z = (np.asarray(x, dtype=float) - self.mean) / self.sd
@@ -71,7 +77,7 @@ class Uniform(Prior):
     high: float
 
     def distribution(self) -> Any:
-        return stats.uniform(self.low, self.high - self.low)
+        return _stats().uniform(self.low, self.high - self.low)
 
     def log_density(self, x: ArrayLike) -> Array:
         x = np.asarray(x, dtype=float)
@@ -90,7 +96,7 @@ class HalfNormal(Prior):
     origin: float = 0.0
 
     def distribution(self) -> Any:
-        return stats.halfnorm(self.origin, self.scale)
+        return _stats().halfnorm(self.origin, self.scale)
 
     def log_density(self, x: ArrayLike) -> Array:
         z = (np.asarray(x, dtype=float) - self.origin) / self.scale
@@ -109,7 +115,7 @@ class LogNormal(Prior):
     spread: float
 
     def distribution(self) -> Any:
-        return stats.lognorm(self.spread, scale=self.median)
+        return _stats().lognorm(self.spread, scale=self.median)
 
     def log_density(self, x: ArrayLike) -> Array:
         x = np.asarray(x, dtype=float)

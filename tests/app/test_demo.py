@@ -19,12 +19,13 @@ from tests.report.blank import blank
 
 
 def test_the_verbs_can_be_sent_to_other_processes() -> None:
-    for stage in demo.stages():
-        assert pickle.loads(pickle.dumps(stage)).keys() == stage.keys()
-    first, then = demo.stages()
-    assert "reconstruct" in first
-    assert set(ordinary_materials()) == {label.partition(",")[0] for label in first} - {"reconstruct"}
-    assert len(then) == len(demo.LOOPS) + len(demo.VALLEYS)
+    for some in demo.verbs():
+        assert pickle.loads(pickle.dumps(some)).keys() == some.keys()
+    runs, loops, valleys = demo.verbs()
+    assert "reconstruct" in runs
+    assert set(ordinary_materials()) == {label.partition(",")[0] for label in runs} - {"reconstruct"}
+    assert next(iter(loops)).endswith(demo.LONGEST)
+    assert (len(loops), len(valleys)) == (len(demo.LOOPS), len(demo.VALLEYS))
 
 
 @pytest.mark.usefixtures("short_walks")
@@ -35,7 +36,7 @@ def test_a_short_demonstration_and_its_page(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(demo, "ordinary_materials", lambda: {one: material(one)})
     first = {f"{one}, {where}": partial(demo.calibrate, one, where) for where in demo.RANGES}
     monkeypatch.setattr(demo, "workers", partial(workers, count=1))  # a fresh process takes longer than its work here
-    monkeypatch.setattr(demo, "stages", lambda: (first, {"valleys": partial(demo.follow_valleys, one)}))
+    monkeypatch.setattr(demo, "verbs", lambda: (first, {}, {"valleys": partial(demo.follow_valleys, one)}))
     told: set[str] = set()
     work = Work(0, tmp_path / "chains", 100.0, lambda label, now: told.add(label))
     answer = demo.demo(tmp_path / "page", work)

@@ -16,14 +16,13 @@ from bayesmembrane.physics.mechanics import fallback
 from bayesmembrane.physics.mechanics.profile import profile
 from bayesmembrane.physics.mechanics.request import Request, Spared, request
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
-from bayesmembrane.physics.mechanics.shooting import solver as shooting
 from bayesmembrane.physics.mechanics.solution import Curves, Status
 
 Solve = Callable[[Request], Curves]
 """`solve`, or something in front of it."""
 
 SOLVERS: MappingProxyType[str, Solve] = MappingProxyType(
-    {"ritz": fallback.solve, "ritz_alone": ritz.solve, "shooting": shooting.solve}
+    {"ritz": fallback.solve, "ritz_alone": ritz.solve, "shooting": fallback.shoot}
 )
 __all__ = ["SOLVERS", "Request", "Solve", "Spared", "force_curve", "profile", "request", "ritz", "solve", "unaided"]
 

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.ndimage import minimum_filter
 
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
@@ -168,6 +167,8 @@ def _on_points(material: Material, l1: Array, l2: Array, measure: Measure) -> tu
 
 def _dips(value: Array, scale: Array) -> tuple[Any, Any]:
     """Grid indices of the lowest local minima, in absolute terms and relative to the size of the Hessian there."""
+    from scipy.ndimage import minimum_filter  # on demand: a force needs none
+
     with np.errstate(all="ignore"):
         relative = np.where(np.isfinite(value), value / scale, np.inf)
     chosen: list[Any] = []

@@ -8,7 +8,6 @@ import numpy as np
 
 from bayesmembrane.physics.mechanics.request import Request, Spared
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
-from bayesmembrane.physics.mechanics.shooting import solver as shooting
 from bayesmembrane.physics.mechanics.solution import Curves, Status
 
 
@@ -27,7 +26,7 @@ def solve(request: Request) -> Curves:
     films = np.flatnonzero(np.any(failed, axis=1))
     if films.size == 0:
         return curves
-    shot = shooting.solve(request.of(films))
+    shot = shoot(request.of(films))
     use = failed[films] & np.isin(shot.status, (Status.OK, Status.NOT_ELLIPTIC))
     merged = {}
     for f in fields(Curves):
@@ -39,3 +38,10 @@ def solve(request: Request) -> Curves:
         values[films] = np.where(mask, getattr(shot, f.name), values[films])
         merged[f.name] = values
     return replace(curves, **merged)
+
+
+def shoot(request: Request) -> Curves:
+    """Curves by shooting, imported on demand: SciPy's integrators take longer to import than a film to be solved."""
+    from bayesmembrane.physics.mechanics.shooting import solver as shooting
+
+    return shooting.solve(request)

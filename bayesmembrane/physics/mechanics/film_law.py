@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
 from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array
@@ -233,6 +232,8 @@ def error(found: FilmLaw, force: Array, slope: Array, deflection: Array) -> Arra
 @cache
 def _spline_slopes(count: int) -> tuple[Array, Array]:
     """Matrices (count, count) from values at j + 1/2 of an even function to its first two derivatives there."""
+    from scipy.interpolate import make_interp_spline  # as in `locking`: on demand
+
     at = np.arange(count) + 0.5
     both = np.concatenate([-at[::-1], at])
     unit = np.eye(count)

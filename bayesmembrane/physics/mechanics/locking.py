@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array
@@ -108,8 +108,10 @@ def locking_deflection(extensibility: ArrayLike, prestretch: ArrayLike, ratio: f
 
 
 @lru_cache(maxsize=64)
-def _table(l0: float, ratio: float) -> CubicSpline:
+def _table(l0: float, ratio: float) -> Any:
     """ln of the locking deflection against ln(Jm - Jm0), where Jm0 is the pre-stretch's own I1 - 3."""
+    from scipy.interpolate import CubicSpline  # takes longer to import than a film to be solved
+
     jm = np.exp(TABLE) + _own(l0)
     return CubicSpline(TABLE, np.log(_lock_all(jm, np.full(jm.size, l0), np.log(ratio))))
 

@@ -206,5 +206,7 @@ def replaced(
     elements, other = level
     new, out = np.empty((len(q), elements + 1)), np.empty((len(q), unknowns(elements, other)))
     tables = basis(elements, other)[:4]
+    # Rows one after the other, as numba would compile for each way in which they may lie.
+    q, ends, gains, d = (np.ascontiguousarray(v) for v in (q, ends, gains, d))
     _replace(q, ends, gains, d, bubbles, new, other, tables, SHARE, WIDEST, out)
     return new, out

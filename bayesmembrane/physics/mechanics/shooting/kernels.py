@@ -9,7 +9,9 @@ and find (l1, th)(0) such that l2(T) = l0 and h(T) = d. The tangent equations wo
 variables; in (l2, V, H) with V = exp(t) P1 cos th, H = exp(t) P1 sin th they need only second ones, since
     V. = exp(t) P2,   H. = 0,
     P11 dl1 + P12 dl2 = exp(-t) (dV cos th + dH sin th),   P1 dth = exp(-t) (dH cos th - dV sin th).
-``derivatives`` is the material's (see `compiled.bind`).
+``derivatives`` is the material's (see `compiled.bind`). Here numba compiles twice as fast for saying 14.0
+in calls (a whole number written there is a type of its own, for which the callee is compiled anew), and loops in place
+of whole arrays.
 """
 
 from __future__ import annotations
@@ -18,6 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.integrate import DOP853
+
+from bayesmembrane.physics.mechanics.compiled import inlined
 
 if TYPE_CHECKING:
     derivatives: Any = None
@@ -165,7 +169,7 @@ def solve_one(x, d, l0, span, p, rtol, most, stages, y, new, tangent):
     size1 = min(d, 1.0)
     size2 = size1 * size1
     base, change, norm, alpha = x.copy(), np.zeros(2), np.inf, 1.0
-    for iteration in range(most):
+    for iteration in range(int(most)):
         good = cross(x, l0, span, p, size2, size1, rtol, stages, y, new)
         now = np.hypot(y[0] / size2, (y[3] - d) / d)
         # Below 30 rtol there is round-off, and no further fall to be had.
@@ -173,13 +177,15 @@ def solve_one(x, d, l0, span, p, rtol, most, stages, y, new, tangent):
             if alpha < 1e-4 or iteration == 0:
                 return 0
             alpha *= 0.4
-            x[:] = base + alpha * change
+            for i in range(2):
+                x[i] = base[i] + alpha * change[i]
             continue
         norm, alpha = now, 1.0
         if not newton(y, d, change, tangent):
             return 0
-        base[:] = x
-        x += change
+        for i in range(2):
+            base[i] = x[i]
+            x[i] += change[i]
         # One more step squares the residual.
         if norm < rtol or (norm < 3e-5 and norm * norm < rtol):
             return iteration + 1 if x[0] > 0.0 and 0.0 < x[1] < np.pi else 0
@@ -209,7 +215,7 @@ def first_state(x, d, l0, span, p, rtol, stages, y, new, tangent):
             return False
         tried[i, j] = np.inf
         trial_start(i, j, d, l0, x)
-        if solve_one(x, d, l0, span, p, rtol, 60, stages, y, new, tangent) > 0:
+        if solve_one(x, d, l0, span, p, rtol, 60.0, stages, y, new, tangent) > 0:
             return True
     return False
 
@@ -251,8 +257,8 @@ def walk(x0, slope0, d0, targets, sweep, l0, span, p, rtol, out, end, stages, y,
             for i in range(2):
                 zero, power = (l0, 2.0) if i == 0 else (0.0, 1.0)
                 hint[i] = extrapolate(goal, d, x[i], tangent[i], d_old, x_old[i], tangent_old[i], zero, power)
-            guess[:] = hint
-            n = solve_one(guess, goal, l0, span, p, rtol, 14, stages, y, new, new_tangent)
+                guess[i] = hint[i]
+            n = solve_one(guess, goal, l0, span, p, rtol, 14.0, stages, y, new, new_tangent)
             spent += max(n, 1)
             if n == 0 or abs(guess[0] / hint[0] - 1.0) > 0.1 or abs(guess[1] - hint[1]) > 0.1:
                 n, d_old = 0, d
@@ -262,13 +268,17 @@ def walk(x0, slope0, d0, targets, sweep, l0, span, p, rtol, out, end, stages, y,
                         end[0], end[1], end[2] = x[0], x[1], d
                     return
                 continue
+            for i in range(2):
+                if goal != d:
+                    x_old[i], tangent_old[i] = x[i], tangent[i]
+                x[i], tangent[i] = guess[i], new_tangent[i]
             if goal != d:
-                x_old[:], tangent_old[:], d_old = x, tangent, d
-            x[:], tangent[:], d = guess, new_tangent, goal
+                d_old, d = d, goal
             stride = min(stride * 1.6, LONGEST)
         out[m, 0], out[m, 1], out[m, 2] = x[0], x[1], n
 
 
+@inlined
 def follow(targets, start, l0, span, p, rtol, out, end):
     """Follow one film through ascending scaled deflections ``targets`` (M,), from a state at small deflection.
 
@@ -282,15 +292,17 @@ def follow(targets, start, l0, span, p, rtol, out, end):
     d = min(0.5, targets[-1])
     stretched = min((l0 - 1.0) / (0.2 * d * d), 1.0) if l0 > 1.0 else 0.0
     x[0], x[1] = l0 + 0.1183 * d * d, d / (span * l0) * (0.7 + 0.3 * stretched)
-    found = solve_one(x, d, l0, span, p, rtol, 20, stages, y, new, tangent) > 0
+    found = solve_one(x, d, l0, span, p, rtol, 20.0, stages, y, new, tangent) > 0
     if not found:
         d = start
     for _ in range(6):
         found = found or first_state(x, d, l0, span, p, rtol, stages, y, new, tangent)
         if found:
-            above = np.searchsorted(targets, d)
-            walk(x, tangent, d, targets[above:], 1, l0, span, p, rtol, out[above:], end, stages, y, new)
-            walk(x, tangent, d, targets[:above], -1, l0, span, p, rtol, out[:above], end, stages, y, new)
+            above = 0
+            while above < targets.size and targets[above] < d:
+                above += 1
+            walk(x, tangent, d, targets[above:], 1.0, l0, span, p, rtol, out[above:], end, stages, y, new)
+            walk(x, tangent, d, targets[:above], -1.0, l0, span, p, rtol, out[:above], end, stages, y, new)
             return
         d *= 0.5
 
