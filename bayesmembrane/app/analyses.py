@@ -41,7 +41,7 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.interrupts import Stop, never
 from bayesmembrane.ground.jobs import Tell, silent
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.registry import components, materials
+from bayesmembrane.ground.registry import components, ordinary_materials
 from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.forward import Solve
@@ -56,6 +56,7 @@ from bayesmembrane.valleys.result import Valleys
 from bayesmembrane.words.language import listed
 
 CURVES = "curves"  # the folder beside the runs in which the solver keeps what it has computed
+ADAPTING = LoopSettings(adapt_noise=True)
 
 
 @dataclass(frozen=True)
@@ -252,47 +253,23 @@ def diagnose(measurement: Measurement, claim: Hypothesis | Question, work: Work)
     return kept("diagnosis", found, document(found), what, work.out)
 
 
-@dataclass(frozen=True)
-class AtTheEnd:
-    """What a loop makes at its end, beside its answer.
-
-    rivals : members of an ambiguous answer that are sampled, the first ones
-    predict : other tests of the same material, whose readings are predicted from the first diagnosis
-    scatter : relative standard deviation by which forces of two specimens differ
-    """
-
-    rivals: int = 0
-    predict: tuple[Measurement, ...] = ()
-    scatter: float = 0.0
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """What a stored answer depends on."""
-        return ({"rivals": self.rivals} if self.rivals else {}) | ({"scatter": self.scatter} if self.predict else {})
-
-
-NOTHING_MORE = AtTheEnd()
-
-
 def loop(
-    measurement: Measurement,
-    claim: Hypothesis | Question,
-    work: Work,
-    *,
-    adapt_noise: bool = True,
-    runs: Path | None = None,
-    end: AtTheEnd = NOTHING_MORE,
+    measurement: Measurement, claim: Hypothesis | Question, work: Work, how: LoopSettings = ADAPTING
 ) -> Answer[Loop]:
-    """Diagnose, add what is missing, calibrate again; its runs lie in ``runs``, or where the answers do."""
-    how = LoopSettings(
-        work.seed, runs or work.out, work.ess, adapt_noise, leaders=end.rivals, predict=end.predict, scatter=end.scatter
-    )
+    """Diagnose, add what is missing, calibrate again; its runs lie where ``how`` says, or where the answers do.
+
+    ``how`` has what ``work`` does not say: seed and ESS are those of ``work``.
+    """
+    how = replace(how, seed=work.seed, ess=work.ess, out=how.out or work.out)
     question = claim if isinstance(claim, Question) else Question(claim)
     label = question.hypothesis.label()
-    settings = {"seed": work.seed, "ess": work.ess, "adapt_noise": adapt_noise, "declared": question.declared}
-    settings |= end.settings
-    what = asked("loop", run_loop, [measurement, *end.predict], [question.hypothesis], settings, library())
-    what = replace(what, specimen=measurement.specimen.name, end=float(np.max(measurement.deflection)))
+    settings: dict[str, Any] = {"seed": work.seed, "ess": work.ess, "adapt_noise": how.adapt_noise}
+    settings["declared"] = question.declared
+    if how.leaders:
+        settings["rivals"] = how.leaders
+    if how.predict:
+        settings |= {"predict": [other.data_hash for other in how.predict], "scatter": how.scatter}
+    what = asked("loop", run_loop, [measurement], [question.hypothesis], settings, library())
     if (stored := held("loop", what, work.out)) is not None:
         return stored
     with in_pieces(what, work.out):
@@ -302,7 +279,7 @@ def loop(
 
 def library() -> list[type[Any]]:
     """Every effect and every material: what a search for something missing may try, and thus depends on."""
-    return [*components("effects").values(), *materials().values()]
+    return [*components("effects").values(), *ordinary_materials().values()]
 
 
 def _mark(draws: Array) -> str:

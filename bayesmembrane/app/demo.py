@@ -28,7 +28,7 @@ from bayesmembrane.data.shipped import shipped
 from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.ground.jobs import Tell, silent, workers
 from bayesmembrane.ground.plain import plain
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.ground.stored import answer, answer_folders, store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.page import write_report
@@ -58,7 +58,7 @@ def order() -> list[tuple[str, str]]:
     """Every material on every range: those with the most parameters first, since they take longest, and two materials
     at a time, so that no solver is compiled twice.
     """
-    names = sorted(materials(), key=lambda name: -len(materials()[name].field_names()))
+    names = sorted(ordinary_materials(), key=lambda name: -len(ordinary_materials()[name].field_names()))
     pairs = [names[i : i + 2] for i in range(0, len(names), 2)]
     return [(name, range_name) for pair in pairs for range_name in RANGES for name in pair]
 
@@ -87,7 +87,7 @@ def demo(page_folder: Path, work: Work) -> dict[str, Any]:
     return {
         "report": str(page),
         "verdicts": [_verdict(found) for found in _answers(folder, "loop")],
-        "runs": [str(folder / run_of(name, r)) for name in materials() for r in RANGES],
+        "runs": [str(folder / run_of(name, r)) for name in ordinary_materials() for r in RANGES],
         "suspect_rows": [row for found in _answers(folder, "reconstruction") for row in found["suspect_rows"]],
         "stored": str(folder),
         "seconds": time.perf_counter() - began,
@@ -142,8 +142,9 @@ def close_loop(name: str, stem: str, work: Work) -> None:
     measurement, *others = (_curve(s) for s in (stem, *PREDICTED.get(stem, ())))
     well = replace(work, ess=min(work.ess, LOOP_ESS))
     question = Question(hypothesis(name or VALLEYS[0]), declared=name != OPEN)
-    end = analyses.AtTheEnd(predict=tuple(others), scatter=SCATTER)
-    analyses.loop(measurement, question, well, runs=_folder(work) / "loops", end=end)
+    runs = _folder(work) / "loops"
+    how = replace(analyses.ADAPTING, out=runs, predict=tuple(others), scatter=SCATTER)
+    analyses.loop(measurement, question, well, how)
 
 
 def _curve(stem: str) -> Measurement:
@@ -153,7 +154,7 @@ def _curve(stem: str) -> Measurement:
 def compare(work: Work) -> None:
     """The five materials on each range of the paper, from the runs that are there."""
     ranges = {name: shipped_ranges()[name] for name in RANGES}
-    analyses.compare(ranges, [hypothesis(name) for name in materials()], work)
+    analyses.compare(ranges, [hypothesis(name) for name in ordinary_materials()], work)
 
 
 def run_of(name: str, range_name: str) -> str:

@@ -25,11 +25,11 @@ from bayesmembrane.data.importers.base import read_export
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.sequence import read_one_after_another
 from bayesmembrane.diagnosis.explanation.case import Question
-from bayesmembrane.diagnosis.loop import Loop
+from bayesmembrane.diagnosis.loop import Loop, LoopSettings
 from bayesmembrane.diagnosis.other_tests import OtherTest, predicted
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.errors import SettingsError
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.ground.threads import one_thread
 from bayesmembrane.physics import hypothesis as hypotheses
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -236,7 +236,8 @@ def loop(
     where neighbouring readings turn out to be correlated. Of an ambiguous answer nothing more is sampled: its members
     are hypotheses that `sample` takes.
     """
-    return analyses.loop(measurement, _asked(hypothesis), _work(seed, out, ess), adapt_noise=adapt_noise).result
+    how = LoopSettings(adapt_noise=adapt_noise)
+    return analyses.loop(measurement, _asked(hypothesis), _work(seed, out, ess), how).result
 
 
 @one_thread
@@ -257,7 +258,7 @@ def _asked(hypothesis: Hypothesis | None) -> Question:
     """The question of a diagnosis, about an energy that is preferred or about none."""
     if hypothesis is not None:
         return Question(hypothesis)
-    return Question(hypotheses.hypothesis(min(materials())), declared=False)
+    return Question(hypotheses.hypothesis(min(ordinary_materials())), declared=False)
 
 
 @one_thread

@@ -242,9 +242,9 @@ class PreferredMaterialOption(OptionGroup):
     @property
     def name(self) -> str:
         """The one that was named, or else the first in the library: any will do to ask the question."""
-        from bayesmembrane.ground.registry import materials
+        from bayesmembrane.ground.registry import ordinary_materials
 
-        return self.material or min(materials())
+        return self.material or min(ordinary_materials())
 
 
 @dataclass(frozen=True)

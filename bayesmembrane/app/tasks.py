@@ -135,8 +135,8 @@ def diagnose(task: Task, whole: Measurement, work: Work) -> tuple[Answer[Any], V
 
 def loop(task: Task, whole: Measurement, work: Work) -> tuple[Answer[Any], Values]:
     """The same, followed to its end; its runs lie apart, so that nobody else works on them."""
-    runs = (work.out or Path()) / "loops" / task.key
-    answer = analyses.loop(_part(task, whole), _question(task), work, runs=runs)
+    how = replace(analyses.ADAPTING, out=(work.out or Path()) / "loops" / task.key)
+    answer = analyses.loop(_part(task, whole), _question(task), work, how)
     return answer, _verdict(answer.document["rounds"][-1]) | {"rounds": len(answer.document["rounds"])}
 
 

@@ -14,10 +14,11 @@ from bayesmembrane.ground.parameters import Array
 
 BROAD, CLOSE, ROUNDS, EACH = 256, 256, 5, 192
 HALVINGS = 40  # of the interval of tempering powers
-VALLEYS, ITERATIONS = 8, 40
+VALLEYS, ITERATIONS, TURNS = 8, 40, 8
 WIDER = 1.5  # of the Laplace approximation
 DEGREES = 4.0  # of freedom of the t-distribution around a valley
 SPARE = 1.5  # effective number of candidates for each walker
+FINEST = 1e-11  # of the largest force: no noise that is inferred is below, as its bounds say
 
 
 def starting_points(
@@ -85,12 +86,12 @@ def _around_valleys(objective: Objective, pool: Array, rms: float, rng: np.rando
     """Draws (CLOSE, k) from a wide t-distribution around the optima of likelihood times prior.
 
     A normal with the prior's median and spread stands for the prior; the noise is the residual of the best start,
-    then of the best optimum.
+    then of the best optimum, until that falls no more.
     """
     k, low, high = pool.shape[1], objective.low, objective.high
     pull = np.diag(1 / objective.spread)
     own = objective.measurement.force_sd
-    floor = 1e-6 * np.max(np.abs(objective.measurement.force)) if own is None else float(np.sqrt(np.mean(own**2)))
+    floor = FINEST * np.max(np.abs(objective.measurement.force)) if own is None else float(np.sqrt(np.mean(own**2)))
     sigma = max(rms, floor)
 
     def residuals(x: Array) -> tuple[Array, Array]:
@@ -102,17 +103,29 @@ def _around_valleys(objective: Objective, pool: Array, rms: float, rng: np.rando
         )
 
     x = np.array(separated(pool, objective.spread, VALLEYS))
-    for _ in range(2):
+    for turn in range(TURNS):
         x, size = descend(residuals, x, (low, high), ITERATIONS)
-        best = x[int(np.argmin(size))]
+        best, before = x[int(np.argmin(size))], sigma
         sigma = max(float(np.sqrt(np.mean(objective(best)[0] ** 2))), floor)
+        # With too large a noise the prior keeps the optimum off the data: of fine ones it takes several turns.
+        if turn and sigma > before / 2:
+            break
     x, size = x[np.isfinite(size)], size[np.isfinite(size)]
     likely = size**2 < np.min(size**2, initial=np.inf) + 40.0
     _, jacobian = residuals(x[likely])
     which = rng.integers(np.count_nonzero(likely), size=CLOSE)
-    root = np.linalg.cholesky(np.linalg.inv(np.einsum("mnk,mnl->mkl", jacobian, jacobian)))
+    root = spread_of(jacobian)
     z = rng.standard_normal((CLOSE, k)) * np.sqrt(DEGREES / rng.chisquare(DEGREES, (CLOSE, 1)))
     return np.asarray(np.clip(x[likely][which] + WIDER * np.einsum("mkl,ml->mk", root[which], z), low, high))
+
+
+def spread_of(jacobian: Array) -> Array:
+    """(M, k, k) lower triangular L with L L^T = (J^T J)^-1, of J (M, n, k): by QR, for J^T J has half of its digits.
+
+    J P = Q R with P that turns the order round: L = P R^-1 P, its columns turned so that the diagonal is positive.
+    """
+    inverse = np.linalg.inv(np.linalg.qr(jacobian[..., ::-1], mode="r"))[..., ::-1, ::-1]
+    return np.asarray(inverse * np.sign(np.diagonal(inverse, axis1=1, axis2=2))[:, None, :])
 
 
 def tempered(lp: Array, worth: float, count: int, rng: np.random.Generator) -> Array:

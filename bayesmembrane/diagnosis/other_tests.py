@@ -16,11 +16,12 @@ import numpy as np
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.left.continued import Continued, continued
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import OTHER_TESTS
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.form_error import FormFactors, form_columns, joint_factors, traces
+from bayesmembrane.physics.form_error import FormFactors, joint_factors
 from bayesmembrane.physics.forward import Forward
 
 
@@ -106,18 +107,6 @@ def _members(found: Diagnosis) -> Iterator[tuple[Candidate, int]]:
             yield j.candidate, count
 
 
-@dataclass(frozen=True, eq=False)
-class _There:
-    """A hypothesis in another test: force (N,) N, what its linear model adds (N,) N, and the columns (N, m) of what is
-    not known of it, with the covariance (m, m) of their coefficients.
-    """
-
-    force: Array
-    moved: Array
-    columns: Array
-    covariance: Array
-
-
 def _draws(search: Search, c: Candidate, other: Measurement, count: int, rng: np.random.Generator) -> Array | None:
     """(count, N) N, without noise; None if the film does not get as far."""
     there = _at(search, c, other)
@@ -127,26 +116,14 @@ def _draws(search: Search, c: Candidate, other: Measurement, count: int, rng: np
     return np.asarray(there.force + there.moved + z @ there.columns.T)
 
 
-def _at(search: Search, c: Candidate, other: Measurement) -> _There | None:
+def _at(search: Search, c: Candidate, other: Measurement) -> Continued | None:
     n = len(search.measurement)
     both = joint_factors(search.measurement, other.path)
     part = replace(search, known_factors=FormFactors(both.state[:n], both.progress[:n], search.factors.local))
     fit = part.at(c.hypothesis, c.x)
     if fit is None:
         return None
-    forward = Forward(c.hypothesis, other, other.deflection, part.quick)
-    curve = forward(fit.x[None, :], sensitivities=True, reached=False)
-    assert curve.sensitivity is not None
-    force, slopes = curve.force[0], curve.sensitivity[0]
-    if not (np.all(np.isfinite(force)) and np.all(np.isfinite(slopes))):
-        return None
     rows = n + other.on_path
     factors = FormFactors(both.state[rows], both.progress[rows])
-    trace = traces(forward, fit.x[None, :], force[None, :])[0]
-    forms = [columns for _, columns in form_columns(factors, force, c.hypothesis.effects, trace)]
-    columns = np.column_stack([slopes * part.steepness(fit), *forms])
-    mean, covariance = part.linear(fit).coefficients(fit.theta)
-    mean[: fit.x.size] -= part.coefficients_at(fit)
-    # What is not steady in one test is another thing in the other.
-    m = columns.shape[1]
-    return _There(force, columns @ mean[:m], columns, covariance[:m, :m])
+    there = continued(part, fit, Forward(c.hypothesis, other, other.deflection, part.quick), factors)
+    return there if there.complete else None

@@ -39,6 +39,11 @@ def materials() -> dict[str, type[Material]]:
     return components("materials")
 
 
+def ordinary_materials() -> dict[str, type[Material]]:
+    """The strain energies that "all energies" means where none is named, sorted by name: those declared `ordinary`."""
+    return {name: kind for name, kind in materials().items() if kind.ordinary}
+
+
 def material(name: str) -> type[Material]:
     """The strain energy called ``name``; raises `SettingsError` with the nearest known names."""
     return component("materials", name)

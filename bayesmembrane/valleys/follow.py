@@ -16,7 +16,7 @@ from bayesmembrane.data.published import read_published_table
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.pieces import piece, within
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.physics.convexity import FREE, MODES
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -218,6 +218,8 @@ def _band(surface: Surface, line: LossProfile, least: float, normal: NormalPoste
     r, j = surface.batch(z)
     rise = ((1 + WIDER) * 1.3 * least) ** 2 - np.sum(r * r, axis=1)
     half = np.sqrt(np.maximum(rise, 0.1 * least**2) / np.sum(j[:, :, o] ** 2, axis=1))
+    if np.any(known := np.isfinite(half)):  # a film without slopes, among others that have them, has a width like them
+        half = np.interp(at, at[known], half[known])
     # Where the posterior weighs the points otherwise than the loss does, its ridge runs beside the floor.
     slope = covariance[o, i] / covariance[i, i]
     ridge = normal.z[o] + slope * (at - normal.z[i]) - z[:, o]
@@ -265,7 +267,7 @@ def _limit(surface: Surface, line: LossProfile, seed: int) -> str:
     ends = [e for e in line.ends if e.open]
     if not ends or surface.hypothesis.effects:
         return ""
-    for name, kind in materials().items():
+    for name, kind in ordinary_materials().items():
         if len(kind.field_names()) >= surface.chart.size or name == surface.hypothesis.material.name:
             continue
         simple = fit(surface.measurement, replace(surface.hypothesis, material=kind, convexity=FREE), seed=seed)

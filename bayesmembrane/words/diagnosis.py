@@ -343,7 +343,8 @@ def why_not(found: Diagnosis) -> str:
         return (
             f"its 90 % band holds only {100 * v.covered_after:.0f} % of the points that were set aside ({set_aside(v)})"
         )
-    return f"it leaves {100 * found.remaining.share:.2g} % of the misfit, and no small error of the forms carries that"
+    left = found.remaining
+    return f"what it leaves (reduced chi-square {left.reduced_chi2:.2f}) is no noise, and no small error of the forms"
 
 
 def _certain(found: Diagnosis) -> str:

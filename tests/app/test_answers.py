@@ -172,7 +172,11 @@ def test_valleys_with_an_effect_come_back_as_they_were(strip: Measurement, tmp_p
 
 @pytest.mark.usefixtures("short_walks")
 def test_a_loop_is_read_back_with_its_runs_also_where_it_was_moved(strip: Measurement, tmp_path: Path) -> None:
-    found = analyses.loop(strip, PLAIN, Work(out=tmp_path / "here", ess=100), runs=tmp_path / "here" / "runs")
+    longer = replace(strip, deflection=1.2 * strip.deflection, specimen=replace(strip.specimen, name="another"))
+    how = replace(analyses.ADAPTING, out=tmp_path / "here" / "runs", predict=(longer,))
+    found = analyses.loop(strip, PLAIN, Work(out=tmp_path / "here", ess=100), how)
+    assert found.folder is not None
+    assert found.folder.name.startswith(f"strip-no-1_neo_hookean_{1e3 * strip.deflection[-1]:.4g}mm_loop_")
     (tmp_path / "here").rename(tmp_path / "there")
     (again,) = lying([tmp_path / "there"])
     assert again.kind == "loop"
@@ -181,6 +185,7 @@ def test_a_loop_is_read_back_with_its_runs_also_where_it_was_moved(strip: Measur
     np.testing.assert_array_equal(first.before.run.draws(), before.before.run.draws())
     assert (first.after is first.before) == (before.after is before.before)
     assert first.diagnosis.verdict == before.diagnosis.verdict
+    np.testing.assert_array_equal(again.read().others[0].after, found.result.others[0].after)
 
 
 @pytest.mark.usefixtures("short_walks")

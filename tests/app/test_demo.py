@@ -13,7 +13,7 @@ from bayesmembrane.app import demo
 from bayesmembrane.app.analyses import Work
 from bayesmembrane.app.folders import lying
 from bayesmembrane.ground.jobs import workers
-from bayesmembrane.ground.registry import material, materials
+from bayesmembrane.ground.registry import material, ordinary_materials
 from bayesmembrane.report.page import TWIN
 from tests.report.blank import blank
 
@@ -23,7 +23,7 @@ def test_the_verbs_can_be_sent_to_other_processes() -> None:
         assert pickle.loads(pickle.dumps(stage)).keys() == stage.keys()
     first, then = demo.stages()
     assert "reconstruct" in first
-    assert set(materials()) == {label.partition(",")[0] for label in first} - {"reconstruct"}
+    assert set(ordinary_materials()) == {label.partition(",")[0] for label in first} - {"reconstruct"}
     assert len(then) == len(demo.LOOPS) + len(demo.VALLEYS)
 
 
@@ -32,7 +32,7 @@ def test_a_short_demonstration_and_its_page(tmp_path: Path, monkeypatch: pytest.
     """One material on both ranges, fitted, sampled, followed and compared; the page alone from the folder."""
     one = "neo_hookean"
     blank(monkeypatch.setattr)
-    monkeypatch.setattr(demo, "materials", lambda: {one: material(one)})
+    monkeypatch.setattr(demo, "ordinary_materials", lambda: {one: material(one)})
     first = {f"{one}, {where}": partial(demo.calibrate, one, where) for where in demo.RANGES}
     monkeypatch.setattr(demo, "workers", partial(workers, count=1))  # a fresh process takes longer than its work here
     monkeypatch.setattr(demo, "stages", lambda: (first, {"valleys": partial(demo.follow_valleys, one)}))

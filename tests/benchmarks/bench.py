@@ -22,7 +22,7 @@ from functools import partial
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.physics.cache import CachedSolver
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics import fallback, request, solve
@@ -42,7 +42,7 @@ FEW = 4
 EXACT = 1e-6
 METHODS = ("DOP853", "LSODA", "RK45")
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-TARGETS = {"shooting, compiled": dict.fromkeys(materials(), 300)} | {
+TARGETS = {"shooting, compiled": dict.fromkeys(ordinary_materials(), 300)} | {
     f"Ritz, {BATCH} films": {"neo_hookean": 3000, "mooney_rivlin": 3000, "gent": 3000, "ogden": 1000, "yeoh": 1000}
 }
 
@@ -199,7 +199,7 @@ def main() -> None:
     parser.add_argument("--batches", type=int, default=3, help=f"batches of {BATCH} films per material")
     options = parser.parse_args()
     rows: list[Row] = []
-    for name, material in materials().items():
+    for name, material in ordinary_materials().items():
         print(f"{name} ...", file=sys.stderr, flush=True)
         rows += measure(material, options.batches)
     print(json.dumps([vars(row) for row in rows], indent=1) if options.json else table(rows))

@@ -30,7 +30,7 @@ import bayesmembrane as bm
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import materials, ordinary_materials
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.mechanics import request
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
@@ -130,7 +130,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--curve", default=str(DATA / "elastosil_50um_op1.csv"))
     parser.add_argument("--specimen", default=str(DATA / "elastosil_50um_op1.toml"))
-    parser.add_argument("--materials", default=",".join(materials()), help="names, with commas")
+    parser.add_argument("--materials", default=",".join(ordinary_materials()), help="names, with commas")
     parser.add_argument("--diagnose", action="store_true", help="diagnose, too")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     options = parser.parse_args()

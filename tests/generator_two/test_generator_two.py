@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bayesmembrane.data.reading import read_measurement
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import materials, ordinary_materials
 from tests.generator_two.course import Way, course
 from tests.generator_two.datasets import generate
 from tests.generator_two.elastic import COMMON, ELASTIC
@@ -64,7 +64,7 @@ def test_it_shares_nothing_with_the_first_generator_and_the_package() -> None:
 def test_the_common_energies_are_those_of_the_package_by_name_and_order() -> None:
     for name in COMMON:
         assert materials()[name].field_names() == ELASTIC[name].names
-    assert not set(ELASTIC) - set(COMMON) & set(materials())
+    assert not set(ELASTIC) - set(COMMON) & set(ordinary_materials())
 
 
 # ---- film ------------------------------------------------------------------------------------------------------------

@@ -66,6 +66,14 @@ def test_the_five_materials_are_found_by_their_files():
         assert registry.material(name) is material
 
 
+def test_all_energies_are_those_of_the_paper_and_of_other_packages(install):
+    """What else ships is there by its name alone; another package's energy joins unless it says otherwise."""
+    install(foreign=Foreign)
+    ordinary = set(registry.ordinary_materials())
+    assert ordinary == {"gent", "mooney_rivlin", "neo_hookean", "ogden", "yeoh", "foreign"}
+    assert {"arruda_boyce", "exp_ln", "gent_thomas", "lopez_pamies"} <= set(registry.materials()) - ordinary
+
+
 def test_the_answer_is_the_callers_to_change():
     registry.materials().clear()
     assert registry.materials()

@@ -19,7 +19,7 @@ from bayesmembrane.comparison.compare import compare_ranges
 from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.published import read_published_table
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.blocks import Table
 from bayesmembrane.report.sections.evidence import sentences
@@ -35,7 +35,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--chains", type=Path, default=Path("chains"))
     asked = parser.parse_args()
-    claims = [hypothesis(name) for name in materials()]
+    claims = [hypothesis(name) for name in ordinary_materials()]
     found = compare_ranges(shipped_ranges(), claims, Judging(asked.seed, out=asked.chains), progress=tell)
     TARGET.write_text(page(found, losses(), asked.seed), encoding="utf-8")
 

@@ -19,7 +19,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.explanation.total import NOTHING
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.physics.hypothesis import hypothesis
 from tests.studies.cycles_page import page
 from tests.studies.vhb_data import FAST, FOLDER, cycles, fast_cycle, kPa
@@ -71,7 +71,7 @@ def main() -> None:
     """Diagnose what is not there yet, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, default=FOLDER)
-    parser.add_argument("--declare", nargs="+", default=[NONE, *materials()])
+    parser.add_argument("--declare", nargs="+", default=[NONE, *ordinary_materials()])
     parser.add_argument("--rows", type=Path, default=Path("studies/cycles.jsonl"))
     parser.add_argument("--table", type=Path, default=Path("docs/studies/cycles.md"))
     parser.add_argument("--seed", type=int, default=0)

@@ -39,6 +39,7 @@ from tests.generator.datasets import Dataset, generate
 from tests.generator.distortions import LIBRARY
 from tests.generator.film import NoSolutionError
 from tests.studies.loop_plan import Case, plan
+from tests.studies.results import stored
 
 Array = NDArray[np.float64]
 
@@ -233,12 +234,6 @@ def told(line: Line, x: Array, data: Dataset, rng: np.random.Generator) -> dict[
     for name, values, truth in zip(FORCES, (plain + error).T, data.film.force(at), strict=True):
         out[name] = (values, float(truth))
     return out
-
-
-def stored(path: Path) -> dict[str, dict[str, Any]]:
-    """Results by key."""
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    return {row["key"]: row for row in map(json.loads, lines)}
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -7,12 +7,9 @@ the study can be interrupted and goes on where it was.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from itertools import islice
 from pathlib import Path
@@ -29,6 +26,7 @@ from tests.generator.film import NoSolutionError
 from tests.studies.loop_intervals import covered
 from tests.studies.loop_plan import Case, plan
 from tests.studies.loop_table import report
+from tests.studies.results import Row, append, stored, until
 
 SEED = 180000
 ROOT = Path(__file__).parents[2]
@@ -37,7 +35,7 @@ TABLE = ROOT / "docs" / "studies" / "loop.md"
 SHOWN = 6
 
 
-def run_case(case: Case) -> dict[str, Any]:
+def run_case(case: Case) -> Row:
     """Everything that the tables need of one case; ``seconds`` are those of the process, for the diagnosis alone."""
     head = asdict(case) | {"key": case.key}
     try:
@@ -114,47 +112,10 @@ def answer_of(found: Diagnosis, data: Dataset) -> dict[str, Any]:
     }
 
 
-def stored(path: Path) -> dict[str, dict[str, Any]]:
-    """Results by key; a line that an interruption cut short is left out."""
-    out = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
-        try:
-            row = json.loads(line)
-        except json.JSONDecodeError:
-            continue
-        out[row["key"]] = row
-    return out
-
-
-def run(cases: Iterable[Case], path: Path, seconds: float, jobs: int) -> None:
-    """Run what is not stored yet, until ``seconds`` have passed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    done = stored(path)
-    todo = [c for c in cases if c.key not in done]
-    end = time.monotonic() + seconds
-    if not todo:
-        return
-    with path.open("a", encoding="utf-8") as file:
-        for row in _results(todo, end, jobs):
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            told = ", ".join(row.get("effects", ())) or row.get("found_material", "") or row.get("skipped", "")
-            print(f"{row['key']}: {row.get('verdict', 'skipped')} {told} ({row.get('seconds', 0):.1f} s)", flush=True)
-
-
-def _results(todo: list[Case], end: float, jobs: int) -> Iterator[dict[str, Any]]:
-    if jobs == 1:
-        warmed()
-        for case in todo:
-            if time.monotonic() > end:
-                return
-            yield run_case(case)
-        return
-    with ProcessPoolExecutor(jobs, initializer=warmed) as pool:
-        # A few at a time: what has begun is finished, and nothing more is begun after the end.
-        rest = iter(todo)
-        while time.monotonic() < end and (some := list(islice(rest, 8 * jobs))):
-            yield from pool.map(run_case, some)
+def line_of(row: Row) -> str:
+    """Verdict and seconds of one case."""
+    told = ", ".join(row.get("effects", ())) or row.get("found_material", "") or row.get("skipped", "")
+    return f"{row['key']}: {row.get('verdict', 'skipped')} {told} ({row.get('seconds', 0):.1f} s)"
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -168,7 +129,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--table", type=Path, default=TABLE, help="Markdown")
     asked = parser.parse_args(arguments)
     cases = list(islice(plan(asked.seed), asked.limit))
-    run(cases, asked.results, asked.seconds, asked.jobs)
+    done = stored(asked.results)
+    todo = [c for c in cases if c.key not in done]
+    append(until(asked.seconds, todo, run_case, asked.jobs, warmed), asked.results, line_of)
     have = stored(asked.results)
     rows = [have[c.key] for c in cases if c.key in have]
     # The place of the file and the number of processes change nothing.

@@ -24,7 +24,7 @@ from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.registry import components, materials
+from bayesmembrane.ground.registry import components, materials, ordinary_materials
 from bayesmembrane.ground.stored import answer, read, store
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -229,7 +229,7 @@ def main() -> None:
     chosen = options.parse_args()
     if not DATA.is_dir():
         raise SystemExit(f"{DATA} is not there")
-    names = sorted(materials())
+    names = sorted(ordinary_materials())
     wanted = [r for r in chosen.only.split(",") if r] or list(RUBBERS)
     rows = [row(rubber, name, measured(rubber)) for rubber in wanted for name in names]
     compared: dict[str, Comparison] = {}

@@ -21,7 +21,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.registry import material, materials
+from bayesmembrane.ground.registry import material, ordinary_materials
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 
@@ -104,7 +104,7 @@ def films(curve: Measurement, breaks: Sequence[BreakPoint], names: Iterable[str]
     thicker = np.array([b.thickness for b in breaks]) / curve.specimen.thickness
     order = np.unique(at)
     found = []
-    for name in names or materials():
+    for name in names or ordinary_materials():
         best = fit(curve, hypothesis(name))
         forward = Forward(best.hypothesis, curve, order)
         curves = forward.curves(best.hypothesis.films(best.coordinates[None, :]), order)

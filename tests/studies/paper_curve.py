@@ -20,7 +20,7 @@ from bayesmembrane.data.shipped import shipped
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.explanation.total import Judged
 from bayesmembrane.diagnosis.result import Diagnosis
-from bayesmembrane.ground.registry import components, materials
+from bayesmembrane.ground.registry import components, ordinary_materials
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.words.diagnosis import sentence
 from bayesmembrane.words.units import size_in_words
@@ -58,7 +58,7 @@ def diagnoses(seed: int) -> str:
     rows, sentences = [], []
     for words, stem in CURVES.items():
         measurement = read_measurement(shipped(f"{stem}.csv"), shipped(f"{stem}.toml"))
-        for name in materials():
+        for name in ordinary_materials():
             found = diagnose(measurement, hypothesis(name), seed=seed)
             rows += list(lines(words, name, found, measurement))
             sentences.append(f"- {name}, {words}: {sentence(found)}")

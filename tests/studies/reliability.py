@@ -9,12 +9,10 @@ part and prints a line for each case; `--summary FILE` prints the tables of what
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import islice, product
@@ -28,7 +26,7 @@ from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.explanation.total import set_name
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.errors import BayesmembraneError
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import materials, ordinary_materials
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.words.diagnosis import document
 from tests.generator.datasets import Dataset, generate
@@ -41,6 +39,7 @@ from tests.studies.loop_intervals import covered
 from tests.studies.reliability_plan import HALVES, Case
 from tests.studies.reliability_rows import Row, answer_row, right_name, spoken_truth, top, truth_row
 from tests.studies.reliability_table import report
+from tests.studies.results import append, stored, until
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "reports" / "study-reliability"
@@ -95,7 +94,7 @@ def run_case(case: Case, energy: str, source: str, half: str) -> Row:
 
 def diagnosed(measurement: Measurement, material: str | None) -> Diagnosis:
     """The answer with an energy declared, or with none."""
-    asked = Hypothesis(materials()[material or min(materials())])
+    asked = Hypothesis(materials()[material or min(ordinary_materials())])
     return diagnose(measurement, Question(asked, declared=material is not None))
 
 
@@ -128,18 +127,6 @@ def warmed() -> None:
         diagnosed(read_measurement(*data.write(Path(folder))), "neo_hookean")
 
 
-def stored(path: Path) -> dict[str, Row]:
-    """Results by key; a line that an interruption cut short is left out."""
-    out = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
-        try:
-            row = json.loads(line)
-        except json.JSONDecodeError:
-            continue
-        out[row["key"]] = row
-    return out
-
-
 def line_of(row: Row) -> str:
     """Truth, verdict, effects, most probable sets and seconds of one case."""
     if "skipped" in row:
@@ -151,39 +138,6 @@ def line_of(row: Row) -> str:
         f"{row['protocol']}: {spoken_truth(row)}{mark} -> {row['verdict']} {said} [{top(row)}] "
         f"{row.get('seconds', 0):.1f} s"
     )
-
-
-Work = Callable[[tuple[Case, str]], Row]
-
-
-def run(todo: Iterable[tuple[Case, str]], work: Work, path: Path, seconds: float, jobs: int) -> None:
-    """Run the (case, energy) that are not stored yet, until ``seconds`` have passed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    done = stored(path)
-    rest = [(case, energy) for case, energy in todo if key(case, energy) not in done]
-    if not rest:
-        return
-    with path.open("a", encoding="utf-8") as file:
-        for row in _results(rest, work, seconds, jobs):
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            print(line_of(row), flush=True)
-
-
-def _results(rest: list[tuple[Case, str]], work: Work, seconds: float, jobs: int) -> Iterator[Row]:
-    if jobs == 1:
-        warmed()
-        end = time.monotonic() + seconds
-        for item in rest:
-            if time.monotonic() > end:
-                return
-            yield work(item)
-        return
-    with ProcessPoolExecutor(jobs, initializer=warmed) as pool:
-        # A few at a time: what has begun is finished, and nothing more is begun after the end.
-        items, end = iter(rest), time.monotonic() + seconds
-        while time.monotonic() < end and (some := list(islice(items, 8 * jobs))):
-            yield from pool.map(work, some)
 
 
 def _one(item: tuple[Case, str], source: str, half: str) -> Row:
@@ -214,7 +168,10 @@ def main(arguments: list[str] | None = None) -> int:
     end = None if asked.count is None else asked.first + asked.count
     cases = list(islice(source.plan(half, seed), asked.first, end))
     todo = list(product(cases, ENERGIES[asked.energy]))
-    run(todo, partial(_one, source=asked.generator, half=half), results, asked.seconds, asked.jobs)
+    done = stored(results)
+    rest = [item for item in todo if key(*item) not in done]
+    work = partial(_one, source=asked.generator, half=half)
+    append(until(asked.seconds, rest, work, asked.jobs, warmed), results, line_of)
     have = stored(results)
     rows = [have[key(*item)] for item in todo if key(*item) in have]
     told = "" if asked.count is None else f" --first {asked.first} --count {asked.count}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bayesmembrane.ground.registry import components, materials
+from bayesmembrane.ground.registry import components, ordinary_materials
 
 Row = dict[str, Any]
 
@@ -31,7 +31,7 @@ def truth_row(truth: Mapping[str, Any], identifiable: bool | None) -> Row:
         "faint": sorted(set(truth["effects"]) - seen),
         "foreign": sorted(seen - known.keys()),
         "family": truth["family"],
-        "family_known": truth["family"] in materials(),
+        "family_known": truth["family"] in ordinary_materials(),
         "own": own,
         "snr": {k: float(v) for k, v in truth["snr"].items()},
         "expected": list(truth["expected"]),

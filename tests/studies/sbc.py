@@ -28,7 +28,7 @@ from bayesmembrane.calibration.run import RunSettings, sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import BayesmembraneError
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.noise.base import force_scale
 from bayesmembrane.physics.rigs.annulus import Annulus
@@ -59,7 +59,7 @@ class Design:
 
 def designs() -> Iterator[Design]:
     """Each material's baseline, then its variations."""
-    names = sorted(materials(), key=lambda n: len(materials()[n].field_names()))
+    names = sorted(ordinary_materials(), key=lambda n: len(ordinary_materials()[n].field_names()))
     for name in names:
         yield Design(name, hypothesis(name), replicates=BASELINES)
     for name in names:

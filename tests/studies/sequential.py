@@ -30,9 +30,10 @@ from tests.generator.distortions import Active, response
 from tests.generator.film import NoSolutionError
 from tests.generator.noise import Noise
 from tests.generator.protocols import Path as Way
-from tests.studies.reliability import diagnosed, stored
+from tests.studies.reliability import diagnosed
 from tests.studies.reliability_plan import HALVES, SEED, Case, measured, plan
 from tests.studies.reliability_rows import Row, answer_row, inside, right_name, spoken_truth, truth_row
+from tests.studies.results import stored
 
 RESULTS = Path(__file__).parents[2] / "reports" / "study-sequential" / "results.jsonl"
 GROUPS = ("single", "pair", "triple")

@@ -18,7 +18,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.result import Diagnosis
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.words.diagnosis import sentence
@@ -114,7 +114,7 @@ def main() -> None:
         print(f"Skipped: the measurements are not in {FOLDER}.")
         return
     trials = []
-    for name in [FIRST, *(n for n in materials() if n != FIRST)]:
+    for name in [FIRST, *(n for n in ordinary_materials() if n != FIRST)]:
         for cycle in found:
             trials.append(trial(cycle, found, name, seed, twice=name == FIRST))
             last = trials[-1]

@@ -13,6 +13,7 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.valleys import follow
 from bayesmembrane.valleys.between import arc_length, closest_approach
 from bayesmembrane.valleys.next_tests import rank
 from bayesmembrane.valleys.posterior import NormalPosterior
@@ -164,3 +165,31 @@ def test_what_is_held_is_not_moved(bowl: Any) -> None:
     assert z[0, 0] == 4.0
     free, _ = descend(bowl.batch, start, (np.full(3, -99.0), np.full(3, 99.0)), 50, np.array([[True, False, False]]))
     np.testing.assert_allclose(z, free, atol=1e-4)
+
+
+def test_a_band_is_as_wide_where_slopes_are_missing_as_beside(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Films that are solved together may lack what each has alone: then nothing of the band was a number."""
+
+    class Lossy(Quadratic):
+        found = False
+
+        def batch(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            r, j = super().batch(z)
+            if self.found:
+                r[-9:], j[-9:] = np.nan, np.nan
+            return r, j
+
+        def minimise(self, start: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[override]
+            z, size = super().minimise(start, held)  # type: ignore[arg-type]
+            self.found = True
+            return z, size
+
+    monkeypatch.setattr(follow, "grid", lambda _, z: z)
+    line: Any = SimpleNamespace(index=0, points=np.array([[-1.0, -2.0], [3.0, -2.0]]))
+    normal: Any = SimpleNamespace(z=AT[:2], spread=lambda: SimpleNamespace(covariance=np.diag([0.1, 0.1])))
+    whole, lossy = (
+        np.asarray(follow._band(kind(MATRIX[:, :2], AT[:2], 0.3), line, 0.3, normal)) for kind in (Quadratic, Lossy)
+    )
+    assert np.all(np.isfinite(lossy))
+    np.testing.assert_array_equal(lossy[:-9], whole[:-9])
+    assert np.all(np.ptp(lossy[-9:, :, 1], axis=1) > 0)

@@ -57,6 +57,7 @@ def verb(
     """Calibrate, diagnose, add what is missing, calibrate again, until adequate or abstaining; and report."""
     from bayesmembrane.app import analyses
     from bayesmembrane.diagnosis.explanation.case import Question
+    from bayesmembrane.diagnosis.loop import LoopSettings
     from bayesmembrane.report.page import write_report
 
     adapt = beside.noise == "auto"
@@ -67,8 +68,8 @@ def verb(
         work = analyses.Work(output.seed, output.folder, sampling.ess, tell)
         question = Question(claim, material.declared)
         others = tuple(curves_with_specimens(output.predict, "--predict"))
-        end = analyses.AtTheEnd(output.rivals, others, output.scatter)
-        found = analyses.loop(measurement, question, work, adapt_noise=adapt, end=end)
+        how = LoopSettings(adapt_noise=adapt, leaders=output.rivals, predict=others, scatter=output.scatter)
+        found = analyses.loop(measurement, question, work, how)
     page = write_report([*analyses.loop_runs(found.result), found.result], output.report_folder)
     document = {**found.document, "report": str(page)}
     answer(document, output.as_json, lambda: show(document, measurement))

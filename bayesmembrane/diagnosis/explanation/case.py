@@ -20,7 +20,7 @@ from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.diagnosis.thresholds import SEARCH
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.registry import materials
+from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -153,14 +153,15 @@ def renewed(search: Search, smooth: Array, best: Candidate) -> Search:
 
 def _energies(search: Search, question: Question, tell: Tell) -> dict[str, Candidate]:
     """Every energy with the given effects; raises `SettingsError` if the declared one, or none, reaches the data."""
-    kinds: dict[str, type[Material]] = {question.hypothesis.material.name: question.hypothesis.material} | materials()
+    asked = question.hypothesis.material
+    kinds: dict[str, type[Material]] = {asked.name: asked} | ordinary_materials()
     found = {}
     for name, kind in kinds.items():
         hypothesis = replace(question.hypothesis, material=kind)
         if len(search.measurement) < hypothesis.curve_size + SEARCH.spare_points:
             continue
         tell(f"fitting {hypothesis.label()}")
-        candidate = _reaching(search, hypothesis, needed=question.declared and kind is question.hypothesis.material)
+        candidate = _reaching(search, hypothesis, needed=question.declared and kind is asked)
         if candidate is not None:
             found[name] = candidate
     if not found:

@@ -16,7 +16,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import Block, extended, weighed
 from bayesmembrane.diagnosis.candidates.search import Search
-from bayesmembrane.diagnosis.left.shape import plateau_of
+from bayesmembrane.diagnosis.explanation.limit import limit_of
 from bayesmembrane.diagnosis.thresholds import FOREIGN
 from bayesmembrane.ground.parameters import Array
 
@@ -220,27 +220,9 @@ def _unnamed(search: Search, base: Candidate) -> Foreign | None:
 
 
 def _clipped(search: Search, base: Candidate) -> Foreign | None:
-    """A load cell at its limit: readings that equal the largest force say only that it was reached.
-
-    ln K compares the model of all readings with one of the others, and the readings at the limit with a constant.
-    """
-    m = search.measurement
-    limit = plateau_of(m.force)
-    if limit is None or not limit.largest or limit.readings < FOREIGN.plateau:
-        return None
-    at = m.force >= limit.force - 1e-9 * abs(limit.force)
-    if np.count_nonzero(~at) < base.x.size + 6:
-        return None
-    part = Search(m.select(~at), search.noise.part(m.select(~at), ~at), search.seed, search.solve)
-    found = part.fit(base.hypothesis, [base.x])
-    if found is None:
-        return None
-    whole = weighed(search.linear(base), base.theta).log_evidence - search.noise.log_root
-    rest = weighed(part.linear(found), found.theta).log_evidence - part.noise.log_root
-    # Each is within rounding of the limit; the limit itself lies anywhere up to twice the force.
-    rounding = max(limit.step, 1e-6 * limit.force)
-    gain = rest - whole - float(np.log(2 * limit.force)) - (limit.readings - 1) * float(np.log(rounding))
-    return Foreign(CLIPPED, base, gain, size=limit.force, place=int(np.flatnonzero(at)[0]))
+    """A load cell at its limit."""
+    found = limit_of(search, base)
+    return None if found is None else Foreign(CLIPPED, base, found.gain, size=found.force, place=found.first)
 
 
 def kinds_of(found: Sequence[Foreign]) -> int:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.left.continued import continued
 from bayesmembrane.diagnosis.thresholds import HELD_OUT
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.form_error import FormFactors, form_columns, traces
+from bayesmembrane.physics.form_error import FormFactors
 from bayesmembrane.physics.forward import Forward
 
 Rivals = Sequence[tuple[Candidate, float]]
@@ -116,16 +117,7 @@ def _predicted(part: Search, fit: Candidate, search: Search, mask: NDArray[np.bo
     """
     whole, sd = search.measurement, search.noise.each[mask] * float(np.exp(fit.theta[0]))
     forward = Forward(fit.hypothesis, whole, whole.deflection, search.quick)
-    new = forward(fit.x[None, :], sensitivities=True, reached=False)
-    assert new.sensitivity is not None
-    force = np.nan_to_num(new.force[0])
-    own = np.nan_to_num(new.sensitivity[0]) * part.steepness(fit)
-    trace = traces(forward, fit.x[None, :], force[None, :])[0]
-    forms = form_columns(search.factors, force, fit.hypothesis.effects, trace)
-    here = np.column_stack([own, *(columns for _, columns in forms)])[mask]
-    mean, covariance = part.linear(fit).coefficients(fit.theta)
-    # The curve is that at the fit; the linear model knows the last bit of the way.
-    mean[: fit.x.size] -= part.coefficients_at(fit)
-    residual = (whole.force - force)[mask] - here @ mean
-    band = HELD_OUT.band * np.sqrt(np.einsum("ni,ij,nj->n", here, covariance, here) + sd**2)
+    new = continued(part, fit, forward, search.factors)
+    residual, here = (whole.force - new.force - new.moved)[mask], new.columns[mask]
+    band = HELD_OUT.band * np.sqrt(np.einsum("ni,ij,nj->n", here, new.covariance, here) + sd**2)
     return misfit_of(residual, search.noise.each[mask]), float(np.mean(np.abs(residual) <= band))

@@ -17,7 +17,7 @@ class Remaining:
     """What is left.
 
     share : part of the squares beyond noise that the plain model leaves; 1 where it is the plain model's own
-    reduced_chi2 : of what is left, by the measurement's own noise
+    reduced_chi2, dof : of what is left, by the measurement's own noise; the degrees of freedom of that
     carried : part of what is left beyond noise that the form error takes: smooth, and no effect
     rms : N, root mean square of the form error
     energy_error : relative error of the energy's form
@@ -30,6 +30,7 @@ class Remaining:
     rms: float
     energy_error: float
     law_errors: Mapping[str, float]
+    dof: int
 
     @property
     def noise(self) -> bool:
@@ -38,12 +39,10 @@ class Remaining:
 
     @property
     def strange(self) -> bool:
-        """True if it is neither noise, nor a little of what was there, nor what a small error of the forms carries."""
-        return (
-            self.reduced_chi2 >= VERDICT.noise_chi2
-            and self.share >= VERDICT.noise_share
-            and self.carried < VERDICT.form_carries
-        )
+        """True if it is more than noise, and more than a small error of the forms that carries it."""
+        by_chance = VERDICT.chance * float(np.sqrt(2.0 / self.dof))
+        forms = self.carried >= VERDICT.form_carries and all(e <= VERDICT.law_small for e in self.law_errors.values())
+        return self.reduced_chi2 >= max(VERDICT.noise_chi2, 1.0 + by_chance) and not forms
 
 
 def remaining(search: Search, model: Candidate, plain: Candidate) -> Remaining:
@@ -58,4 +57,5 @@ def remaining(search: Search, model: Candidate, plain: Candidate) -> Remaining:
         rms=float(np.sqrt(np.mean(model.form**2))),
         energy_error=model.energy_error,
         law_errors=model.law_errors,
+        dof=dof,
     )

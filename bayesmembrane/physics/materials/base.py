@@ -32,6 +32,7 @@ class Material(ABC):
 
     name, title, reference : how users call it, how reports print it, where it comes from
     colour : of its curves in reports, "#rrggbb"; "" leaves the choice to the report
+    ordinary : False keeps it out of "all energies": it is fitted and compared only where its name is given
     units, meanings : unit of each field, and what it is in a few words
     scales : per field, 1 if it scales with the modulus (N/m), 0 if it does not: F(s c) = s F(c)
     coordinates : the `Parameter` s in which it is sampled, with their priors; the first one is `LN_GD`
@@ -43,6 +44,7 @@ class Material(ABC):
     name: ClassVar[str]
     title: ClassVar[str]
     colour: ClassVar[str] = ""
+    ordinary: ClassVar[bool] = True
     reference: ClassVar[str]
     units: ClassVar[tuple[str, ...]]
     meanings: ClassVar[tuple[str, ...]]

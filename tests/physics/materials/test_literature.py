@@ -1,4 +1,4 @@
-"""The five energies against the literature: closed forms beside a symbolic derivation from the published formula."""
+"""Energies against the literature: closed forms beside a symbolic derivation from the published formula."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ I1 = L1**2 + L2**2 + J**-2
 I2 = J**2 + L1**-2 + L2**-2
 C = sympy.symbols("c1:4")
 A = sympy.symbols("a1:4")
+LANGEVIN = [sympy.Rational(*k) for k in ((1, 2), (1, 20), (11, 1050), (19, 7000), (519, 673750))]
 
 ENERGIES = {
     "neo_hookean": ((C[0],), C[0] * (I1 - 3)),
@@ -24,6 +25,19 @@ ENERGIES = {
     "gent": ((C[0], C[1]), -C[0] * C[1] * sympy.log(1 - (I1 - 3) / C[1])),
     "yeoh": (C, sum(c * (I1 - 3) ** (i + 1) for i, c in enumerate(C))),
     "ogden": (C + A, sum(c / a * (L1**a + L2**a + J**-a - 3) for c, a in zip(C, A, strict=True))),
+    "arruda_boyce": (
+        (C[0], A[0]),
+        C[0] * sum(k / A[0] ** i * (I1 ** (i + 1) - 3 ** (i + 1)) for i, k in enumerate(LANGEVIN)),
+    ),
+    "gent_thomas": ((C[0], C[1]), C[0] * (I1 - 3) + C[1] * sympy.log(I2 / 3)),
+    "exp_ln": (
+        (C[0], A[0], A[1]),
+        C[0] * (sympy.exp(A[0] * (I1 - 3)) / A[0] + A[1] * (I1 - 2) * (1 - sympy.log(I1 - 2)) - 1 / A[0] - A[1]),
+    ),
+    "lopez_pamies": (
+        C[:2] + A[:2],
+        sum(c * 3 ** (1 - a) / (2 * a) * (I1**a - 3**a) for c, a in zip(C[:2], A[:2], strict=True)),
+    ),
 }
 
 pytestmark = pytest.mark.parametrize("material", [named(name) for name in ENERGIES], ids=list(ENERGIES))

@@ -116,7 +116,7 @@ def _shortened(posterior: Emulated, coefficients: Array) -> tuple[Given, Array]:
     All curves are sums of T; where noise weighs every reading alike, nothing but their T + 1 products with each other
     and with the data counts, however many readings there are.
     """
-    if not isinstance(posterior, Posterior):
+    if not isinstance(posterior, Posterior) or posterior.noise.traced:  # traces stand behind the forces
         return posterior, coefficients
     _, size, axes = np.linalg.svd(np.vstack([coefficients, posterior.measurement.force]), full_matrices=False)
     axes = axes[size > FAINT * size[0]]

@@ -83,3 +83,20 @@ def test_readings_that_weigh_differently_have_no_such_axes() -> None:
     d = np.linspace(5e-4, 0.03, 40)
     m = Measurement(d, 40 * d, Uniaxial(0.05, 0.01), Specimen("strip", 5e-4), force_sd=1e-3 * (1 + d / d[-1]))
     assert Posterior(hypothesis("yeoh"), m).along(np.eye(3, d.size)) is None
+
+
+def test_curves_with_the_traces_of_effects_are_emulated_whole() -> None:
+    """Noise that asks what each effect changes is told longer curves than those that were measured."""
+    d = np.concatenate([np.linspace(1e-3, 0.03, 20), np.linspace(0.029, 2e-3, 20)])
+    m = Measurement(d, 40 * d, Uniaxial(0.05, 0.01), Specimen("strip", 5e-4))
+    posterior = Posterior(hypothesis("neo_hookean", ["force_gain", "mullins"], "form"), m)
+    middle = np.array([float(p.prior.quantile(0.5)) for p in posterior.hypothesis.parameters])
+    x = middle + 0.02 * np.random.default_rng(4).standard_normal((200, len(middle)))
+    found = emulate(posterior, x, np.random.default_rng(5))
+    assert found is not None
+    assert found.coefficients.shape[1] == 3 * len(m)
+    near = middle + 0.01 * np.random.default_rng(6).standard_normal((20, len(middle)))
+    curves = monomials((near - found.centre) @ found.inverse.T, found.terms) @ found.coefficients
+    truth = posterior.evaluate(near)
+    np.testing.assert_allclose(curves[:, : len(m)], truth.force, atol=1e-3 * np.max(truth.force))
+    assert np.all(np.isfinite(found.log_density(near)))

@@ -1,0 +1,49 @@
+"""A load cell at its limit: exact to a digit, or with the noise of all readings; and a peak that is none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.explanation.limit import limit_of
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.mechanics import api
+from tests.diagnosis.curves import SD, measured, triangle, white_noise
+
+CLAIM = hypothesis("neo_hookean")
+SHARE = 0.9
+"""Of the largest force: where the load cell ends."""
+
+
+def fitted(limit: float, noise_first: bool, seed: int) -> tuple[Search, Candidate, float]:
+    """A neo-Hookean film over a triangle, cut off at the part ``limit`` of its largest force, its plain fit, and N."""
+    empty = measured(np.ones(240), triangle(240))
+    film = Forward(CLAIM, empty, empty.deflection, api.solve)(np.array([[np.log(16.0)]]), reached=False).force[0]
+    noise = SD * np.random.default_rng(seed).standard_normal(film.size)
+    most = limit * float(np.max(film))
+    force = np.minimum(film + noise, most) if noise_first else np.minimum(film, most) + noise
+    m = replace(empty, force=force)
+    search = Search(m, white_noise(m), 0, api.solve)
+    base = search.fit(CLAIM, search.material_starts(CLAIM))
+    assert base is not None
+    return search, base, most
+
+
+@pytest.mark.parametrize("noise_first", [True, False])
+def test_a_limit_is_found_where_it_is(noise_first: bool) -> None:
+    search, base, most = fitted(SHARE, noise_first, 4101)
+    found = limit_of(search, base)
+    assert found is not None
+    assert found.gain > 10.0
+    assert found.force == pytest.approx(most, abs=3 * SD)
+    assert abs(search.measurement.force[found.first] - most) < 6 * SD
+
+
+@pytest.mark.parametrize("seed", range(4110, 4116))
+def test_a_peak_is_no_limit(seed: int) -> None:
+    search, base, _ = fitted(2.0, True, seed)
+    found = limit_of(search, base)
+    assert found is None or found.gain < 0.0
