@@ -89,13 +89,12 @@ DAMAGES: tuple[Callable[[bytes, Rng], bytes], ...] = (
 
 
 def stored(place: Path) -> Path:
-    """Folders with a run and its predictions, with a fit, and with valleys."""
+    """A folder with a run, its predictions and a fit."""
     shorten()
     measurement, claim = _question("band neo_hookean white", 0)
     work = analyses.Work(out=place, ess=Settings().ess)
     analyses.sample(measurement, claim, work, name="run")
     analyses.fit(measurement, hypothesis("neo_hookean"), work)
-    analyses.valleys(measurement, hypothesis("neo_hookean"), work)
     return place
 
 
