@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.app.answers import Answer, Asked, asked, held, kept
+from bayesmembrane.app.answers import Answer, Asked, asked, held, in_pieces, kept
 from bayesmembrane.app.documents import document
 from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.calibration.fingerprint import fingerprint
@@ -231,7 +231,8 @@ def valleys(
     what = asked("valleys", how, [measurement], [claim], settings)
     if (stored := held("valleys", what, work.out)) is not None:
         return stored
-    found: Valleys | Beside = how(measurement, claim, ends, rise=rise, seed=work.seed)
+    with in_pieces(what, work.out):
+        found: Valleys | Beside = how(measurement, claim, ends, rise=rise, seed=work.seed)
     return kept("valleys", found, document(found), what, work.out)
 
 
@@ -243,7 +244,8 @@ def valleys_with_draws(
     what = asked("valleys", valleys_of, measurements, [claim], settings)
     if (stored := held("valleys", what, work.out)) is not None:
         return stored
-    found = valleys_of(measurements, claim, seed=work.seed, draws=draws)
+    with in_pieces(what, work.out):
+        found = valleys_of(measurements, claim, seed=work.seed, draws=draws)
     return kept("valleys", found, document(found), what, work.out)
 
 
@@ -278,7 +280,8 @@ def loop(
     what = asked("loop", run_loop, [measurement], [question.hypothesis], settings, library())
     if (stored := held("loop", what, work.out)) is not None:
         return stored
-    found = run_loop(measurement, question, how, tell=lambda text: work.tell(label, text))
+    with in_pieces(what, work.out):
+        found = run_loop(measurement, question, how, tell=lambda text: work.tell(label, text))
     return kept("loop", found, document(found), what, work.out)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -13,6 +14,7 @@ import numpy as np
 from bayesmembrane.calibration.fingerprint import fingerprint
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import BayesmembraneError
+from bayesmembrane.ground.pieces import drop, keeping
 from bayesmembrane.ground.stored import answer, read, store
 from bayesmembrane.physics.hypothesis import Hypothesis
 
@@ -100,8 +102,13 @@ def held(kind: str, what: Asked, out: str | Path | None) -> Answer[Any] | None:
     return None
 
 
+def in_pieces(what: Asked, out: str | Path | None) -> AbstractContextManager[None]:
+    """Inside, pieces of the answer are kept in its folder until `kept` stores it whole: who is killed goes on there."""
+    return keeping(None if out is None else Path(out) / what.name, what.fingerprint)
+
+
 def kept(kind: str, result: Result, document: Mapping[str, Any], what: Asked, out: str | Path | None) -> Answer[Result]:
-    """The answer, stored in its own folder inside ``out`` unless that is None.
+    """The answer, stored in its own folder inside ``out`` unless that is None; its pieces go.
 
     Raises `StorageError` if it cannot be written.
     """
@@ -110,4 +117,5 @@ def kept(kind: str, result: Result, document: Mapping[str, Any], what: Asked, ou
     folder = Path(out) / what.name
     whole = {**document, "stored": str(folder)}
     store(folder, kind, result, whole)
+    drop(folder)
     return Answer(result, whole)

@@ -6,15 +6,14 @@ is kept in pieces (nested-run-2) until it is there.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 from bayesmembrane.calibration.store import ASKED, STATUS, is_finished, read_asked
 from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.pieces import stored_once
 from bayesmembrane.ground.sealed import read_json
-from bayesmembrane.ground.stored import answer, read, store
 
 FOLDER = "comparison"
 
@@ -49,16 +48,7 @@ def kept(run: Path | None, name: str, key: str, make: Callable[[], Part]) -> Par
     """
     if run is None:
         return make()
-    folder, digest = run / FOLDER, hashlib.sha256(key.encode()).hexdigest()
-    try:
-        if (answer(folder, name) or {}).get("key") == digest:
-            found: Part = read(folder, name)
-            return found
-    except StorageError:
-        pass  # damaged: made again below
-    part = make()
-    store(folder, name, part, {"key": digest})
-    return part
+    return stored_once(run / FOLDER, name, key, make)
 
 
 def drop_pieces(run: Path | None, name: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ from bayesmembrane.diagnosis.other_tests import OtherTest, check, predicted
 from bayesmembrane.diagnosis.reference.outliers import without_outliers
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned, thinning
 from bayesmembrane.diagnosis.thresholds import LOOP, TINY
+from bayesmembrane.ground.pieces import piece
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -135,8 +137,9 @@ def loop(
     question = hypothesis if isinstance(hypothesis, Question) else Question(hypothesis)
     kept, aside = without_outliers(part)
     closing = _Closing(kept, how, tell or (lambda _: None), watch)
-    found = closing.diagnosed(question)
-    others = closing.predicted(found)  # before anything is sampled: a test that no film follows ends it here
+    found = piece("diagnosis-0", lambda: closing.diagnosed(question))
+    # Before anything is sampled: a test that no film follows ends it here.
+    others = piece("others", partial(closing.predicted, found))
     noise = _noise_for(found, question.hypothesis) if closing.settings.adapt_noise else question.hypothesis.noise
     stage = closing.sampled(replace(found.null.hypothesis, noise=noise))
     seen, rounds = {stage.run.hypothesis.label()}, list[Round]()
@@ -151,7 +154,8 @@ def loop(
         if not goes_on or len(rounds) >= closing.settings.most_rounds:
             break
         seen.add(following.label())
-        stage, found = after, closing.diagnosed(replace(question, hypothesis=following, declared=True))
+        again = partial(closing.diagnosed, replace(question, hypothesis=following, declared=True))
+        stage, found = after, piece(f"diagnosis-{len(rounds)}", again)
     return Loop(tuple(rounds), closing.left(rounds[-1].diagnosis), thinning(measurement, part), others)
 
 
@@ -178,7 +182,7 @@ class _Closing:
         )
         if run.interrupted:
             raise KeyboardInterrupt
-        return _stage(run, s.solve, s.seed)
+        return piece(f"stage-{claim.label()}", lambda: _stage(run, s.solve, s.seed))
 
     def predicted(self, first: Diagnosis) -> tuple[OtherTest, ...]:
         """The other tests, by all that the first diagnosis holds probable."""

@@ -8,6 +8,7 @@ from typing import Any
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.pieces import within
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -57,7 +58,8 @@ def valleys_beside(
     if not hypothesis.effects:
         raise SettingsError(f"{hypothesis.label()} has no effects to be left out", remedy="name some, or ask `valleys`")
     plain = replace(hypothesis, effects=())
-    without = valleys(measurement, plain, ranges, rise=rise, seed=seed, solve=solve)
+    with within("without"):
+        without = valleys(measurement, plain, ranges, rise=rise, seed=seed, solve=solve)
     added = valleys(measurement, hypothesis, ranges, rise=rise, seed=seed, solve=solve)
     both = zip(without.ranges, added.ranges, strict=True)
     return Beside(without, added, tuple(between(a, b) for a, b in both))

@@ -15,6 +15,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.pieces import piece, within
 from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.physics.convexity import FREE, MODES
 from bayesmembrane.physics.forward import Solve
@@ -86,9 +87,12 @@ def valleys_of(
     if not 0 < rise < np.inf:
         raise SettingsError(f"the loss cannot rise by {rise:g} of itself", remedy="give a positive number, such as 0.1")
     surfaces = [Surface(hypothesis, m, solve) for m in measurements]
-    found = [_valley(s, rise, seed, None if draws is None else draws[i]) for i, s in enumerate(surfaces)]
+    found = []
+    for i, surface in enumerate(surfaces):
+        with within(str(i)):
+            found.append(_valley(surface, rise, seed, None if draws is None else draws[i]))
     if hypothesis.curve_size <= 2:
-        coarse = _coarse(surfaces, found)
+        coarse = piece("coarse", lambda: _coarse(surfaces, found))
         found = [replace(v, coarse=g) for v, g in zip(found, coarse, strict=True)]
     pairs = tuple(between(a, b) for a, b in combinations(found, 2))
     return Valleys(hypothesis, tuple(found), pairs)
@@ -98,21 +102,23 @@ def _valley(surface: Surface, rise: float, seed: int, draws: Array | None) -> Va
     h, m, chart = surface.hypothesis, surface.measurement, surface.chart
     published = _published(h, m)
     starts = [p for _, p in published]
-    fitted = fit(m, replace(h, convexity=FREE), seed=seed, starts=starts)
-    best, least, lines = _lines(surface, chart.from_coordinates(fitted.coordinates)[0], rise)
+    fitted = piece("fit", lambda: fit(m, replace(h, convexity=FREE), seed=seed, starts=starts))
+    start = chart.from_coordinates(fitted.coordinates)[0]
+    best, least, lines = piece("lines", lambda: _lines(surface, start, rise))
     metric = metric_of(chart)
     spectra = tuple(_spectrum(surface, best, s) for s in _metrics(metric))
     along = _along(lines, spectra[0])
-    floor_z, floor_loss = floor(surface, lines[along], FLOOR if best.size <= 2 else FLOOR_OF_MANY, best)
+    count = FLOOR if best.size <= 2 else FLOOR_OF_MANY
+    floor_z, floor_loss = piece("floor", lambda: floor(surface, lines[along], count, best))
     inside = floor_loss <= (least + rise * least) * (1 + 1e-6)
     inside[inside] = _connected(floor_z[inside], best)
     floor_z, floor_loss = floor_z[inside], floor_loss[inside]
     k = best.size
     points = MAP_OF_MANY if h.effects else MAP.get(k, MAP_OF_MANY)
-    maps = pair_maps(surface, best, lines, points) if k > 2 else ()
+    maps = piece("maps", lambda: pair_maps(surface, best, lines, points)) if k > 2 else ()
     normal = NormalPosterior(surface, best)
-    band = _band(surface, lines[along], least, normal) if k <= 2 else None
-    spread = _spread(surface, normal, band, along, draws, seed)
+    band = piece("band", lambda: _band(surface, lines[along], least, normal)) if k <= 2 else None
+    spread = piece("spread", lambda: _spread(surface, normal, band, along, draws, seed))
     valley = Valley(
         hypothesis=h,
         chart=chart,
@@ -136,8 +142,8 @@ def _valley(surface: Surface, rise: float, seed: int, draws: Array | None) -> Va
         band=band,
         spread=spread,
         published=(),
-        next_tests=rank(surface, normal, spread, lambda z: metric.scale(chart, z)),
-        limit=_limit(surface, lines[along], seed),
+        next_tests=piece("tests", lambda: rank(surface, normal, spread, lambda z: metric.scale(chart, z))),
+        limit=piece("limit", lambda: _limit(surface, lines[along], seed)),
         unreached=float(np.mean([np.mean(~np.isfinite(p.loss)) for p in maps])) if maps else 0.0,
     )
     return replace(valley, published=tuple(_placed(surface, valley, label, p) for label, p in published))
