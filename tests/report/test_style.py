@@ -38,7 +38,7 @@ def test_a_strangers_material_brings_its_own_colour_and_title(monkeypatch: pytes
 
 def test_effects_change_the_look() -> None:
     assert look("neo_hookean+zero_offset") != look("neo_hookean")
-    assert colour("neo_hookean+zero_offset") not in {colour(n) for n in registry.components("materials")}
+    assert colour("neo_hookean+zero_offset") not in {colour(n) for n in registry.ordinary_materials()}
 
 
 @pytest.mark.parametrize(

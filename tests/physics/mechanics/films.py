@@ -24,7 +24,13 @@ SILICONE = {
     "yeoh": (8.840838, -0.6303258, 0.05632747),
     "ogden": (11.060008, 0.1959017, -0.3679535, 1.5196142, 5.805068, -1.1529809),
 }
-every_material = pytest.mark.parametrize("material", materials().values(), ids=materials().keys())
+every_material = pytest.mark.parametrize(
+    "material",
+    [pytest.param(m, marks=() if m.ordinary else pytest.mark.study) for m in materials().values()],
+    ids=materials().keys(),
+)
+"""Those that are there by name alone in `make study`: what is solved here knows a material by its contract only, which
+is tested for all of them (`tests/physics/materials`), and one curve of each is (`tests/physics/test_forward.py`)."""
 
 
 def silicone(material: type[Material]) -> Array:
