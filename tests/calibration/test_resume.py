@@ -31,7 +31,7 @@ from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.words.sampling import sentences
 
 CLAIM = hypothesis("neo_hookean")
-FEW = Settings(ess=1e6, walkers=8, chunk=30, most_steps=70)  # over lessons at 22 and 44
+FEW = Settings(ess=1e6, walkers=8, chunk=30, most_steps=70, sampler="emcee")  # over lessons at 22 and 44
 
 
 def strip(shift: float = 0.0) -> Measurement:
@@ -177,7 +177,7 @@ def test_more_draws_go_on_from_fewer_and_leave_them(tmp_path: Path, monkeypatch:
     first = sample(strip(), CLAIM, how(tmp_path, short))
     before = load_run(first.path)  # type: ignore[arg-type]
     with monkeypatch.context() as patch:
-        patch.setattr(walk, "starting_points", None)
+        patch.setattr(walk, "tried", None)
         more = sample(strip(), CLAIM, how(tmp_path, long))
     assert more.path != first.path
     assert more.status["steps"] == 70
