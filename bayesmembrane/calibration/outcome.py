@@ -135,6 +135,8 @@ def _importance(chains: Chains, mass: Mass) -> dict[str, float] | None:
     return {
         "k_hat": found.k_hat,
         "efficiency": found.efficiency,
+        "log_integral": found.log_mean,
+        "log_integral_sd": found.log_mean_sd,
         "log_evidence": found.log_mean - float(np.log(mass.value)),
         "log_evidence_sd": float(np.hypot(found.log_mean_sd, mass.sd / mass.value)),
     }

@@ -27,7 +27,7 @@ from bayesmembrane.comparison.evidence.target import EvidenceEstimate, Posterior
 from bayesmembrane.comparison.leave_out.score import leave_one_out, leave_range_out
 from bayesmembrane.comparison.parts import drop_pieces, kept, run_folder, serves
 from bayesmembrane.comparison.prior_widths import prior_widths
-from bayesmembrane.comparison.result import Row
+from bayesmembrane.comparison.result import ByWeights, Row
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.jobs import Tell
@@ -149,7 +149,17 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
         evaluations=int(run.status["evaluations"]) + climbed.evaluations + bridged.evaluations,
         seconds=float(run.status["seconds"]) + climbed.seconds + bridged.seconds,
         quality=run.quality,
+        by_weights=_by_weights(run, mass),
     )
+
+
+def _by_weights(run: Run, mass: Mass) -> ByWeights | None:
+    """ln Z by the weights of the run, divided by the mass as the other estimates are."""
+    found = run.status.get("importance")
+    if found is None:
+        return None
+    sd = float(np.hypot(found["log_integral_sd"], mass.sd / mass.value))
+    return ByWeights(float(found["log_integral"] - np.log(mass.value)), sd, float(found["k_hat"]))
 
 
 def _mass(posterior: Posterior, seed: int) -> Mass:

@@ -23,6 +23,15 @@ from bayesmembrane.physics.hypothesis import Hypothesis
 REACH = 10.0  # of ln Z: what is certainly farther behind the best has a probability below 1e-4
 
 
+@dataclass(frozen=True)
+class ByWeights:
+    """ln Z by the importance weights of all that a mixture proposed, its standard error, and Pareto's k-hat of them."""
+
+    log_evidence: float
+    sd: float
+    k_hat: float
+
+
 @dataclass(frozen=True, eq=False)
 class Row:
     """One hypothesis.
@@ -40,6 +49,7 @@ class Row:
     evaluations, seconds : in all
     quality : how far the draws can be trusted, None without any
     failure : "" or why the hypothesis could not be fitted: the error that fitting raised
+    by_weights : a third estimate of ln Z, which does not decide; None where emcee's ensembles walked
     """
 
     label: str
@@ -57,6 +67,7 @@ class Row:
     quality: Quality | None = None
     failure: str = ""
     posterior_probability_sd: float | None = None
+    by_weights: ByWeights | None = None
 
     @property
     def fitted(self) -> bool:
@@ -71,6 +82,7 @@ class Row:
             "log_evidence": dict(e.log_evidence) if e else {},
             "log_evidence_sd": dict(e.log_evidence_sd) if e else {},
             "agreed": bool(e and e.agreed),
+            "by_weights": asdict(self.by_weights) if self.by_weights else None,
             "elpd_loo": loo.elpd if loo else None,
             "loo_se": loo.se if loo else None,
             "loo_refits": len(loo.refitted) if loo else None,

@@ -23,6 +23,8 @@ _EVIDENCE = (
     Column("nested_sd", "+-", ".2f"),
     Column("bridge", "ln Z, bridge", ".2f"),
     Column("bridge_sd", "+-", ".2f"),
+    Column("by_weights", "ln Z, weights", ".2f"),
+    Column("by_weights_sd", "+-", ".2f"),
     Column("probability", "posterior probability", "p"),
     Column("probability_sd", "+-", "p"),
     Column("elpd_loo", "elpd, leave one out", ".1f"),
@@ -40,7 +42,8 @@ def evidence_table(found: Mapping[str, Comparison]) -> Table:
     rows = tuple(_evidence(name, r) for name, c in found.items() for r in c.rows)
     caption = (
         "Evidence ln Z by two estimators, divided by the prior mass that convexity leaves, each with its standard "
-        "error; expected log predictive density of points left out, with exact refits where importance weights fail; "
+        "error, and, where draws were proposed by a mixture, by the weights of all proposals, which does not decide; "
+        "expected log predictive density of points left out, with exact refits where importance weights fail; "
         "error of the rest of the curve, predicted from the fitted range."
     )
     return Table("evidence", caption, _EVIDENCE, rows)
@@ -55,6 +58,8 @@ def _evidence(name: str, row: Row) -> tuple[Value, ...]:
         e.log_evidence_sd[NESTED] if e else None,
         e.log_evidence[BRIDGE] if e else None,
         e.log_evidence_sd[BRIDGE] if e else None,
+        row.by_weights.log_evidence if row.by_weights else None,
+        row.by_weights.sd if row.by_weights else None,
         row.posterior_probability,
         row.posterior_probability_sd,
         loo.elpd if loo else None,
