@@ -169,7 +169,7 @@ def opened(campaign: Path) -> Iterator[Index]:
     with closing(connection):
         try:
             yield Index(connection)
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             raise StorageError(f"the index of the campaign cannot be used ({error})", str(path), "remove it") from None
 
 
@@ -211,7 +211,7 @@ def _connected(path: Path) -> sqlite3.Connection | None:
         connection.execute("PRAGMA synchronous = OFF")
         (version,) = connection.execute("PRAGMA user_version").fetchone()
         connection.execute("SELECT count(*) FROM tasks, about").fetchone()
-    except sqlite3.DatabaseError:
+    except (sqlite3.DatabaseError, UnicodeDecodeError):  # what SQLite says of it may be no text either
         connection.close()
         return None
     if version != VERSION:

@@ -207,7 +207,8 @@ def main() -> int:
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         root = Path(place)
-        found = damaged_more([*answers(root / "answers"), *campaign(root / "campaign")], given.times, given.seed)
+        files = [*campaign(root / "campaign"), *answers(root / "answers")]
+        found = damaged_more(files, given.times, given.seed)
         found = damaged(stored(root / "run"), given.times, given.seed) | found
     page = table(found, given.times, given.seed)
     if given.table is not None:

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.calibration.run import RunSettings, sample
+from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.campaign.file import read_campaign
 from bayesmembrane.campaign.index import INDEX, SEAL, opened, rebuild
 from bayesmembrane.campaign.page import write_morning_page
@@ -20,7 +22,7 @@ from bayesmembrane.campaign.status import standing
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.diagnose import diagnose
-from bayesmembrane.diagnosis.loop import Loop, Round
+from bayesmembrane.diagnosis.loop import Loop, Round, Stage
 from bayesmembrane.ground.stored import read, store
 from bayesmembrane.ground.tree import Encoder
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -29,9 +31,9 @@ from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.valleys.follow import valleys
 from tests.campaign.doing import sampled
 from tests.campaign.films import planned
-from tests.report.sections.loops import stage
 from tests.report.sections.test_evidence import compared
 from tests.report.test_page import reconstruction
+from tests.short_walks import FEW
 
 Read = Callable[[], Any]
 
@@ -55,7 +57,8 @@ def answers(place: Path) -> list[File]:
     force = force_curve("neo_hookean", (7.5,), at)[0] + 0.004 * np.random.default_rng(0).standard_normal(12)
     curve = Measurement(at, force, Annulus(0.010, 0.035), Specimen("film", 5e-5))
     claim = hypothesis("neo_hookean")
-    found, walked = diagnose(curve, claim), stage(curve, claim, 500.0)
+    how = RunSettings(out=place / "runs", settings=Settings(**{"ess": 1.0, **FEW}))
+    found, walked = diagnose(curve, claim), Stage(sample(curve, claim, how), 500.0, 0.03, 450.0, 4.0, 0.91)
     kinds: dict[str, Any] = {
         "comparison": compared(),
         "reconstruction": reconstruction(),
