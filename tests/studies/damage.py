@@ -177,7 +177,7 @@ def _became(file: File, now: Any, whole: Any, without: Any, damage: str) -> str:
 
 def table(found: dict[str, Counter[str]], times: int, seed: int) -> str:
     rows = "\n".join(
-        f"| {name} | {' | '.join(str(c[g]) for g in GOOD)} | {sum(c.values()) - sum(c[g] for g in GOOD)} |"
+        f"| {name} | {sum(c.values())} | {' | '.join(str(c[g]) for g in GOOD)} | {sum(c.values()) - sum(c[g] for g in GOOD)} |"
         for name, c in found.items()
     )
     return f"""# Stored files that are damaged
@@ -193,8 +193,8 @@ files. "Passed over": as if the file were not there; its task is done again. "As
 it was damaged, for a user wrote it, or it is the passing note of a worker; a run compares the hash of its data.
 Valleys, diagnosis and loop are those of a short neo-Hookean curve.
 
-| file | a sentence | as it was | passed over | as it stands | a traceback or other numbers |
-|---|---|---|---|---|---|
+| file | times | a sentence | as it was | passed over | as it stands | a traceback or other numbers |
+|---|---|---|---|---|---|---|
 {rows}
 """
 
