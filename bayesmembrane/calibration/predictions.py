@@ -234,7 +234,7 @@ class _Carried:
         forward = Forward(self.hypothesis, measurement, at, self.solve)
         found = forward(self.x, reached=False)
         shown = traces(forward, self.x, found.force) if self.noise.traced else None
-        return found.force + self._error(Elsewhere(forward.path, found.force, shown)), found.status
+        return found.force + self._error(Elsewhere(forward.path, found.force, shown, forward.places)), found.status
 
     def at_points(self) -> Array:
         """(B, N) N: the form error at the fitted points."""

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.motion import Motion
@@ -121,10 +121,13 @@ def unsteady(measurement: Measurement) -> Array:
     return np.array(sorted(i for i in near | set(ends.tolist()) if 0 <= i < n), dtype=int)
 
 
-def joint_factors(measurement: Measurement, there: Motion) -> FormFactors:
-    """The processes at the N readings and, after them, at the G points of another way of the disc from rest."""
-    state = [states(measurement), _states(there.deflection, there.across, measurement)]
-    way = [progress(measurement), np.cumsum(there.steps) / measurement.full_range]
+def joint_factors(measurement: Measurement, there: Motion, places: NDArray[np.int64] | None = None) -> FormFactors:
+    """The processes at the N readings and, after them, at the G points of another way of the disc from rest, or at
+    the ``places`` (G,) of it.
+    """
+    some = slice(None) if places is None else places
+    state = [states(measurement), _states(there.deflection, there.across, measurement)[some]]
+    way = [progress(measurement), np.cumsum(there.steps)[some] / measurement.full_range]
     return FormFactors(
         smooth_factor(np.concatenate(state), STATE_LENGTHS),
         smooth_factor(np.concatenate(way)[:, None], PROGRESS_LENGTHS),

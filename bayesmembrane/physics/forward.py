@@ -229,8 +229,13 @@ class Forward:
         return np.concatenate(found)
 
     @property
+    def places(self) -> NDArray[np.int64] | None:
+        """(N,) where ``deflection`` lies on `path`; None if it is all of it."""
+        return self.measurement.on_path if self._measured else None
+
+    @property
     def _here(self) -> Any:
-        return self.measurement.on_path if self._measured else slice(None)
+        return slice(None) if self.places is None else self.places
 
     def curves(
         self,

@@ -97,7 +97,8 @@ def compose(results: Sequence[Any], title: str | None = None) -> Content:
     leading = next(((section, lead) for section in every if (lead := section.lead(results)) is not None), None)
     told = [s for section in every if not section.aside for s in section.answer(results)]
     subject = _subject([s for s in (section.subject(results) for section in every) if s is not None])
-    about = f"What the {subject.curve}{' of ' if subject.films else ''}{listed(subject.films)} says"
+    verb = "say" if subject.curve.endswith("curves") else "says"
+    about = f"What the {subject.curve}{' of ' if subject.films else ''}{listed(subject.films)} {verb}"
     parts = [part for section in every for part in section.parts(results)]
     plain = Content(
         title=title or about,

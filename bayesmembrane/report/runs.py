@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
@@ -161,6 +161,7 @@ class Shown:
         return Case(
             name=self.name,
             end=d.end,
+            points=int(d.at.size),
             rmse=float(fit["rmse_N"] or 0.0),
             own_noise=fit["own_noise_N"],
             extra_noise=None if noise is None else float(np.mean(noise)),
@@ -224,9 +225,20 @@ def by_points(shown: Sequence[Shown]) -> list[list[Shown]]:
 
 
 def reach(s: Shown, shown: Sequence[Shown]) -> str:
-    """How far a run was fitted, as all of ``shown`` are told apart: with its points where others end there, too."""
+    """How far a run was fitted, as all of ``shown`` are told apart: with its specimen, or its points, where others end
+    there, too.
+    """
     same = {o.data_hash for o in shown if o.end == s.end}
-    return s.end if len(same) <= 1 else f"{s.end} ({s.digest.at.size} points)"
+    films = {o.film.name for o in shown if o.end == s.end}
+    if len(same) <= 1:
+        return s.end
+    return f"{s.end} ({s.film.name if len(films) == len(same) else f'{s.digest.at.size} points'})"
+
+
+def cases(shown: Sequence[Shown]) -> list[Case]:
+    """Their cases, each named with its specimen where there are several."""
+    several = len({s.film.name for s in shown}) > 1
+    return [replace(s.case, name=f"{s.name} on {s.film.name}") if several else s.case for s in shown]
 
 
 def end_column(shown: Sequence[Shown]) -> Column:

@@ -29,7 +29,7 @@ def paper_losses(table: PublishedTable) -> dict[str, dict[str, float]]:
 
 @dataclass(frozen=True)
 class LossPair:
-    """Ours and the paper's loss of one material over one range, N, on the same curve."""
+    """Ours and the paper's loss of one material over one range, "the range up to 30 mm", N, on the same curve."""
 
     name: str
     range: str

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bayesmembrane.calibration.run import Run
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, WAVE, Foreign
@@ -22,7 +23,7 @@ from bayesmembrane.words import language
 from bayesmembrane.words.diagnosis import percent, set_title, why_not
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed
-from bayesmembrane.words.moved import MATTERS, modulus_of
+from bayesmembrane.words.moved import MATTERS, modulus_of, settled
 from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.seen import MEASURED, seen
 from bayesmembrane.words.shape import PARTS
@@ -76,12 +77,14 @@ class Course:
     """The diagnoses that a first screen is about: the ``first``, those that ``named`` something, and the ``last``.
 
     sized : False: sizes are told elsewhere
+    sampled : the posterior of the last model, if there is one: its means are the sizes that are told
     """
 
     first: Diagnosis
     named: tuple[Diagnosis, ...]
     last: Diagnosis
     sized: bool = True
+    sampled: Run | None = None
 
     @property
     def telling(self) -> Diagnosis:
@@ -96,7 +99,7 @@ def of_diagnosis(d: Diagnosis) -> Brief:
 
 def of_loop(found: Loop, *, sized: bool = True) -> Brief:
     """Of a closed loop: what all rounds came to, with the sizes of what is probable or without."""
-    course = replace(course_of(found), sized=sized)
+    course = replace(course_of(found), sized=sized, sampled=found.rounds[-1].before.run)
     following = _next(course.last)
     before, after = found.rounds[0].before, found.rounds[-1].after
     if course.named and course.last.verdict == "adequate":
@@ -127,6 +130,7 @@ def tested(d: Diagnosis) -> str:
     what = "readings" if how.origin == MEASURED else "points"
     cycles = np.unique(m.cycle).size
     of = f" in {cycles} cycles" if cycles > 1 else " of a loop" if np.any(m.leg < 0) else ""
+    of = of if m.rig.has_path else ""
     aside = "" if d.set_aside is None else f" ({len(d.set_aside.numbers)} set aside)"
     readings = f"{len(m)} {what}{aside}{of} up to {how.place(float(np.max(m.deflection)))}"
     model = "" if d.declared else ", the nearest of all energies"
@@ -165,7 +169,7 @@ def _told(d: Diagnosis, name: str, course: Course, sized: bool = True) -> str:
     if of is None or name == NOTHING or not (sized and course.sized):
         return f"{p} {set_title(name)}"
     if course.last is not d and set(name.split("+")) <= set(course.last.null.names):
-        of = course.last.null
+        of = settled(course.last.null, course.sampled)
     own = [e for e in of.hypothesis.effects if e.name in name.split("+")]
     return f"{p} {listed(f'{e.title} ({flagged_size(e, of, d.measurement)})' for e in own)}"
 

@@ -52,6 +52,7 @@ class Case:
     lost : share of the draws without a force there, by reason
     loose : parameters that the data hardly determine, with posterior over prior width
     how : in which quantities and units people read it
+    points : how many readings were fitted; 0 if that is told elsewhere
     """
 
     name: str
@@ -73,6 +74,7 @@ class Case:
     lost: Mapping[str, float]
     loose: Mapping[str, float]
     how: Seen = DISC
+    points: int = 0
 
     @property
     def verdict(self) -> str:
@@ -96,15 +98,24 @@ def answer(cases: Sequence[Case]) -> list[str]:
     """What to read if one reads nothing else: what describes each range, how stiff, what lies beyond, what to trust."""
     groups = _by_range(cases)
     telling = next((g for g in groups if any(c.verdict in GOOD for c in g)), min(groups, key=_miss))
-    told = [*(describes(g) for g in groups), stiffness(telling), extrapolation(telling), convergence(cases)]
+    told = [*(describes(g) for g in groups)]
+    told += [_of_range(f(telling), telling, groups) for f in (stiffness, extrapolation)] + [convergence(cases)]
     return [t for t in told if t]
 
 
 def details(cases: Sequence[Case]) -> list[str]:
     """The other ranges' stiffness and extrapolation, and what the data leave open."""
     said = answer(cases)
-    told = [f(g) for g in _by_range(cases) for f in (unknown, stiffness, extrapolation)]
+    groups = _by_range(cases)
+    told = [_of_range(f(g), g, groups) for g in groups for f in (unknown, stiffness, extrapolation)]
     return [t for t in told if t and t not in said]
+
+
+def _of_range(told: str, group: Sequence[Case], groups: Sequence[Sequence[Case]]) -> str:
+    """A sentence on one range, which it names where there are several."""
+    if not told or len(groups) == 1:
+        return told
+    return f"Fitted up to {group[0].how.place(group[0].end)}: {told[0].lower()}{told[1:]}"
 
 
 def _miss(group: Sequence[Case]) -> float:
@@ -119,6 +130,8 @@ def _by_range(cases: Sequence[Case]) -> list[list[Case]]:
 def describes(group: Sequence[Case]) -> str:
     """Which materials describe the curve of one range."""
     end = group[0].how.place(group[0].end)
+    if (points := {c.points for c in group}) != {0} and len(points) == 1:
+        end += f" ({points.pop()} points)"
     by = {v: [c for c in group if c.verdict == v] for v in ("adequate", "strained", "misses", "unknown")}
     if by["unknown"]:
         best = sorted(group, key=lambda c: c.rmse)

@@ -8,7 +8,7 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST
 from bayesmembrane.words.diagnosis import experiment_sentence, percent, set_aside
 from bayesmembrane.words.hypothesis import spoken
-from bayesmembrane.words.language import listed, spoken_parameter
+from bayesmembrane.words.language import listed, spoken_parameter, three_digits
 from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.seen import seen
 from bayesmembrane.words.sizes import flagged_size
@@ -64,7 +64,8 @@ def validation_sentence(d: Diagnosis) -> str:
         if v.chosen == d.best.hypothesis.label()
         else f"the others choose {chosen} instead: the choice rests on the points left out"
     )
-    fall = f"their root mean square goes from {factor * v.before.rmse_N:.3g} to {factor * v.after.rmse_N:.3g} {unit}"
+    before, after = (three_digits(factor * e.rmse_N) for e in (v.before, v.after))
+    fall = f"their root mean square goes from {before} to {after} {unit}"
     return f"Set aside before looking: {set_aside(v)}. Without these points {same}; {fall}."
 
 

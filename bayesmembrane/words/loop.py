@@ -8,6 +8,7 @@ from bayesmembrane.diagnosis.left.discrepancy import Discrepancy
 from bayesmembrane.diagnosis.loop import Loop, Round, Stage, moved
 from bayesmembrane.diagnosis.other_tests import OtherTest
 from bayesmembrane.words import diagnosis as words
+from bayesmembrane.words.language import percent
 from bayesmembrane.words.seen import Seen, seen
 
 
@@ -37,11 +38,11 @@ def other_document(found: OtherTest) -> dict[str, Any]:
 def other_sentence(found: OtherTest) -> str:
     """The same in words."""
     how = seen(found.measurement)
-    apart = f" (specimens {found.scatter:.0%} apart)" if found.scatter else ""
+    apart = f" (specimens {percent(found.scatter)} apart)" if found.scatter else ""
     return (
         f"{found.measurement.specimen.name}, which no fit saw, is predicted to {how.error(found.rmse_after)} root mean "
         f"square ({how.error(found.rmse_before)} by the model as given); the 90 % band{apart} holds "
-        f"{found.covered:.0%} of its points."
+        f"{percent(found.covered)} of its points."
     )
 
 

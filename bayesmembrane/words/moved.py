@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -92,6 +92,19 @@ def modulus_fitted(c: Candidate, m: Measurement) -> float:
     """G in MPa of what was fitted and not sampled."""
     modulus = c.hypothesis.material.shear_modulus(c.hypothesis.films(c.x[None]).T)
     return float(1e-6 * np.ravel(modulus)[0] / m.specimen.thickness)
+
+
+def settled(c: Candidate, run: Run | None) -> Candidate:
+    """The candidate with its effects as the posterior of the same model has them in the mean; else as it was fitted.
+
+    What was sampled after it had been fitted has one size, wherever it is told.
+    """
+    if run is None or run.hypothesis.label() != c.hypothesis.label():
+        return c
+    x, names = c.x.copy(), c.hypothesis.names
+    for i in range(c.hypothesis.material_size, c.hypothesis.curve_size):
+        x[i] = _moments(run.data.posterior[names[i]].values)[0]
+    return replace(c, x=x)
 
 
 def modulus_of(run: Run) -> tuple[float, float]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from bayesmembrane.diagnosis.loop import Loop, Round, Stage
@@ -11,13 +13,13 @@ from bayesmembrane.words.candidates import bounds, validation_sentence
 from bayesmembrane.words.diagnosis import finding_sentence
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed
-from bayesmembrane.words.moved import modulus_fitted, modulus_of, moved_sentences
+from bayesmembrane.words.moved import modulus_fitted, modulus_of, moved_sentences, settled
 from bayesmembrane.words.seen import seen
 
 
 def answer(found: Loop) -> list[str]:
     """What was found and added, with the size, and how it ended."""
-    told = [finding_sentence(r.diagnosis) for r in found.rounds]
+    told = [finding_sentence(_settled(r)) for r in found.rounds]
     told = [told[0], *(f"With that: {s}" for s in told[1:])]
     last = found.rounds[-1]
     if last.changed:
@@ -26,6 +28,15 @@ def answer(found: Loop) -> list[str]:
             f"{spoken(last.after.run.hypothesis)} is adequate has not been asked."
         )
     return told
+
+
+def _settled(r: Round) -> Diagnosis:
+    """The diagnosis of a round with the size of what was then added as it was sampled."""
+    d = r.diagnosis
+    if not (r.changed and d.members):
+        return d
+    first, *others = d.members
+    return replace(d, members=(replace(first, candidate=settled(first.candidate, r.after.run)), *others))
 
 
 def subject(found: Loop) -> str:

@@ -17,6 +17,7 @@ from bayesmembrane.physics.materials.gent import Gent
 from bayesmembrane.physics.mechanics import request, solve
 from bayesmembrane.physics.mechanics.api import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.biaxial import Biaxial
 
 AT = np.linspace(0.004, 0.030, 7)
 SD = 5e-3
@@ -102,6 +103,20 @@ def test_points_that_were_not_used_are_compared_with_predicted_measurements() ->
     assert np.all(found.rest_residual[0] < 0)
     assert np.all(found.rest_residual[2] > 0)
     np.testing.assert_allclose((found.rest_residual[2] - found.rest_residual[0]) / (2 * 1.645), SD, rtol=0.2)
+
+
+@pytest.mark.parametrize("noise", ["form", "form_ar1"])
+def test_form_errors_reach_points_that_are_scattered_over_a_path(noise: str) -> None:
+    """Of a sheet up to one stretch the rest lies here and there among all readings; each has its own form error."""
+    x = 0.05 * np.tile(np.linspace(0.1, 1.0, 8), 2)
+    across = np.concatenate([1 + 0.5 * x[:8] / 0.05, 1 + 2 * x[8:] / 0.05])
+    sheet = Measurement(x, np.linspace(1.0, 5.0, 16), Biaxial(), Specimen("sheet", 1e-4), across=across)
+    some = x <= 0.03
+    claim = hypothesis("neo_hookean", noise=noise)
+    theta = np.array([[np.log(30.0), -7.0, np.log(0.05), 0.0][: 2 + len(claim.noise.coordinates) - 1]] * 50)
+    found = predict_draws(claim, sheet.select(some), theta, Wanted(rest=sheet.select(~some)))
+    assert found.rest_residual.shape == (3, np.count_nonzero(~some))
+    assert np.all(found.rest_residual[2] > found.rest_residual[0])
 
 
 def test_states_shapes_and_map_belong_to_the_film() -> None:

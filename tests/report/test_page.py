@@ -125,7 +125,11 @@ def test_names_are_shown_as_they_are(whole: Path, page: Page) -> None:
 
 def test_the_answer_comes_first_and_the_warning_before_it(page: Page) -> None:
     text = page.text
-    box, answer, contents = text.index("Not to be relied on"), text.index("Up to 35 mm, Yeoh"), text.index("Contents")
+    box, answer, contents = (
+        text.index("Not to be relied on"),
+        text.index("Up to 35 mm (8 points), Yeoh"),
+        text.index("Contents"),
+    )
     assert box < answer < contents < text.index("How it was made")
     assert "neo-Hookean up to 35 mm: sampling stopped early (step limit)" in text[box:answer]
     assert "neo-Hookean (rms residual" in text[answer:contents]
@@ -141,7 +145,7 @@ def test_a_converged_run_has_no_warning(tmp_path: Path, yeoh: Shown) -> None:
 def test_numerical_failures_and_solvers_that_disagree_are_in_the_box(tmp_path: Path, yeoh: Shown) -> None:
     poor = replace(yeoh, outcomes={"ok": 900, "unresolved": 100}, crosscheck={**yeoh.crosscheck, "largest": 2e-4})
     text = Page(write_report([poor], tmp_path).read_text(encoding="utf-8")).text
-    box = text[text.index("Not to be relied on") : text.index("Up to 35 mm, Yeoh")]
+    box = text[text.index("Not to be relied on") : text.index("Up to 35 mm (8 points), Yeoh")]
     assert "10 % of the films could not be computed" in box
     assert "disagree by up to 2.0e-04" in box
 

@@ -176,10 +176,11 @@ def _became(file: File, now: Any, whole: Any, without: Any, damage: str) -> str:
 
 
 def table(found: dict[str, Counter[str]], times: int, seed: int) -> str:
-    rows = "\n".join(
-        f"| {name} | {sum(c.values())} | {' | '.join(str(c[g]) for g in GOOD)} | {sum(c.values()) - sum(c[g] for g in GOOD)} |"
-        for name, c in found.items()
-    )
+    def row(name: str, count: Counter[str]) -> str:
+        good = [count[g] for g in GOOD]
+        return "| " + " | ".join(map(str, [name, count.total(), *good, count.total() - sum(good)])) + " |"
+
+    rows = "\n".join(row(name, count) for name, count in found.items())
     return f"""# Stored files that are damaged
 
 `make study-damage` (`python -m tests.studies.damage --times {times} --seed {seed}`): each file of a folder with a run,

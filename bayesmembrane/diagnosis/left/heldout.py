@@ -40,12 +40,17 @@ def misfit_of(residual: Array, noise_sd: Array, parameters: int = 0, white: Arra
     return Misfit(float(np.sqrt(np.mean(residual**2))), float(np.max(np.abs(residual))), float(np.sum(freed**2) / dof))
 
 
+def cycles_of(measurement: Measurement) -> NDArray[np.int64]:
+    """Numbers of the cycles; one where readings are states, and no stations of a path."""
+    return np.unique(measurement.cycle) if measurement.rig.has_path else np.ones(1, dtype=np.int64)
+
+
 def held_out(measurement: Measurement) -> NDArray[np.bool_]:
     """(N,) True for points that are set aside: the rule looks at the path alone.
 
     The last cycle where there are two or more, else every fourth of twenty blocks of the path.
     """
-    cycles = np.unique(measurement.cycle)
+    cycles = cycles_of(measurement)
     if cycles.size >= 2:
         mask = np.asarray(measurement.cycle == cycles[-1])
     else:
@@ -98,7 +103,7 @@ def validate(search: Search, before: Candidate, after: Candidate, rivals: Rivals
     last, covered_last = _predicted(part, fits[after.label], search, mask)
     belief = {c.label: value for c, value in rivals}
     chosen = max(fits, key=lambda label: fits[label].log_evidence + belief.get(label, -np.inf))
-    cycles = np.unique(whole.cycle)
+    cycles = cycles_of(whole)
     return HeldOut(int(cycles[-1]), cycles.size, first, last, chosen, covered_first, covered_last)
 
 

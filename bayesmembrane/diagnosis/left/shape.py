@@ -55,7 +55,10 @@ def residual_shape(measurement: Measurement, residual: Array) -> ResidualShape:
     """The shape of a residual (N,) N against deflection, leg, cycle and time."""
     d, r = measurement.deflection, residual
     third = np.clip((3 * (d - d.min()) / max(np.ptp(d), 1e-12)).astype(int), 0, 2)
-    up, down = r[measurement.leg > 0], r[measurement.leg < 0]
+    # States that are no stations of a path have no legs and no cycles.
+    path = measurement.rig.has_path
+    leg, cycle = (v if path else np.zeros_like(v) for v in (measurement.leg, measurement.cycle))
+    up, down = r[leg > 0], r[leg < 0]
     both = up.size > 0 and down.size > 0
     place = np.arange(r.size) if measurement.time is None else measurement.time
     varies = r.size > 3 and np.std(r) > 0
@@ -67,7 +70,7 @@ def residual_shape(measurement: Measurement, residual: Array) -> ResidualShape:
         loading=_rms(up) if up.size else None,
         unloading=_rms(down) if down.size else None,
         gap=float(np.mean(up) - np.mean(down)) if both else 0.0,
-        cycles=tuple((int(c), _rms(r[measurement.cycle == c])) for c in np.unique(measurement.cycle)),
+        cycles=tuple((int(c), _rms(r[cycle == c])) for c in np.unique(cycle)),
         trend=float(np.corrcoef(place, r)[0, 1]) if varies else 0.0,
         timed=measurement.time is not None,
         plateau=plateau_of(measurement.force),

@@ -35,6 +35,9 @@ def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
     sd = 1.0 if stated is None else float(np.sqrt(np.mean(stated**2)))
     profile = np.ones(1) if stated is None else stated / sd
     y, q = divided(measurement.force, profile), orthonormal(divided(basis, profile))
+    if not measurement.rig.has_path:
+        # States are no stations of one path: their order is that of a file, and nothing remembers by it.
+        return _forgetful(measurement, _Restricted(y, q, readings), sd, profile)
     found = [_most_likely(_Restricted(y, q, gaps), "time")]
     if gaps.size and float(np.max(np.abs(gaps - 1))) > NOISE.even_steps:
         found.append(_most_likely(_Restricted(y, q, readings), "readings"))
@@ -45,6 +48,17 @@ def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
     if inferred.dof < NOISE.doubt_from_dof or not (inferred.remembers or larger):
         return OwnNoise(sd, 0.0, 0.0, gaps, None, np.inf, profile=profile)
     return replace(inferred, excess=inferred.sd / sd)
+
+
+def _forgetful(measurement: Measurement, readings: _Restricted, stated: float, profile: Array) -> OwnNoise:
+    """Independent noise: what is stated, unless the readings scatter more."""
+    found = replace(_noise_at(readings, 0.0, 0.0, "readings"), profile=profile)
+    if measurement.force_sd is None:
+        return found
+    larger = chi2.sf((found.sd / stated) ** 2 * found.dof, found.dof) < NOISE.doubt_below
+    if larger and found.dof >= NOISE.doubt_from_dof:
+        return replace(found, excess=found.sd / stated)
+    return OwnNoise(stated, 0.0, 0.0, readings.gaps, None, np.inf, profile=profile)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +99,11 @@ def _most_likely(likelihood: _Restricted, clock: str) -> tuple[float, OwnNoise]:
     middle = min(max(rho, step), NOISE.largest_rho - step)
     bend = (value(middle - step) - 2 * value(middle) + value(middle + step)) / step**2
     error = float(np.sqrt(2 / bend)) if bend > 0 else 1 / np.sqrt(dof)
-    least, rss = likelihood.at(rho)
+    return likelihood.value(rho), _noise_at(likelihood, rho, min(error, NOISE.largest_rho_sd), clock)
+
+
+def _noise_at(likelihood: _Restricted, rho: float, error: float, clock: str) -> OwnNoise:
+    """The noise of one correlation, and its standard error."""
     floor = NOISE.smallest_sd * float(np.max(np.abs(likelihood.y)))
-    sd = max(float(np.sqrt(rss / dof)), floor)
-    return least, OwnNoise(sd, rho, min(error, NOISE.largest_rho_sd), likelihood.gaps, None, float(dof), clock)
+    sd = max(float(np.sqrt(likelihood.at(rho)[1] / likelihood.dof)), floor)
+    return OwnNoise(sd, rho, error, likelihood.gaps, None, float(likelihood.dof), clock)

@@ -10,9 +10,8 @@ import numpy as np
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array, Natural, Normal, Parameter
-from bayesmembrane.physics.noise.base import LN_SD, SD, Noise, NoiseLikelihood, conditional, force_scale
+from bayesmembrane.physics.noise.base import LN_SD, SD, Noise, NoiseLikelihood, conditional, force_scale, root_of
 
-ROUND_OFF = 1e-13  # of the trace of a covariance: what doubles leave of its smallest eigenvalues
 LN_LENGTH = Parameter(
     "ln_length",
     "-",
@@ -51,15 +50,6 @@ class AR1(Noise):
         return AR1Likelihood(measurement)
 
 
-def _root(sigma: Array) -> Array:
-    """Cholesky factors of (B, N, N); where a memory of many times the test leaves round-off, that much is added."""
-    try:
-        return np.asarray(np.linalg.cholesky(sigma))
-    except np.linalg.LinAlgError:
-        trace = np.trace(sigma, axis1=1, axis2=2)
-        return np.asarray(np.linalg.cholesky(sigma + ROUND_OFF * trace[:, None, None] * np.eye(sigma.shape[1])))
-
-
 class AR1Likelihood(NoiseLikelihood):
     """O(N) by a Kalman filter where the points' own noise is independent, else one Cholesky factor for each draw.
 
@@ -82,7 +72,7 @@ class AR1Likelihood(NoiseLikelihood):
             r = np.ascontiguousarray(residual, dtype=float)
             return np.asarray(_filter(r, tau * tau, rate, self.gap, self.variance))
         sigma = self.given + (tau * tau)[:, None, None] * np.exp(-rate[:, None, None] * self.distance)
-        root = _root(sigma)
+        root = root_of(sigma)
         z = np.linalg.solve(root, residual[:, :, None])[:, :, 0]
         log_det = np.sum(np.log(np.diagonal(root, axis1=1, axis2=2)), axis=1)
         return np.asarray(-0.5 * np.sum(z * z, axis=1) - log_det - 0.5 * self.variance.size * np.log(2 * np.pi))

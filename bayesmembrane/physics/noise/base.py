@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.motion import Motion
@@ -17,6 +18,7 @@ from bayesmembrane.ground.parameters import Array, Natural, Normal, Parameter
 if TYPE_CHECKING:
     from bayesmembrane.physics.effects.base import Effect
 
+ROUND_OFF = 1e-13  # of the trace of a covariance: what doubles leave of its smallest eigenvalues
 MEDIAN_SHARE, SPREAD = 3e-3, 2.0
 
 LN_SD = Parameter(
@@ -47,11 +49,13 @@ class Elsewhere:
     path : how the disc gets there
     force : (B, G) N, the curves of B draws
     traces : (B, E, G) N, what each effect changes of them; None where nothing asks for it
+    places : (G,) where the points lie on the path; None if they are all of it
     """
 
     path: Motion
     force: Array
     traces: Array | None = None
+    places: NDArray[np.int64] | None = None
 
 
 class NoiseLikelihood(ABC):
@@ -99,7 +103,7 @@ class NoiseLikelihood(ABC):
 
     def draw(self, x: Array, rng: np.random.Generator) -> Array:
         """One draw of the noise for each coordinate vector in x (B, k), shape (B, N), N."""
-        roots = (np.linalg.cholesky(self.covariance(row)) for row in x)
+        roots = (root_of(self.covariance(row)[None])[0] for row in x)
         return np.stack([root @ rng.standard_normal(len(root)) for root in roots])
 
     def sd(self, x: Array) -> Array:
@@ -178,6 +182,15 @@ class Noise(ABC):
 
         Raises `SettingsError` if the inferred part is off and the measurement gives no noise of its own.
         """
+
+
+def root_of(sigma: Array) -> Array:
+    """Cholesky factors of (B, N, N); where a memory of many times the test leaves round-off, that much is added."""
+    try:
+        return np.asarray(np.linalg.cholesky(sigma))
+    except np.linalg.LinAlgError:
+        trace = np.trace(sigma, axis1=1, axis2=2)
+        return np.asarray(np.linalg.cholesky(sigma + ROUND_OFF * trace[:, None, None] * np.eye(sigma.shape[1])))
 
 
 def conditional(pull: Array, precision: Array) -> Array:

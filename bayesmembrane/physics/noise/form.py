@@ -170,7 +170,7 @@ class FormLikelihood(NoiseLikelihood):
         all that was seen, the energy's error has its own part.
         """
         n = len(self.measurement)
-        joint = self.factors if there is None else joint_factors(self.measurement, there.path)
+        joint = self.factors if there is None else joint_factors(self.measurement, there.path, there.places)
         here = FormFactors(joint.state[:n], joint.progress[:n])
         force, traces = self._curves(len(x)) if there is None else self._shown(there)
         beyond = slice(0, n) if there is None else slice(n, None)

@@ -11,7 +11,7 @@ from scipy.linalg import solve_triangular
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array, Natural, Parameter
 from bayesmembrane.physics.noise.ar1 import LN_LENGTH, AR1Likelihood, gaps_of
-from bayesmembrane.physics.noise.base import NoiseLikelihood
+from bayesmembrane.physics.noise.base import NoiseLikelihood, root_of
 from bayesmembrane.physics.noise.form import Form, FormLikelihood
 
 
@@ -50,7 +50,7 @@ class FormAR1Likelihood(FormLikelihood):
     def log_likelihood(self, residual: Array, x: Array) -> Array:
         if self.axes is None:
             return super().log_likelihood(residual, x)
-        roots = np.linalg.cholesky(np.stack([self._one(b, len(x)).covariance(x[b]) for b in range(len(x))]))
+        roots = root_of(np.stack([self._one(b, len(x)).covariance(x[b]) for b in range(len(x))]))
         z = np.linalg.solve(roots, residual[:, :, None])[:, :, 0]
         log_det = 2 * np.sum(np.log(np.diagonal(roots, axis1=1, axis2=2)), axis=1)
         return np.asarray(-0.5 * (np.sum(z * z, axis=1) + log_det + residual.shape[1] * np.log(2 * np.pi)))
@@ -75,7 +75,7 @@ class FormAR1Likelihood(FormLikelihood):
             return super()._whitened(values, x)
         tau = float(np.exp(x[0])) * self.scale
         remembered = tau**2 * np.exp(-np.exp(-x[-1]) * self.memory.distance)
-        root = np.linalg.cholesky(np.diag(self.own) + self.axes.T @ remembered @ self.axes)
+        root = root_of((np.diag(self.own) + self.axes.T @ remembered @ self.axes)[None])[0]
         return np.asarray(solve_triangular(root, values, lower=True))
 
     def _one(self, b: int, count: int) -> FormLikelihood:

@@ -15,13 +15,13 @@ from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.ground.stored import read
 from bayesmembrane.report.blocks import PLAIN, Block, Column, Figure, Picture, Table, Text, points
 from bayesmembrane.report.canvas import Interval, draw_interval, encoded, new_figure, style
-from bayesmembrane.report.runs import Shown, end_column, ends, in_order
+from bayesmembrane.report.runs import Shown, cases, end_column, ends, in_order
 from bayesmembrane.report.sections.base import Section, Subject, of_kind
 from bayesmembrane.report.style import FAINT, with_unit
 from bayesmembrane.words.beside_paper import LossPair, losses
 from bayesmembrane.words.calibration import answer, details, overview, verdict
 from bayesmembrane.words.hypothesis import material_title
-from bayesmembrane.words.language import listed, spoken_parameter
+from bayesmembrane.words.language import listed, millimetres, spoken_parameter
 from bayesmembrane.words.seen import alike
 
 
@@ -41,9 +41,11 @@ class CalibrationsSection(Section):
         beside = sorted(of_kind(results, Compared), key=lambda c: (c.material, c.end))
         out: list[Block] = []
         if shown:
-            out += [*points(details([s.case for s in shown])), fits_table(shown)]
+            out += [*points(details(cases(shown))), fits_table(shown)]
         if beside:
-            told = losses([LossPair(material_title(c.material), c.range, c.ours, c.evaluated) for c in beside])
+            told = losses(
+                [LossPair(material_title(c.material), f"the range {_up_to(c)}", c.ours, c.evaluated) for c in beside]
+            )
             out += [*([Text(told)] if told else []), losses_table(beside)]
         for _, group in groupby(sorted(shown, key=lambda s: s.hypothesis.label()), lambda s: s.hypothesis.label()):
             runs = sorted(group, key=lambda s: s.digest.end)
@@ -52,7 +54,7 @@ class CalibrationsSection(Section):
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
         shown = in_order(of_kind(results, Shown))
-        return answer([s.case for s in shown]) if shown else ()
+        return answer(cases(shown)) if shown else ()
 
     def subject(self, results: Sequence[Any]) -> Subject | None:
         shown = in_order(of_kind(results, Shown))
@@ -60,7 +62,7 @@ class CalibrationsSection(Section):
             return None
         films = tuple(dict.fromkeys(s.film.name for s in shown))
         curves = list(dict.fromkeys(s.how.curve for s in shown))
-        return Subject(films, overview([s.case for s in shown]), curves[0] if len(curves) == 1 else "force curve")
+        return Subject(films, overview(cases(shown)), curves[0] if len(curves) == 1 else "force curve")
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
@@ -116,6 +118,10 @@ def _times(factor: float, value: float | None) -> float | None:
     return None if value is None else factor * value
 
 
+def _up_to(c: Compared) -> str:
+    return f"up to {millimetres(c.end)}"
+
+
 def losses_table(compared: Sequence[Compared]) -> Table:
     """Our losses beside the paper's."""
     columns = (
@@ -131,7 +137,7 @@ def losses_table(compared: Sequence[Compared]) -> Table:
     rows = tuple(
         (
             material_title(c.material),
-            c.range,
+            _up_to(c),
             c.ours,
             c.constrained,
             c.printed,

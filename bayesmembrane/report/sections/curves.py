@@ -36,15 +36,20 @@ class CurvesSection(Section):
 
 
 def _blocks(group: Sequence[Shown], end: str) -> list[Block]:
-    names, how = listed(s.name for s in group), group[0].how
+    names, how, path = listed(s.name for s in group), group[0].how, group[0].film.rig.has_path
+    drawn = (
+        f"median curves and 90 % bands of {names}. Beyond the fitted range curves are dashed and bands hatched: there "
+        "only the form of the energy and the priors speak"
+        if path
+        else f"medians of {names} at each state"
+    )
+    sd = "; the grey band is two standard deviations of the stated noise" if group[0].digest.has_noise else ""
     figure = Figure(
         first_look([look_of(group, end)]),
         alt=f"{how.origin.capitalize()} {how.load} against {how.travel} up to {end} with the curves of {names}, and "
         "their residuals",
-        caption=f"{how.load.capitalize()} ({how.load_scale[1]}) against {how.travel_label}, fitted up to {end}: median "
-        f"curves and 90 % bands of {names}. Beyond the fitted range curves are dashed and bands hatched: there only "
-        f"the form of the energy and the priors speak. Below: {how.origin} minus median {how.load} "
-        f"({how.load_scale[1]}); the grey band is two standard deviations of the stated noise. "
+        caption=f"{how.load.capitalize()} ({how.load_scale[1]}) against {how.travel_label}, fitted up to {end}: "
+        f"{drawn}. Below: {how.origin} minus median {how.load} ({how.load_scale[1]}){sd}. "
         "The vertical axis of the residuals is logarithmic away from zero where it has to be.",
     )
     return [figure, *points([held_out(s.name, s.digest.rest_residual, s.how) for s in group if s.digest.rest_at.size])]
@@ -57,7 +62,10 @@ def look_of(group: Sequence[Shown], end: str) -> Panel:
     if d.rest_at.size:
         rest = Measured(d.rest_at, d.rest_force, d.rest_sd if np.all(np.isfinite(d.rest_sd)) else None, group[0].how)
     curves = tuple(
-        Fitted(s.look, s.digest.deflection, s.digest.curve, s.digest.beyond, s.digest.residual, s.name) for s in group
+        Fitted(
+            s.look, s.digest.deflection, s.digest.curve, s.digest.beyond, s.digest.residual, s.name, s.film.rig.has_path
+        )
+        for s in group
     )
     return Panel(group[0].points, curves, rest, f"Fitted up to {end}")
 
@@ -70,7 +78,7 @@ class Fitted:
     """What one model says: 5, 50 and 95 % of the force (3, G) N at ``deflection`` (G,) m, and the residuals.
 
     ``beyond`` (G,) is True where the deflection lies outside the fitted range; ``residual`` (3, N) N is measured minus
-    computed force at the measured points.
+    computed force at the measured points. Without a ``path`` each point is a state by itself.
     """
 
     look: str
@@ -79,6 +87,7 @@ class Fitted:
     beyond: NDArray[np.bool_]
     residual: Array
     label: str
+    path: bool = True
 
 
 @dataclass(frozen=True)
@@ -112,7 +121,7 @@ def _look(ax: Axes, look: Panel, first: bool) -> None:
     end = _at(how, float(np.max(look.points.deflection)))
     for curve in look.curves:
         _curve(ax, curve, look.points)
-    last = max([end, *(_at(how, float(c.deflection[-1])) for c in look.curves)])
+    last = max([end, *(_at(how, float(c.deflection[-1])) for c in look.curves if c.path)])
     lowest, top = _reach(look, last)
     if last > end * (1 + 1e-6):
         ax.axvspan(end, last, color=SHADE, zorder=0)
@@ -132,7 +141,7 @@ def _look(ax: Axes, look: Panel, first: bool) -> None:
     if look.rest is not None and look.rest.deflection.size:
         errorbars(ax, look.rest, filled=False)
     ax.set_ylim(lowest - 0.02 * top, top)
-    ax.set_xlim(how.rest, last)
+    ax.set_xlim(min(how.rest, float(np.min(how.along(look.points.deflection)))), last if last > end else None)
     ax.set_title(look.heading)
     ax.grid(color=FAINT, linewidth=0.6)
     if first:
@@ -156,6 +165,12 @@ def _curve(ax: Axes, curve: Fitted, points: Measured) -> None:
     how = points.how
     x, force, c = how.along(curve.deflection), how.carried(curve.force), colour(curve.look)
     inside = ~curve.beyond
+    if not curve.path:
+        ax.plot(
+            how.along(points.deflection), how.carried(points.force - curve.residual[1]), color=c, linestyle="none",
+            marker=marker(curve.look), markersize=3.5, alpha=0.7, zorder=3,
+        )  # fmt: skip
+        return
     band(ax, x, force, inside, Shade(c, 0.25))
     if np.any(np.diff(points.deflection) < 0) and np.all(np.isfinite(curve.residual[1])):
         ax.plot(how.along(points.deflection), how.carried(points.force - curve.residual[1]), color=c, zorder=3)
@@ -180,8 +195,8 @@ def _look_residuals(ax: Axes, look: Panel, first: bool) -> None:
     ax.axhline(0, color=INK, linewidth=0.8)
     for curve, residual in zip(look.curves, left, strict=True):
         c = colour(curve.look)
-        mark = marker(curve.look) if n <= 60 else "none"
-        line = linestyle(curve.look)
+        mark = marker(curve.look) if n <= 60 or not curve.path else "none"
+        line = linestyle(curve.look) if curve.path else "none"
         ax.plot(x, residual, color=c, linewidth=1.1, linestyle=line, marker=mark, markersize=3.5)
     _residual_scale(ax, left, own)
     ax.set_xlabel(how.travel_label)
@@ -224,6 +239,6 @@ def _look_legend(looks: Sequence[Panel]) -> list[Any]:
             )
         )  # fmt: skip
     for name, c in curves.items():
-        line, mark = linestyle(c.look), marker(c.look)
+        line, mark = linestyle(c.look) if c.path else "none", marker(c.look)
         handles.append(Line2D([], [], color=colour(c.look), linestyle=line, marker=mark, markersize=4, label=name))
     return handles

@@ -155,7 +155,7 @@ def curves_picture(fits: Sequence[Fit], kind: str = "svg") -> Picture:
             if len(ends) > 1:
                 ax.set_title(f"Fitted up to {end}")
             ax.set_ylabel(how.load_label)
-            ax.set_xlim(left=how.rest)
+            ax.set_xlim(left=min([how.rest, *(float(np.min(how.along(f.deflection))) for f in own)]))
             ax.grid(color=FAINT, linewidth=0.6)
             ax.legend(loc="upper left")
         panels[-1].set_xlabel(how.travel_label)
@@ -165,12 +165,13 @@ def curves_picture(fits: Sequence[Fit], kind: str = "svg") -> Picture:
 def _curves(ax: Axes, fits: Sequence[Fit], how: Seen) -> None:
     for name, f in zip(spoken_apart([f.hypothesis for f in fits]), fits, strict=True):
         material = f.hypothesis.material.name
+        path = f.rig is None or f.rig.has_path
         ax.plot(
             how.along(f.deflection),
             how.carried(f.force),
             color=colour(material),
-            linestyle=linestyle(material),
-            marker=marker(material) if f.deflection.size <= 60 else "",
+            linestyle=linestyle(material) if path else "none",
+            marker=marker(material) if f.deflection.size <= 60 or not path else "",
             markersize=4,
             label=f"{name} (rms {how.force(f.rmse_N)})",
         )

@@ -11,6 +11,8 @@ import numpy as np
 from bayesmembrane.calibration.joint.fit import JointFit
 from bayesmembrane.calibration.joint.run import KIND, JointRun
 from bayesmembrane.calibration.run import stored_predictions
+from bayesmembrane.ground.parameters import Natural
+from bayesmembrane.ground.registry import components
 from bayesmembrane.ground.stored import read
 from bayesmembrane.report.blocks import PLAIN, Block, Column, Figure, Picture, Table, points
 from bayesmembrane.report.canvas import Shade, band, encoded, errorbars, new_figure, style
@@ -18,7 +20,7 @@ from bayesmembrane.report.runs import Shown
 from bayesmembrane.report.runs import read as shown_run
 from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
 from bayesmembrane.report.style import FAINT, colour
-from bayesmembrane.words.hypothesis import material_title
+from bayesmembrane.words.hypothesis import effect_title, material_title
 from bayesmembrane.words.joint import answer, fit_sentence, sentences
 from bayesmembrane.words.language import listed, spoken_parameter
 
@@ -78,9 +80,8 @@ class JointSection(Section):
         every: list[JointRun | JointFit] = [*of_kind(results, JointRun), *of_kind(results, JointFit)]
         if not every:
             return None
-        films = dict.fromkeys(p.measurement.specimen.name for e in every for p in e.joint.parts)
         tests = dict.fromkeys(label for e in every for label in e.joint.labels)
-        return Subject(tuple(films), f"One material in the tests {listed(tests)}.", "curves")
+        return Subject(tuple(tests), f"One material in the tests {listed(tests)}.", "curves")
 
 
 def _posterior(run: JointRun) -> Table:
@@ -96,12 +97,26 @@ def _posterior(run: JointRun) -> Table:
     )
     rows = []
     for p, v in zip(joint.natural_parameters, run.status["posterior"].values(), strict=True):
-        rows.append((spoken_parameter(p.name), p.unit, v["mean"], v["sd"], *v["hdi_94"]))
+        name, factor, unit = _read_as(run, p)
+        rows.append((name, unit, *(factor * u for u in (v["mean"], v["sd"], *v["hdi_94"]))))
     caption = (
         "The joint posterior. Parameters of the energy are those of the thinnest film, "
         f"{1e6 * joint.thickness:.4g} um thick, and all tests share them; the others belong to one test."
     )
     return Table("joint posterior", caption, columns, tuple(rows))
+
+
+def _read_as(run: JointRun, p: Natural) -> tuple[str, float, str]:
+    """(name, factor, unit) of a parameter as people read it: that of a test with its label, in the units of its rig."""
+    for part in run.joint.parts:
+        if not p.name.startswith(f"{part.label}."):
+            continue
+        m, own = part.measurement, p.name.removeprefix(f"{part.label}.")
+        block = own.partition(".")[0]
+        title = f"{effect_title(block)}, " if block in components("effects") else ""
+        factor, unit = m.rig.shown(m.specimen.thickness).get(p.unit, (1.0, p.unit))
+        return f"{part.label}: {title}{spoken_parameter(own)}", factor, unit
+    return spoken_parameter(p.name), 1.0, p.unit
 
 
 def _tests(run: JointRun) -> Table:
@@ -156,8 +171,8 @@ def _bands(run: JointRun, shown: Sequence[Shown]) -> Figure:
     return Figure(
         bands_picture(run.joint.labels, shown),
         alt=f"Measured curves of {names}, each with the band that the joint posterior predicts for it",
-        caption=f"Every test with what the joint posterior says of it: 90 % band of a new measurement (light) and of "
-        f"the curve (dark), and its median, within the fitted range. {names[:1].upper()}{names[1:]}.",
+        caption="Every test with what the joint posterior says of it: 90 % band of a new measurement (light) and of "
+        "the curve (dark), and its median, within the fitted range.",
     )
 
 

@@ -54,7 +54,7 @@ class PopulationSection(Section):
     def subject(self, results: Sequence[Any]) -> Subject | None:
         found = of_kind(results, Population)
         labels = [label for p in found for label in p.specimens.labels]
-        return Subject(tuple(dict.fromkeys(labels)), "A population of specimens.") if found else None
+        return Subject(tuple(dict.fromkeys(labels)), "A population of specimens.", "curves") if found else None
 
 
 def _table(found: Population) -> Table:

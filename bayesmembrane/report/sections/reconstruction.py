@@ -17,7 +17,7 @@ from bayesmembrane.report.canvas import Measured, encoded, new_figure, style
 from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
 from bayesmembrane.report.style import ALARM, FAINT, INK, MUTED, RANGE_COLOURS
 from bayesmembrane.words.hypothesis import material_title
-from bayesmembrane.words.language import listed
+from bayesmembrane.words.language import listed, millimetres
 from bayesmembrane.words.origin import origin, suspect
 
 
@@ -43,7 +43,7 @@ class ReconstructionSection(Section):
         return [
             Glance(
                 "reconstruction",
-                f"the curve over {listed(r.name for r in found.ranges)}",
+                f"the curve up to {listed(millimetres(r.deflection.max()) for r in found.ranges)}",
                 f"{found.force.size} points; printed rows that contradict the rest: {len(found.suspects)}",
             )
             for found in of_kind(results, Reconstruction)

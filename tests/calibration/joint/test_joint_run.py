@@ -115,7 +115,8 @@ def test_a_stored_run_is_read_back_and_shown_with_the_band_of_every_test(
     assert isinstance(stored[made_.folder.name, "joint"], JointRun)
     assert {(label, "run") for label in ("strip", "sheet")} <= set(stored)
     page = bm.report(made_.folder, out=tmp_path / "page").read_text()
-    for words in ("Several tests together", "strip", "sheet", "joint posterior predicts"):
+    shift = "strip: offset of the deflection zero, shift"
+    for words in ("Several tests together", shift, "sheet: extra noise", "joint posterior predicts"):
         assert words in page
     document = bm.as_dict(made_)
     assert set(document["tests"]) == {"strip", "sheet"}

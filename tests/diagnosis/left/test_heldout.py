@@ -3,14 +3,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.candidates.candidate import with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.left.heldout import held_out, misfit_of, validate
+from bayesmembrane.diagnosis.left.shape import residual_shape
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.neo_hookean import NeoHookean
+from bayesmembrane.physics.rigs.biaxial import Biaxial
 from bayesmembrane.words.diagnosis import set_aside
 from tests.diagnosis.curves import SD, measured, triangle
 from tests.generator.datasets import generate
@@ -39,6 +42,23 @@ def test_points_are_set_aside_by_the_path_alone() -> None:
 
 def test_too_few_points_set_nothing_aside() -> None:
     assert not np.any(held_out(measured(np.zeros(12), np.linspace(0.001, 0.04, 12))))
+
+
+def test_states_that_are_no_path_have_no_cycles_no_legs_and_no_noise_that_remembers() -> None:
+    """A sheet pulled again and again, each time further across: one state after the other, in the order of a file."""
+    l1 = np.tile(np.linspace(1.05, 1.5, 12), 8)
+    l2 = 1 + np.repeat(np.linspace(0.1, 1.0, 8), 12) * (l1 - 1)
+    x, across = 0.05 * (np.concatenate([l1, l2]) - 1), np.concatenate([l2, l1])
+    # An error that goes on from reading to reading, as that of a wrong energy does along a series.
+    force = 10 * x / 0.05 + np.sin(np.arange(x.size) / 4)
+    m = Measurement(x, force, Biaxial(), Specimen("sheet", 1e-3), across=across)
+    assert np.unique(m.cycle).size > 1
+    noise = own_noise(m, np.column_stack([np.ones(x.size), x]))
+    assert noise.rho == 0
+    assert noise.sd == pytest.approx(np.sqrt(0.5), rel=0.05)
+    shape = residual_shape(m, force)
+    assert (shape.loading, shape.unloading, len(shape.cycles)) == (None, None, 1)
+    assert 0.2 < np.mean(held_out(m)) < 0.3
 
 
 def test_the_right_effect_predicts_the_cycle_that_it_has_not_seen() -> None:

@@ -38,10 +38,17 @@ def silicone(material: type[Material]) -> Array:
     return np.array(SILICONE.get(material.name, material.typical()))
 
 
-def prior_draws(material: type[Material], count: int, seed: int) -> Array:
-    """(count, n) parameters from the prior, with the modulus fixed: it only scales the forces."""
+def prior_draws(material: type[Material], count: int, seed: int, wide: float = 1.0) -> Array:
+    """(count, n) parameters from the prior, with the modulus fixed: it only scales the forces.
+
+    ``wide`` times as far from the prior's mean, within the bounds of the coordinates.
+    """
     rng = np.random.default_rng(seed)
     x = np.stack([c.prior.draw(rng, count) for c in material.coordinates])
+    if wide != 1.0:
+        middle = np.mean(x, axis=1, keepdims=True)
+        low, high = np.array([c.bounds for c in material.coordinates]).T
+        x = np.clip(middle + wide * (x - middle), low[:, None], high[:, None])
     x[0] = np.log(15.0)
     return material.from_coordinates(x).T
 

@@ -14,6 +14,8 @@ from bayesmembrane.physics.materials.ogden import Ogden
 from bayesmembrane.physics.materials.yeoh import Yeoh
 from bayesmembrane.physics.mechanics import Note, Status, request, solve
 from bayesmembrane.physics.mechanics.fallback import solve as solve_whatever_it_takes
+from bayesmembrane.physics.mechanics.request import Spared
+from bayesmembrane.physics.mechanics.ritz import batch
 from bayesmembrane.physics.mechanics.ritz import kernels as ritz_kernels
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
 from bayesmembrane.physics.mechanics.shooting import solver as shooting
@@ -250,6 +252,30 @@ def test_neighbours_in_a_batch_do_not_change_a_single_bit(material):
         part = ritz.solve(asked(material, p[list(films)], FIFTEEN))
         for name in ("force", "slope", "status", "note", "convexity", "variation", "energy"):
             np.testing.assert_array_equal(getattr(part, name), getattr(together, name)[list(films)], err_msg=name)
+
+
+@pytest.mark.parametrize("spare", [Spared.NONE, Spared.NOT_CONVEX])
+@every_material
+def test_answers_alone_equal_answers_in_a_batch(material, spare):
+    # Films so odd, and clamped so differently, that each takes its own steps, loses its path, and walks on.
+    p, rng = prior_draws(material, 48, seed=107, wide=2.0), np.random.default_rng(108)
+    l0 = np.where(rng.random(48) < 0.5, 1.0, 1.0 + 0.2 * rng.random(48))
+    question = replace(asked(material, p, np.linspace(0.743, 91.5, 9) * MM, l0), spare=spare)
+    together = ritz.solve(question)
+    for i in range(48):
+        alone = ritz.solve(question.of(np.array([i])))
+        for name in ("force", "slope", "status", "note", "convexity", "ellipticity"):
+            np.testing.assert_array_equal(getattr(alone, name)[0], getattr(together, name)[i], err_msg=f"{name}, {i}")
+
+
+def test_a_film_is_followed_in_its_own_steps_whoever_is_beside_it():
+    start, d = np.array([0.4, 0.4]), np.array([[0.5, 2.0, 2.0], [0.5, 40.0, 41.0]])
+    grid, keep = batch.path(start, d, 0.8)
+    np.testing.assert_array_equal(grid[keep], d.T)
+    for i in range(2):
+        alone, _ = batch.path(start[[i]], d[[i]], 0.8)
+        repeated = np.append(True, np.diff(grid[:, i]) > 0)
+        np.testing.assert_array_equal(grid[repeated, i], np.unique(alone))
 
 
 def test_prestretch_may_differ_between_films():

@@ -310,3 +310,6 @@ def test_a_memory_of_many_times_the_test_beside_a_given_covariance_has_a_likelih
     x = np.array([[0.0, 45.0], [np.log(1e-3), 1.0]])
     found = AR1Likelihood(m).log_likelihood(np.full((2, n), 1e-3), x)
     assert np.all(np.isfinite(found))
+    # The same beside a form error, which is none at ln_eta = -40.
+    both = FormAR1().bind(m).log_likelihood(np.full((2, n), 1e-3), np.insert(x, 1, -40.0, axis=1))
+    assert both == pytest.approx(found, rel=1e-6)

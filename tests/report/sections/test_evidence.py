@@ -16,7 +16,8 @@ from bayesmembrane.data.published import read_published_table
 from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.page import TWIN, write_report
-from bayesmembrane.report.sections.evidence import sentences
+from bayesmembrane.report.runs import Shown, cases, reach
+from bayesmembrane.report.sections.evidence import EvidenceSection, sentences
 from bayesmembrane.report.sections.evidence.figures import comparison_picture
 from bayesmembrane.report.sections.evidence.tables import evidence_table, modes_table, ranking_table, widths_table
 from tests.report.pages import without_pictures
@@ -110,3 +111,20 @@ def test_a_stored_comparison_gives_the_same_page(tmp_path: Path) -> None:
     store(tmp_path / "answer", "comparison", compared(), {})
     stored, held = (write_report([found], tmp_path / "page").read_text() for found in (tmp_path / "answer", compared()))
     assert without_pictures(stored) == without_pictures(held)
+
+
+def test_ranges_have_the_names_of_the_rest_of_the_page(yeoh: Shown) -> None:
+    """How far the runs were fitted that a comparison rests on; its own name where none of them is there."""
+    found = compared()
+    first = found["OP1"]
+    rested = replace(first, rows=tuple(replace(r, run=Path(yeoh.folder)) for r in first.rows))
+    names = [g.about.partition("hypotheses ")[2] for g in EvidenceSection().glances([{**found, "OP1": rested}, yeoh])]
+    assert names == [f"up to {yeoh.end}", *(f"on {n}" for n in list(found)[1:])]
+
+
+def test_specimens_of_one_material_are_told_apart(yeoh: Shown) -> None:
+    other = replace(yeoh, data_hash="another", film=replace(yeoh.film, name="strip 2"))
+    both = [yeoh, other]
+    assert [reach(s, both) for s in both] == [f"{yeoh.end} ({s.film.name})" for s in both]
+    assert [c.name for c in cases(both)] == [f"{s.name} on {s.film.name}" for s in both]
+    assert [c.name for c in cases([yeoh])] == [yeoh.name]

@@ -82,17 +82,18 @@ def compiled(material: type[Material]) -> Any:
 def path(start: Array, d: Array, stride: float) -> tuple[Array, NDArray[np.bool_]]:
     """From scaled deflections ``start`` (B,) through ascending d (B, N) in steps of ``stride`` in asinh(d) at most.
 
-    Returns deflections (M, B), of which the first is the start, and a mask (M,) of those that were asked for.
+    Returns deflections (M, B), of which the first is the start, and a mask (M,) of those that were asked for. Each film
+    takes steps of its own, whoever is beside it, and where others take more waits at the end of them.
     """
     x = np.arcsinh(np.concatenate([start[None], d.T]))
     gap = np.diff(x, axis=0)
-    steps = np.maximum(np.ceil(np.max(gap, axis=1) / stride), 1).astype(int)
-    home = np.repeat(np.arange(len(gap)), steps)
-    part = np.arange(home.size) - np.repeat(np.cumsum(steps) - steps, steps) + 1
-    keep = part == steps[home]
-    grid = d.T[home]
-    grid[~keep] = np.sinh(x[home] + gap[home] * (part / steps[home])[:, None])[~keep]
-    return np.concatenate([start[None], grid]), np.append(False, keep)
+    steps = np.maximum(np.ceil(gap / stride), 1).astype(int)
+    most = np.max(steps, axis=1)
+    home = np.repeat(np.arange(len(gap)), most)
+    part = np.arange(home.size) - np.repeat(np.cumsum(most) - most, most) + 1
+    done = np.minimum(part[:, None] / steps[home], 1.0)
+    grid = np.where(done < 1, np.sinh(x[home] + gap[home] * done), d.T[home])
+    return np.concatenate([start[None], grid]), np.append(False, part == most[home])
 
 
 def follow(request: Request, d: Array, level: int, sensitivities: bool = False) -> tuple[Array, Array]:
@@ -101,10 +102,9 @@ def follow(request: Request, d: Array, level: int, sensitivities: bool = False) 
     Returns what `run` returns.
     """
     start = np.minimum(FIRST, d[:, 0])
-    grid, keep = path(start, d, STRIDE / 2**level)
-    if np.all(start == d[:, 0]):
-        grid, keep = grid[1:], keep[1:]
-    return run(request, (grid, keep), Shapes.flat(request.ratio, len(d), level), level, sensitivities)
+    return run(
+        request, path(start, d, STRIDE / 2**level), Shapes.flat(request.ratio, len(d), level), level, sensitivities
+    )
 
 
 def run(

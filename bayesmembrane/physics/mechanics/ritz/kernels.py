@@ -40,7 +40,7 @@ FORCE, SLOPE, STORED, STATUS, COUNT, GAIN, VARIATION = range(7)
 STRETCH, ELLIPTIC, CONVEX, LEAST_P11, LEAST_P2, SLACK = range(7, 13)
 RESULTS = 13
 # What a lane does, and what it is about to do (see `decide`).
-ACCEPT, HALVE, RESTART, FINISH, ALPHA, BASE, FALL, MODE = range(8)
+ACCEPT, HALVE, RESTART, FINISH, ALPHA, BASE, FALL, MODE, MOVES = range(9)
 FRESH, RUNNING, DONE, LOST = 0.0, 1.0, 2.0, 3.0
 # Codes of `solution.Status`.
 OK, NOT_ELLIPTIC, INDEFINITE, UNRESOLVED, ITERATION_LIMIT = 0.0, 2.0, 3.0, 4.0, 5.0
@@ -369,7 +369,8 @@ def force_sensitivity(x, p, dq, span, value, rate, half, growth, weight, out):
 def decide(first, last_chance, tolerance, d, lane, sums, dots, pivot, out):
     """Per lane: accept the trial state, halve the step, restart or finish. Scalar code, a few operations per lane.
 
-    lane (8, LANES), kept between iterations: accept, halve, restart, finish (masks), alpha, base energy, fall, mode.
+    lane (9, LANES), kept between iterations: accept, halve, restart, finish (masks), alpha, base energy, fall, mode;
+    and whether it moves at all, see `begin`.
     first : True for the first trial state at this deflection; it may be restarted unless it is the ``last_chance``.
     tolerance : Newton decrement, over d I_d, at which a state has converged
     Returns the number of lanes that are done or lost.
@@ -478,13 +479,16 @@ def follow_block(p_rows, gd, l0, grid, q, ends, tables, limits, keep, wanted, re
     band, y, z = np.zeros((m * width, LANES)), np.empty((m, LANES)), np.empty((m, LANES))
     grad, mixed, trial, base = np.empty((m, LANES)), np.empty((m, LANES)), q.copy(), q.copy()
     step, old, dq, dold = np.zeros((m, LANES)), q.copy(), np.zeros((m, LANES)), np.zeros((m, LANES))
-    lane, sums, dots = np.zeros((8, LANES)), np.empty((4, LANES)), np.empty((3, LANES))
+    lane, sums, dots = np.zeros((9, LANES)), np.empty((4, LANES)), np.empty((3, LANES))
+    behind = np.empty((1, LANES))
+    store(behind, 0, load(grid, 0))
     pivot, out, gains = np.empty((1, LANES)), np.empty((RESULTS + len(FIELDS), LANES)), np.empty((elements, LANES))
     for j in range(grid.shape[0]):
         d, before = load(grid, j), load(grid, max(j - 1, 0))
         if j > 0:
-            predict(q, dq, old, dold, d, before, load(grid, max(j - 2, 0)), trial)
-        count, awake = 0, begin(q, dq, old, dold, lane, out)
+            predict(q, dq, old, dold, d, before, load(behind, 0), trial)
+        alive, awake = begin(grid, j, q, dq, old, dold, behind, lane, out)
+        count = 0
         while awake > 0 and count < most:
             states(trial, d, l0, p, inner, span, value, rate, half, growth, x)
             assemble(x, c, row, sums, span, value, rate, half, growth, weight, width, grad, mixed, band)
@@ -496,7 +500,7 @@ def follow_block(p_rows, gd, l0, grid, q, ends, tables, limits, keep, wanted, re
             if over == LANES:
                 break
         end(lane)
-        if keep[j] and awake == 0:
+        if keep[j] and alive == 0:
             # Nobody is on the way any more: there is nothing to look at.
             spread(out, result, 0, kept)
             kept += 1
@@ -514,18 +518,31 @@ def follow_block(p_rows, gd, l0, grid, q, ends, tables, limits, keep, wanted, re
             kept += 1
 
 
-def begin(q, dq, old, dold, lane, out):
-    """Make the last state the one before, and wake the lanes that are not lost; returns how many these are."""
-    for i in range(q.shape[0]):
-        store(old, i, load(q, i))
-        store(dold, i, load(dq, i))
-    awake = 0
+def begin(grid, j, q, dq, old, dold, behind, lane, out):
+    """Wake the lanes that go on to deflection j of ``grid`` (M, LANES): their last state becomes the one before.
+
+    behind (1, LANES) : where the states before the last ones, ``old`` and ``dold``, are
+    A lane that has arrived sleeps: its deflection is repeated because others of the batch take more steps to theirs.
+    Returns how many lanes are not lost, and how many of these are awake.
+    """
+    alive, awake = 0, 0
     for k in range(LANES):
-        if lane[MODE, k] != LOST:
-            lane[MODE, k] = FRESH
-            awake += 1
-        out[STATUS, k] = ITERATION_LIMIT
-    return awake
+        moves = j == 0 or grid[j, k] != grid[j - 1, k]
+        lane[MOVES, k] = 1.0 if moves else 0.0
+        lost = lane[MODE, k] == LOST
+        if moves or lost:
+            out[STATUS, k] = ITERATION_LIMIT
+        if not lost:
+            alive += 1
+            if moves:
+                lane[MODE, k] = FRESH
+                awake += 1
+    moved = load(lane, MOVES)
+    for i in range(q.shape[0]):
+        store(old, i, where(moved, load(q, i), load(old, i)))
+        store(dold, i, where(moved, load(dq, i), load(dold, i)))
+    store(behind, 0, where(moved, load(grid, max(j - 1, 0)), load(behind, 0)))
+    return alive, awake
 
 
 def end(lane):
@@ -539,7 +556,8 @@ def follow(p, gd, l0, grid, start, ends, tables, limits, keep, wanted, result, t
     """Continue B blocks of `LANES` films each through ascending scaled deflections.
 
     p (B, n_fields, LANES), gd, l0 (B, 1, LANES) : parameters, G d, pre-stretch
-    grid (B, M, LANES) : scaled deflections, of which those with keep (M,) are examined, N of them
+    grid (B, M, LANES) : scaled deflections, of which those with keep (M,) are examined, N of them; a film stays as it
+    is where its own is repeated
     start (B, 2n, LANES) : unknowns from which the first deflection is tried (zeros: the flat film)
     ends (B, E+1, LANES) : where in t the elements of each film end, from 0 to T
     tables : see `elements.basis`

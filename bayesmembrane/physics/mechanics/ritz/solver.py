@@ -123,6 +123,8 @@ class _Search:
         lost = (self.status == Status.ITERATION_LIMIT) & self.wanted
         if np.any(lost):
             self._walk(level, lost)
+        else:
+            self.walks.rest()
         return bool(self.film.size or np.any((self.status == Status.ITERATION_LIMIT) & self.wanted))
 
     def _refine(self, level: int) -> None:

@@ -108,6 +108,10 @@ class Walks:
         film, column, found = (np.concatenate([getattr(p, n) for p in parts]) for n in ("film", "column", "found"))
         return Met(film, column, found, Shapes.joined([p.shapes for p in parts]))
 
+    def rest(self) -> None:
+        """Nobody walks with the elements of this level: as for a film that does not in a batch that does."""
+        self.before, self.now = self.now, Stand.new(np.empty(0, np.intp), np.empty(0), self.now.shapes.of([]))
+
     def reasons(self, level: int) -> tuple[Rows, NDArray[np.int8]]:
         """Films whose path ended in the last walk, as far as that can be believed, and why (`Status`)."""
         now, some = self.now, films(self.request, self.now.rows)

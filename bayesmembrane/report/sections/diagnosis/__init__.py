@@ -99,7 +99,10 @@ def place_of(d: Diagnosis, sd: Array | None = None) -> Place:
     """Where the points lie, which were set aside, and their noise."""
     m = d.measurement
     mask = held_out(m) if d.validation is not None else np.zeros(len(m), dtype=bool)
-    return Place(m.deflection, m.time, m.leg, m.cycle, mask, d.noise.each if sd is None else sd, seen(m))
+    leg, cycle = m.leg, m.cycle
+    if not m.rig.has_path:  # states have no legs and no cycles
+        leg, cycle = np.ones_like(leg), np.ones_like(cycle)
+    return Place(m.deflection, m.time, leg, cycle, mask, d.noise.each if sd is None else sd, seen(m), m.rig.has_path)
 
 
 def _residuals(d: Diagnosis) -> Figure:
@@ -126,8 +129,9 @@ def residuals_figure(place: Place, rows: Sequence[Residual]) -> Figure:
         hollow = " All points were fitted here; the hollow ones are those held out for the errors of the table."
     lines = ""
     if place.leg.size >= PARTS:
-        lines = " The lines are means of neighbours: where they leave the middle of the band, or loading and unloading "
-        lines += "part, something is missing."
+        parted = ", or loading and unloading part" if np.any(place.leg < 0) else ""
+        lines = f" The lines are means of neighbours: where they leave the middle of the band{parted}, something is "
+        lines += "missing."
     caption = (
         f"{how.origin.capitalize()} less fitted {how.load} ({how.small[1]}) against {listed(against)}{order}. Grey: "
         f"what noise does.{lines}{hollow}"

@@ -44,6 +44,7 @@ class Place:
     held_out : (N,) True where a point was set aside
     sd : (N,) N, the measurement's own noise
     how : in which quantities and units people read it
+    path : False where each point is a state by itself: there are no legs and no cycles
     """
 
     deflection: Array
@@ -53,6 +54,7 @@ class Place:
     held_out: NDArray[np.bool_]
     sd: Array
     how: Seen
+    path: bool = True
 
     @property
     def along(self) -> tuple[Array, str]:
@@ -227,7 +229,8 @@ def _handles(place: Place) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = []
     for sign, name, colour, symbol in LEGS:
         if np.any(place.leg == sign):
-            handles.append(Line2D([], [], color=colour, marker=symbol, linewidth=0, markersize=5, label=name))
+            label = name if place.path else place.how.origin
+            handles.append(Line2D([], [], color=colour, marker=symbol, linewidth=0, markersize=5, label=label))
     if np.any(place.held_out):
         hollow = Line2D([], [], color=MUTED, marker="o", linewidth=0, markersize=6, markerfacecolor="white")
         hollow.set_label("held out")

@@ -26,10 +26,10 @@ def error_columns(how: Seen) -> tuple[Column, ...]:
         Column("model", "model"),
         Column(f"rmse_{unit}", f"root mean square ({unit})", PLAIN),
         Column(f"max_{unit}", f"largest ({unit})", PLAIN),
-        Column("reduced_chi2", "reduced chi-square", ".3f"),
+        Column("reduced_chi2", "reduced chi-square", ".3g"),
         Column(f"heldout_rmse_{unit}", f"held out: root mean square ({unit})", PLAIN),
         Column(f"heldout_max_{unit}", f"held out: largest ({unit})", PLAIN),
-        Column("heldout_reduced_chi2", "held out: reduced chi-square", ".3f"),
+        Column("heldout_reduced_chi2", "held out: reduced chi-square", ".3g"),
         Column("heldout_coverage_90", "held out: inside the 90 % band", "%"),
     )
 
@@ -104,7 +104,8 @@ def ranking_table(d: Diagnosis, name: str) -> Table:
             )
         )
     caption = (
-        f"What could explain the residual of {spoken(d.null.hypothesis)}: every hypothesis was fitted as a whole. "
+        f"What could explain the residual of {spoken(d.null.hypothesis)}: every hypothesis was fitted as a whole, and "
+        "its sizes are those of that fit; of what was then sampled the posterior tells the size. "
         "Probability: among all of them, nothing foreign beside it. ln Bayes factor: against the model as it was, "
         "noise and form error integrated out. Unexplained: part of the squares beyond noise that is left, form error "
         "aside; above 100 % it is more than the model as it was leaves. Error of its law: what the trace of its "

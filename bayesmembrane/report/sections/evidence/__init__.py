@@ -10,6 +10,7 @@ from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.published import PublishedTable
 from bayesmembrane.ground.stored import read
 from bayesmembrane.report.blocks import Block, Figure, Points
+from bayesmembrane.report.runs import Shown
 from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
 from bayesmembrane.report.sections.evidence.figures import comparison_picture
 from bayesmembrane.report.sections.evidence.tables import (
@@ -42,7 +43,7 @@ class EvidenceSection(Section):
         return read(folder, "published") if found is None else found
 
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
-        found, paper = by_range(results), _paper(results)
+        found, paper = _called(results)
         if not found:
             return ()
         figure = Figure(
@@ -62,16 +63,16 @@ class EvidenceSection(Section):
         return [Points(tuple(sentences(found, paper))), figure, *(t for t in tables if t is not None)]
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
-        return sentences(by_range(results), {})
+        return sentences(_called(results)[0], {})
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
         return [
             Glance(
                 "comparison",
-                f"{len(c.rows)} hypotheses on {name}",
+                f"{len(c.rows)} hypotheses {name if name.startswith('up to') else f'on {name}'}",
                 f"{called(c.ranking[0])} first" if c.ranking else "no ranking",
             )
-            for name, c in by_range(results).items()
+            for name, c in _called(results)[0].items()
         ]
 
     def subject(self, results: Sequence[Any]) -> Subject | None:
@@ -89,6 +90,21 @@ def by_range(results: Sequence[Any]) -> dict[str, Comparison]:
         elif isinstance(result, Mapping):
             found |= {name: c for name, c in result.items() if isinstance(c, Comparison)}
     return found
+
+
+def _called(results: Sequence[Any]) -> tuple[dict[str, Comparison], PaperLosses]:
+    """The comparisons, and the paper's losses, by the names that ranges have on the rest of the page: how far the runs
+    were fitted that they rest on.
+    """
+    found, paper = by_range(results), _paper(results)
+    ends = {Path(s.folder).name: s.end for s in of_kind(results, Shown)}
+    names = {}
+    for name, c in found.items():
+        reached = {ends.get(r.run.name) for r in c.rows if r.run is not None} - {None}
+        names[name] = f"up to {reached.pop()}" if len(reached) == 1 else name
+    if len(set(names.values())) < len(names):
+        return found, paper
+    return {names[n]: c for n, c in found.items()}, {names.get(n, n): losses for n, losses in paper.items()}
 
 
 def sentences(found: Mapping[str, Comparison], paper: PaperLosses) -> list[str]:

@@ -14,6 +14,7 @@ from bayesmembrane.report.blocks import Column, Table, Value
 from bayesmembrane.words.beside_paper import PaperLosses
 from bayesmembrane.words.comparison import called, remark
 from bayesmembrane.words.hypothesis import material_title, spoken
+from bayesmembrane.words.language import spoken_parameter
 
 _EVIDENCE = (
     Column("range", "range"),
@@ -140,7 +141,7 @@ def widths_table(found: Mapping[str, Comparison]) -> Table:
             for parameter in dict.fromkeys(w.parameter for w in r.widths):
                 half, twice = by.get((parameter, 0.5)), by.get((parameter, 2.0))
                 cells = [v for w in (half, twice) for v in ((w.change, w.sd) if w else (None, None))]
-                rows.append((name, called(r), parameter, *cells))
+                rows.append((name, called(r), spoken_parameter(parameter), *cells))
     caption = (
         "Change of ln Z when the prior of one coordinate is half or twice as wide, by reweighting the draws; a dash "
         "where the draws cannot tell."

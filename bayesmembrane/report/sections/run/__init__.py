@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -109,7 +110,13 @@ def _blocks(s: Shown, compared: Compared | None) -> list[Block]:
 
 def _sentences(s: Shown) -> list[str]:
     smooth = smooth_sentence(s.quality) if s.quality is not None else ""
-    told = [describes([s.case]), smooth, unknown([s.case]), extrapolation([s.case]), convergence([s.case])]
+    told = [
+        describes([replace(s.case, points=0)]),
+        smooth,
+        unknown([s.case]),
+        extrapolation([s.case]),
+        convergence([s.case]),
+    ]
     return [t for t in told if t]
 
 
