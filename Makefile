@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-sequential study-fuzz study-import study-scale study-kill study-overnight study-damage study-seeds study-sbc study-modes clean
+.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-sequential study-fuzz study-import study-scale study-kill study-overnight study-damage study-foretold study-seeds study-sbc study-modes clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -27,6 +27,7 @@ help:
 	@echo "make study-kill  runs killed at random moments and while they write, and a campaign of 60 runs, some minutes; KILL='--kills 20' asks for less"
 	@echo "make study-overnight  what checkpoints cost, the memory of ten million draws, how late a deadline is, some minutes"
 	@echo "make study-damage  every stored file damaged 500 times, an hour or less; DAMAGE='--times 50' asks for less"
+	@echo "make study-foretold  what dry runs foretell beside what three campaigns take, some minutes"
 	@echo "make study-import 10 000 damaged exports, what becomes of them, some minutes; IMPORT='--count 1000' asks for less"
 	@echo "make study-seeds 50 seeds for the statistical tests, lanes on and off, hours; goes on where it was; SEEDS='--group quick' asks for less"
 	@echo "make study-sbc  simulation-based calibration of every material, hours; goes on where it was; SBC='--only gent --limit 20' asks for less"
@@ -98,6 +99,9 @@ study-overnight: $(STAMP)
 
 study-damage: $(STAMP)
 	$(PY) -m tests.studies.damage --table docs/studies/damage.md $(DAMAGE)
+
+study-foretold: $(STAMP)
+	$(PY) -m tests.studies.foretold --table docs/studies/foretold.md
 
 study-import: $(STAMP)
 	$(PY) -m tests.studies.imports --table docs/studies/import.md $(IMPORT)

@@ -2,13 +2,15 @@
 
 A run of each material with each set of effects is rehearsed in a folder that is thrown away, with all that belongs to
 it: starts, walk, predictions, page. It walks `STEPS` steps at most; what it says itself to lack is added. What is not
-rehearsed within `PATIENCE` is taken for as long as the mean of what is. The other analyses solve the same forward model
+rehearsed within `PATIENCE` is taken for as long as the mean of what is. Each worker starts, and loads compiled code at
+its first run. The other analyses solve the same forward model
 more often: so many runs as `SHARES` says.
 """
 
 from __future__ import annotations
 
 import heapq
+import resource
 import subprocess
 import sys
 import tempfile
@@ -62,6 +64,7 @@ class Estimate:
 
     tasks : how many of each analysis are left to do
     work : s of one core that they take
+    starting : s of one core in which the workers start and load compiled code
     seconds : by the clock until the last one is done, on ``workers``
     done, refused : tasks that are done already, and why others cannot be
     rehearsed : s by the clock that a run of each kind takes, as measured
@@ -69,6 +72,7 @@ class Estimate:
 
     tasks: Mapping[str, int]
     work: Mapping[str, float]
+    starting: float
     seconds: float
     workers: int
     done: int
@@ -80,6 +84,7 @@ class Estimate:
         return {
             "tasks": dict(self.tasks),
             "core_seconds": dict(self.work),
+            "starting_core_seconds": self.starting,
             "seconds": self.seconds,
             "workers": self.workers,
             "done": self.done,
@@ -95,13 +100,15 @@ def estimated(campaign: Path, made: Plan, workers: int, tell: Callable[[str], No
     ended = {key for key, record in read_records(campaign).items() if record.state in ENDED}
     able = [task for task in made.tasks if not task.fault]
     left = [task for task in able if task.key not in ended]
-    paces, start = _rehearsed(left, tell), _start()
+    paces, loading = _rehearsed(left, tell)
+    start = total([_start(), loading]) if left else Pace(0.0, 0.0)
     times = [(task, _pace(task, paces)) for task in left]
     analyses = Counter(task.analysis for task in left)
     return Estimate(
         tasks=analyses,
         work={a: sum(pace.processor for task, pace in times if task.analysis == a) for a in analyses},
-        seconds=_wall([(task, pace.clock) for task, pace in times], workers) + (start if left else 0.0),
+        starting=start.processor * min(workers, len(left)),
+        seconds=_wall([(task, pace.clock) for task, pace in times], workers) + start.clock,
         workers=workers,
         done=len(able) - len(left),
         refused=tuple(task.fault for task in made.tasks if task.fault),
@@ -113,13 +120,14 @@ def _kind(claim: Mapping[str, Any]) -> Kind:
     return (claim["material"], *claim["effects"])
 
 
-def _rehearsed(left: Sequence[Task], tell: Callable[[str], None]) -> dict[Kind, Pace]:
-    """What a run of each kind takes; empty if none can be made."""
+def _rehearsed(left: Sequence[Task], tell: Callable[[str], None]) -> tuple[dict[Kind, Pace], Pace]:
+    """What a run of each kind takes, empty if none can be made; and what the first run of a process takes longer."""
     first: dict[Kind, Task] = {}
     for task in left:
         for claim in task.claims:
             first.setdefault(_kind(claim), replace(task, claims=(claim,)))
     found: dict[Kind, Pace] = {}
+    cold = warm = Pace(0.0, 0.0)
     began = time.process_time()
     for kind, task in first.items():
         if found and time.process_time() - began > PATIENCE:
@@ -127,11 +135,13 @@ def _rehearsed(left: Sequence[Task], tell: Callable[[str], None]) -> dict[Kind, 
         tell(f"Timing {'+'.join(kind)}")
         try:
             if not found:
-                _rehearse(task)  # loads what all of them need, which is no part of their time
-            found[kind] = _rehearse(task)
+                cold = _rehearse(task)  # loads what all of them need, once in each worker
+                found[kind] = warm = _rehearse(task)
+            else:
+                found[kind] = _rehearse(task)
         except BayesmembraneError:
             continue  # the campaign will refuse it, and say why
-    return found
+    return found, Pace(max(0.0, cold.clock - warm.clock), max(0.0, cold.processor - warm.processor))
 
 
 def _rehearse(task: Task) -> Pace:
@@ -149,11 +159,13 @@ def _rehearse(task: Task) -> Pace:
     return made.times(1.0 + lacking / made.clock) if lacking > 0 else made
 
 
-def _start() -> float:
-    """s in which a worker starts."""
-    began = time.perf_counter()
+def _start() -> Pace:
+    """What the start of a worker takes."""
+    began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([sys.executable, "-c", "import bayesmembrane.app.tasks"], check=True)
-    return time.perf_counter() - began
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return Pace(time.perf_counter() - began, processor)
 
 
 def _pace(task: Task, paces: Mapping[Kind, Pace]) -> Pace:
@@ -178,6 +190,7 @@ def _wall(times: Sequence[tuple[Task, float]], workers: int) -> float:
 def show_estimate(found: Estimate) -> None:
     """The estimate on the terminal."""
     rows = [[a, str(n), duration(found.work[a])] for a, n in found.tasks.items()]
+    rows.append(["start of the workers", "", duration(found.starting)])
     table("What would run", ["analysis", "tasks", "time of one core"], rows)
     for fault in found.refused:
         say(f"Cannot be done: {fault}")

@@ -17,7 +17,7 @@ from queue import Empty, SimpleQueue
 from types import FrameType
 from typing import Any
 
-from bayesmembrane.campaign.index import OWNER, Index, opened, rebuild
+from bayesmembrane.campaign.index import OWNER, Index, opened, rebuild, seal
 from bayesmembrane.campaign.plan import Plan
 from bayesmembrane.campaign.pool import Executor
 from bayesmembrane.campaign.record import ENDED, FAILED, PREEMPTED, Record, read_now, remove_now, write_record
@@ -75,6 +75,7 @@ def drive(campaign: Path, plan: Plan, begin: Callable[[], Executor], session: Se
         with _signals() as asked, _begun(begin) as executor, opened(campaign) as index:
             how = _Driver(plan, executor, session, order, index, asked).run()
             states = Counter(index.states().values())
+        seal(campaign)
     return Ended(how, states, time.monotonic() - began)
 
 

@@ -6,6 +6,7 @@ syncing, and a damaged one is replaced.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import sqlite3
@@ -19,10 +20,12 @@ from bayesmembrane.campaign.plan import Plan, read_plan
 from bayesmembrane.campaign.record import RECORDS, REFUSED, WAITING, Record, read_records
 from bayesmembrane.campaign.task import Task
 from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.files import write_text
 from bayesmembrane.ground.locks import is_held
 from bayesmembrane.ground.plain import json_text
 
 INDEX, OWNER = "index.sqlite", "owner.lock"
+SEAL = "index.sha256"
 VERSION = 1
 
 _COLUMNS = {
@@ -156,7 +159,7 @@ def opened(campaign: Path) -> Iterator[Index]:
     """
     path = campaign / INDEX
     connection = _connected(path)
-    if connection is None or (not is_held(campaign / OWNER) and _behind(campaign, path)):
+    if connection is None or (not is_held(campaign / OWNER) and _old(campaign, path)):
         if connection is not None:
             connection.close()
         rebuild(campaign, read_plan(campaign))
@@ -166,7 +169,7 @@ def opened(campaign: Path) -> Iterator[Index]:
     with closing(connection):
         try:
             yield Index(connection)
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             raise StorageError(f"the index of the campaign cannot be used ({error})", str(path), "remove it") from None
 
 
@@ -191,6 +194,7 @@ def rebuild(campaign: Path, plan: Plan) -> Path:
         if changed:  # what is written from here on makes the index old again
             os.utime(part, ns=(changed, changed))
         part.replace(path)
+        seal(campaign)
     except (sqlite3.Error, OSError) as error:
         raise StorageError(
             f"the index of the campaign cannot be written ({error})", str(path), "free some space, or make it writable"
@@ -207,13 +211,34 @@ def _connected(path: Path) -> sqlite3.Connection | None:
         connection.execute("PRAGMA synchronous = OFF")
         (version,) = connection.execute("PRAGMA user_version").fetchone()
         connection.execute("SELECT count(*) FROM tasks, about").fetchone()
-    except sqlite3.DatabaseError:
+    except (sqlite3.DatabaseError, UnicodeDecodeError):  # what SQLite says of it may be no text either
         connection.close()
         return None
     if version != VERSION:
         connection.close()
         return None
     return connection
+
+
+def seal(campaign: Path) -> None:
+    """Note the checksum of an index that nobody changes any more; raises `StorageError` if that cannot be."""
+    write_text(campaign / SEAL, _checksum(campaign / INDEX), "the checksum of the index")
+
+
+def _checksum(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _old(campaign: Path, path: Path) -> bool:
+    """Whether an index that nobody works with is to be made again: it is behind, or not what was written."""
+    if _behind(campaign, path):
+        return True
+    try:
+        whole = (campaign / SEAL).read_bytes() == _checksum(path).encode()
+    except FileNotFoundError:
+        return False  # of an earlier version
+    return not whole and not is_held(campaign / OWNER)  # a client may just have begun
 
 
 def _behind(campaign: Path, path: Path) -> bool:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 from bayesmembrane.campaign.task import Task
 from bayesmembrane.ground.errors import StorageError
-from bayesmembrane.ground.files import write_text
-from bayesmembrane.ground.plain import json_text
+from bayesmembrane.ground.sealed import damaged, read_json, write_json
 
 PLAN, FORMAT = "plan.json", 1
+_WHAT = "the plan of the campaign"
+_AGAIN = "give campaign run the campaign file again: what is done stays done"
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def write_plan(folder: Path, made: Plan) -> Path:
         raise StorageError("the folder holds files that are no campaign", str(folder), "choose another with --out")
     head = {"program": "bayesmembrane", "format": FORMAT, "name": made.name, "source": made.source}
     body = {"deadline": made.deadline, "tasks": [task.plain() for task in made.tasks]}
-    return write_text(folder / PLAN, json_text({**head, **body}), "the plan of the campaign")
+    return write_json(folder / PLAN, {**head, **body}, _WHAT, indent=None)
 
 
 def read_plan(folder: Path) -> Plan:
@@ -47,15 +47,11 @@ def read_plan(folder: Path) -> Plan:
     path = folder / PLAN
     if not path.is_file():
         raise StorageError("there is no campaign in this folder", str(folder), "name the folder that campaign run made")
+    held = read_json(path, _WHAT, _AGAIN)
     try:
-        held = json.loads(path.read_text(encoding="utf-8"))
         tasks = tuple(Task.from_plain(values) for values in held["tasks"])
         if held["format"] != FORMAT:
             raise ValueError(f"it has the format {held['format']}, and this version reads {FORMAT}")
         return Plan(str(held["name"]), str(held["source"]), tasks, held["deadline"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise StorageError(
-            f"the plan of the campaign is damaged ({type(error).__name__}: {error})",
-            str(path),
-            "give campaign run the campaign file again: what is done stays done",
-        ) from None
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise damaged(path, _WHAT, f"{type(error).__name__}: {error}", _AGAIN) from None

@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from bayesmembrane.ground.errors import StorageError
-from bayesmembrane.ground.files import write_text
-from bayesmembrane.ground.plain import json_text, plain
+from bayesmembrane.ground.plain import plain
+from bayesmembrane.ground.sealed import read_json, write_json
 
 RECORDS, NOW = "records", "now"
+_WHAT = "the record of a task"
 
 WAITING, RUNNING, PREEMPTED = "waiting", "running", "preempted"
 FAILED, REFUSED, DONE = "failed", "refused", "done"
@@ -56,15 +57,14 @@ class Record:
 
 def write_record(campaign: Path, record: Record) -> Path:
     """Store a record; raises `StorageError` if that cannot be."""
-    return write_text(campaign / RECORDS / f"{record.key}.json", json_text(asdict(record)), "the record of a task")
+    return write_json(campaign / RECORDS / f"{record.key}.json", asdict(record), _WHAT, indent=None)
 
 
 def read_record(path: Path) -> Record | None:
     """The record in a file; None if there is none or it is damaged: its task is then done again, and quickly."""
     try:
-        held = json.loads(path.read_bytes())
-        record = Record(**held)
-    except (OSError, ValueError, TypeError):
+        record = Record(**read_json(path, _WHAT))
+    except (StorageError, TypeError):
         return None
     return record if record.state in STATES and record.key == path.stem else None
 
@@ -114,7 +114,7 @@ def read_now(campaign: Path) -> dict[str, dict[str, Any]]:
             values = json.loads(path.read_bytes())
             if _alive(values):
                 found[path.stem] = values
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, OverflowError):
             continue  # just removed, or cut by a power failure: nobody is known to work on it
     return found
 

@@ -113,7 +113,9 @@ def standing_of(campaign: Path, index: Index) -> Standing:
 
 
 def _numbers(note: Mapping[str, Any]) -> dict[str, float | None]:
-    return {n: note.get(n) for n in ("ess", "wanted", "tau", "r_hat", "acceptance", "seconds_left")}
+    """What a note tells in numbers; the note of a dead worker may hold anything."""
+    told = {n: note.get(n) for n in ("ess", "wanted", "tau", "r_hat", "acceptance", "seconds_left")}
+    return {n: value if isinstance(value, int | float) else None for n, value in told.items()}
 
 
 def _left(

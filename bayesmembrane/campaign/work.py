@@ -177,7 +177,7 @@ def stopped(order: Order) -> bool:
     try:
         held = json.loads((order.campaign / SESSION).read_bytes())
         return bool(held["session"] != order.session or held["stop"])
-    except (OSError, ValueError, KeyError):
+    except (OSError, ValueError, KeyError, TypeError):
         return False  # not to be read just now: the next look will tell
 
 

@@ -44,23 +44,23 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         raise damaged(path, what, "it is no whole TOML document") from None
 
 
-def write_json(path: Path, values: Mapping[str, Any], what: str) -> None:
-    """Write ``values`` as `plain` ones, sealed; raises `StorageError` if that cannot be."""
+def write_json(path: Path, values: Mapping[str, Any], what: str, indent: int | None = 1) -> Path:
+    """Write ``values`` as `plain` ones, sealed, and return ``path``; raises `StorageError` if that cannot be."""
     body = plain(values)
-    write_text(path, json_text({KEY: _sha(_canonical(body)), **body}, indent=1), what)
+    return write_text(path, json_text({KEY: _sha(_canonical(body)), **body}, indent=indent), what)
 
 
-def read_json(path: Path, what: str) -> dict[str, Any]:
+def read_json(path: Path, what: str, remedy: str = AGAIN) -> dict[str, Any]:
     """What `write_json` wrote; raises `StorageError` if it cannot be read, or is not what was written."""
     try:
-        content = json.loads(_text(path, what))
+        content = json.loads(_text(path, what, remedy))
         if not isinstance(content, dict):
             raise ValueError
         found = content.pop(KEY, None)
         if found is not None and found != _sha(_canonical(content)):
-            raise damaged(path, what, "its content is not what was written")
+            raise damaged(path, what, "its content is not what was written", remedy)
     except (ValueError, RecursionError):
-        raise damaged(path, what, "it is no whole JSON document") from None
+        raise damaged(path, what, "it is no whole JSON document", remedy) from None
     return content
 
 
@@ -111,13 +111,13 @@ def damaged(path: Path, what: str, reason: str, remedy: str = AGAIN) -> StorageE
     return StorageError(f"{what} is damaged ({reason})", str(path), remedy)
 
 
-def _text(path: Path, what: str) -> str:
+def _text(path: Path, what: str, remedy: str = AGAIN) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
-        raise damaged(path, what, error.strerror or str(error)) from None
+        raise damaged(path, what, error.strerror or str(error), remedy) from None
     except UnicodeDecodeError:
-        raise damaged(path, what, "it is no text in UTF-8") from None
+        raise damaged(path, what, "it is no text in UTF-8", remedy) from None
 
 
 def _canonical(values: Any) -> bytes:

@@ -55,7 +55,9 @@ def test_a_removed_or_damaged_index_is_made_again_the_same(night: tuple[Path, Pl
     campaign, _ = night
     before = rows_of(campaign)
     whole = (campaign / INDEX).read_bytes()
-    for damage in (b"", b"SQLite format 3\0 and nothing", whole[: len(whole) // 2], whole[:100] + b"\0" * 400):
+    odd = whole.replace(b"CREATE TABLE tasks", b"CR\xbbATE TABLE tasks")
+    assert odd != whole
+    for damage in (b"", b"SQLite format 3\0 and nothing", whole[: len(whole) // 2], whole[:100] + b"\0" * 400, odd):
         (campaign / INDEX).write_bytes(damage)
         assert rows_of(campaign) == before
     (campaign / INDEX).unlink()

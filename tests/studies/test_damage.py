@@ -4,8 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from bayesmembrane.ground.stored import read, store
+from tests.report.sections.test_evidence import compared
 from tests.short_walks import shorten
 from tests.studies import damage
+from tests.studies.damage_more import File, campaign
 
 
 def test_damage_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -15,3 +18,13 @@ def test_damage_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     for name, count in found.items():
         assert set(count) <= {"told", "as it was"}, (name, count)
     assert sum(count["told"] for count in found.values()) > 50
+
+
+def test_damage_of_a_campaign_and_of_answers_is_told(tmp_path: Path) -> None:
+    folder = store(tmp_path / "answer", "comparison", compared(), {})
+    answer = [File(end, folder / f"comparison.{end}", lambda: read(folder, "comparison")) for end in ("json", "npz")]
+    found = damage.damaged_more([*answer, *campaign(tmp_path / "night")], len(damage.DAMAGES), 3)
+    for name, count in found.items():
+        assert set(count) <= set(damage.GOOD), (name, count)
+    assert found["campaign: plan.json"]["told"] > 5
+    assert found["campaign: records/KEY.json"]["passed over"] > 5
