@@ -42,7 +42,7 @@ class Emulated(Given, Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class Allowed:
     """Where points were found possible and where not: a prior that is cut is not emulated, but looked up.
 
     x : (M, k) points; possible : (M,)
@@ -52,7 +52,7 @@ class Seen:
     possible: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, x: Array, possible: NDArray[np.bool_]) -> Seen | None:
+    def of(cls, x: Array, possible: NDArray[np.bool_]) -> Allowed | None:
         """What was seen; None if all of it is possible."""
         return None if np.all(possible) else cls(x, possible)
 
@@ -130,7 +130,7 @@ class Emulator:
         return x, start - now
 
 
-def emulate(posterior: Emulated, x: Array, rng: np.random.Generator, seen: Seen | None = None) -> Emulator | None:
+def emulate(posterior: Emulated, x: Array, rng: np.random.Generator, seen: Allowed | None = None) -> Emulator | None:
     """An emulator learned from draws x (M, k), of the polynomial degree that predicts held-out densities best.
 
     ``seen`` tells where the prior is cut; without it the cut is left to whoever judges. None where there are too few

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
-from bayesmembrane.calibration.sampling.proposals.emulator import Emulator, Seen, emulate
+from bayesmembrane.calibration.sampling.proposals.emulator import Emulator, Allowed, emulate
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture, widened
 from bayesmembrane.calibration.sampling.weights import Worth, worth
 from bayesmembrane.calibration.starts import Tried, tempered
@@ -87,7 +87,7 @@ def _learned(posterior: Posterior, tried: Tried, states: Array, rng: np.random.G
     draws = states
     with suppress(np.linalg.LinAlgError):
         near = _near(tried, rng)
-        emulator = emulate(posterior, near, rng, Seen.of(tried.x, tried.log_posterior > -np.inf))
+        emulator = emulate(posterior, near, rng, Allowed.of(tried.x, tried.log_posterior > -np.inf))
         if emulator is not None:
             draws = _walked(emulator, states, rng)
     return widened(fit_mixture(_parted(draws, rng), rng), draws)
