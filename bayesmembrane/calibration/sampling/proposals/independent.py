@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
-from bayesmembrane.calibration.sampling.proposals.emulator import Emulator, Allowed, emulate
+from bayesmembrane.calibration.sampling.proposals.emulator import Allowed, Emulator, emulate
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture, widened
 from bayesmembrane.calibration.sampling.weights import Worth, worth
 from bayesmembrane.calibration.starts import Tried, tempered
