@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from bayesmembrane.calibration.fit import Fit
 
 MEASURED = "measured"
+FORCE = "force"
 BARE = "-"
 """The unit of a number without one."""
 _NOT_MEASURED = ("reconstructed", "synthetic", "simulated")
@@ -69,7 +70,7 @@ class Seen:
 
     def force(self, value: float) -> str:
         """A force in N in words, three digits: mN below 0.1 N; of a strip its stress."""
-        if not self.bare:
+        if self.load == FORCE:
             return newtons(value)
         return (
             f"{digits(self.load_scale[0] * value)} {self.load_scale[1]}" if math.isfinite(value) else f"no {self.load}"
@@ -119,7 +120,8 @@ def seen_on(rig: Fixture, thickness: float, origin: str = "") -> Seen:
     if rig.homogeneous:
         travel, rest, load = rig.axes
         return Seen(travel, (shown["m"][0], BARE), rest, load, shown["N"], shown["N"], made(origin))
-    return Seen("deflection", shown["m"], 0.0, "force", (1.0, "N"), shown["N"], made(origin))
+    travel, rest, load = rig.axes
+    return Seen(travel, shown["m"], rest, load, (1.0, "N") if load == FORCE else shown["N"], shown["N"], made(origin))
 
 
 def seen_by_fit(found: Fit) -> Seen:
