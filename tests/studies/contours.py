@@ -40,7 +40,7 @@ FILMS = {
 }
 """N/m; a silicone film of 50 um, as calibrated from the paper's curve."""
 FORCES, FORCE_SD = 15, 0.004  # readings up to the lift; N
-TRACED, HEIGHTS_MM = 40, (0.3, 0.1, 0.03)  # points of a contour; standard deviations of a height
+TRACED, HEIGHTS_MM = 40, (0.0, 0.3, 0.1, 0.03)  # points of a contour; standard deviations of a height, 0: none
 ESS = 400.0
 
 
@@ -140,17 +140,18 @@ def main() -> None:
     options = argparse.ArgumentParser()
     options.add_argument("--out", type=Path, default=HERE / "reports" / "study-contours")
     options.add_argument("--films", default=",".join(FILMS))
+    options.add_argument("--heights-mm", default=",".join(map(str, HEIGHTS_MM)), help="0: no contour")
     chosen = options.parse_args()
     chosen.out.mkdir(parents=True, exist_ok=True)
-    rows: list[Mapping[str, Any]] = []
     for name in chosen.films.split(","):
-        for sd in (None, *HEIGHTS_MM):
-            file = chosen.out / f"{name}_{sd}.json"
+        for sd in map(float, chosen.heights_mm.split(",")):
+            file = chosen.out / f"{name}_{sd:g}.json"
             if not file.exists():
-                file.write_text(json.dumps(row(name, sd, seed=1)), encoding="utf-8")
-            rows.append(json.loads(file.read_text(encoding="utf-8")))
+                file.write_text(json.dumps(row(name, sd or None, seed=1)), encoding="utf-8")
+            rows = [json.loads(f.read_text(encoding="utf-8")) for f in chosen.out.glob("*.json")]
+            rows.sort(key=lambda r: -(r["height_sd_mm"] or np.inf))
             TARGET.write_text(page(rows), encoding="utf-8")
-            print(name, sd, rows[-1]["seconds"], flush=True)
+            print(name, sd, flush=True)
 
 
 if __name__ == "__main__":
