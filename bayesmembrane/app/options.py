@@ -321,6 +321,13 @@ class RunOptions(SamplingOptions):
         Path | None,
         typer.Option("--fork", help="Begin a new run at the end of the one in this folder, whatever made that."),
     ] = None
+    sampler: Annotated[
+        str,
+        typer.Option(
+            "--sampler",
+            help="auto: propose from a learned mixture where it is good enough, else emcee's ensembles; or emcee.",
+        ),
+    ] = "auto"
 
 
 def spread(verb: Callable[..., None]) -> Callable[..., None]:

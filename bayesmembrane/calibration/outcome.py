@@ -12,8 +12,10 @@ from bayesmembrane.calibration.crosscheck import crosscheck
 from bayesmembrane.calibration.goodness import dominates, goodness
 from bayesmembrane.calibration.layout import inference_data
 from bayesmembrane.calibration.posterior import FAILURES, Posterior
+from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.quality import NOTEWORTHY
 from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.leaps import offers
 from bayesmembrane.calibration.sampling.walk import Sampled
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
@@ -60,6 +62,7 @@ def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) ->
     square = noise.stated(residual, theta)
     status = {
         **_answer(hypothesis, data, sampled, wanted),
+        "importance": _importance(sampled.chains, masses[hypothesis.convexity.name]),
         "prior_mass": {mode: {"value": m.value, "sd": m.sd} for mode, m in masses.items()},
         **_judgement(posterior, data, evaluation.force[best], None if square is None else float(square[best])),
         "checks": {
@@ -109,6 +112,7 @@ def walk_answer(sampled: Sampled, names: Sequence[str], wanted: float) -> dict[s
     c = sampled.convergence
     return {
         "status": sampled.status,
+        "sampler": "emcee" if sampled.chains.mixture is None else "mixture",
         "ess_bulk": float(np.min(c.ess)),
         "ess_wanted": wanted,
         "r_hat": float(np.max(c.r_hat)),
@@ -120,6 +124,19 @@ def walk_answer(sampled: Sampled, names: Sequence[str], wanted: float) -> dict[s
         "evaluations": sampled.chains.evaluations,
         "seconds": sampled.chains.seconds,
         "tally": dict(sampled.chains.counts),
+    }
+
+
+def _importance(chains: Chains, mass: Mass) -> dict[str, float] | None:
+    """What the weights of all proposals say where they came from one mixture: a third estimate of ln Z."""
+    if chains.mixture is None:
+        return None
+    found = offers(chains)
+    return {
+        "k_hat": found.k_hat,
+        "efficiency": found.efficiency,
+        "log_evidence": found.log_mean - float(np.log(mass.value)),
+        "log_evidence_sd": float(np.hypot(found.log_mean_sd, mass.sd / mass.value)),
     }
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from bayesmembrane.calibration.descent import descend
@@ -21,20 +23,51 @@ SPARE = 1.5  # effective number of candidates for each walker
 FINEST = 1e-11  # of the largest force: no noise that is inferred is below, as its bounds say
 
 
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """Points x (M, k) that were solved, and ``log_posterior`` there (M,), -inf where they are not possible."""
+
+    x: Array
+    log_posterior: Array
+
+    def joined(self, x: Array, log_posterior: Array) -> Tried:
+        """These and further ones."""
+        return Tried(np.concatenate([self.x, x]), np.concatenate([self.log_posterior, log_posterior]))
+
+    def starts(self, rng: np.random.Generator, ensembles: int, walkers: int) -> Array:
+        """Starting points (E, W, k), all possible and all different, drawn without replacement from p(x | y)^b.
+
+        b <= 1 is the largest power at which the points are worth more than the walkers, so that the starts are spread
+        at least as widely as the posterior.
+        """
+        found, wanted = self.possible, ensembles * walkers
+        chosen = tempered(found.log_posterior, SPARE * wanted, wanted, rng)
+        return np.asarray(found.x[rng.permutation(chosen)].reshape(ensembles, walkers, -1))
+
+    @property
+    def possible(self) -> Tried:
+        """Those that are possible."""
+        good = np.isfinite(self.log_posterior)
+        return Tried(self.x[good], self.log_posterior[good])
+
+
 def starting_points(
     posterior: Posterior, rng: np.random.Generator, ensembles: int, walkers: int, counts: Outcomes
 ) -> Array:
-    """Starting points (E, W, k), all possible and all different, drawn without replacement from p(x | y)^b.
+    """`Tried.starts` (E, W, k) of what was `tried`; raises `SettingsError` as that does."""
+    return tried(posterior, rng, ensembles * walkers, counts).starts(rng, ensembles, walkers)
 
-    Candidates are prior draws brought to their best modulus, draws around the valleys that a descent finds from them,
-    and what differential evolution makes of the better ones; b <= 1 is the largest power at which the candidates are
-    worth more than the walkers, so that the starts are spread at least as widely as the posterior.
+
+def tried(posterior: Posterior, rng: np.random.Generator, wanted: int, counts: Outcomes) -> Tried:
+    """Points around the valleys of the posterior, at least ``wanted`` of them possible.
+
+    They are prior draws brought to their best modulus, draws around the valleys that a descent finds from them, and
+    what differential evolution makes of the better ones.
 
     Raises `SettingsError` if next to no admissible parameters reach the data.
     """
     x = _candidates(posterior, rng)
     lp = _evaluate(posterior, x, counts)
-    wanted = ensembles * walkers
     for _ in range(ROUNDS):
         good = np.isfinite(lp)
         if np.count_nonzero(good) < 4:
@@ -43,9 +76,7 @@ def starting_points(
             parents = x[good][tempered(lp[good], EACH / 2, EACH, rng)]
             more = evolved(parents, rng)
         x, lp = np.concatenate([x, more]), np.concatenate([lp, _evaluate(posterior, more, counts)])
-    good = np.isfinite(lp)
-    x, lp = x[good], lp[good]
-    if len(x) < wanted:
+    if np.count_nonzero(np.isfinite(lp)) < wanted:
         mode = posterior.hypothesis.convexity
         limit = "" if not mode.restricts else f' that meet the convexity prior "{mode}"'
         raise SettingsError(
@@ -53,8 +84,7 @@ def starting_points(
             f"{1e3 * np.max(posterior.measurement.deflection):g} mm",
             remedy="use a shorter range, another material or another convexity prior",
         )
-    chosen = tempered(lp, SPARE * wanted, wanted, rng)
-    return np.asarray(x[rng.permutation(chosen)].reshape(ensembles, walkers, -1))
+    return Tried(x, lp)
 
 
 def _evaluate(posterior: Posterior, x: Array, counts: Outcomes) -> Array:

@@ -41,6 +41,8 @@ class HowSampled:
     tau : (k,) autocorrelation times of the coordinates, steps
     means : (E, T, k) means over the walkers of each ensemble at ``steps_at`` (T,), burn-in included
     draws : (E, D, k) some of the draws of each ensemble, in the order of the walk, at the steps ``draws_at`` (D,)
+    sampler : "emcee", or "mixture" where one proposed every step
+    k_hat : Pareto shape of the largest weights of what a mixture proposed; None without one
     """
 
     status: str
@@ -59,6 +61,8 @@ class HowSampled:
     steps_at: Array
     draws: Array
     draws_at: Array
+    sampler: str = "emcee"
+    k_hat: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,6 +341,8 @@ def _sampling(run: Run) -> HowSampled:
         steps_at=steps,
         draws=draws,
         draws_at=at,
+        sampler=status.get("sampler", "emcee"),
+        k_hat=(status.get("importance") or {}).get("k_hat"),
     )
 
 

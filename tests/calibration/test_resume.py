@@ -31,7 +31,7 @@ from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.words.sampling import sentences
 
 CLAIM = hypothesis("neo_hookean")
-FEW = Settings(ess=1e6, walkers=8, chunk=30, most_steps=70)  # over lessons at 22 and 44
+FEW = Settings(ess=1e6, walkers=8, chunk=30, most_steps=70, sampler="emcee")  # over lessons at 22 and 44
 
 
 def strip(shift: float = 0.0) -> Measurement:

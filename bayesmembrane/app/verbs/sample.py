@@ -34,6 +34,7 @@ def verb(
 ) -> None:
     """The posterior, stored as a run; the same command continues one that was stopped, or goes on to a higher --ess."""
     from bayesmembrane.app import analyses
+    from bayesmembrane.calibration.sampling.walk import Settings
 
     if curve.several:
         jointly(curve.listed(used), material, beside, sampling, output)
@@ -41,7 +42,8 @@ def verb(
     claim, whole = beside.with_material(material.material), curve.read()
     with resumable(output.folder), bars() as tell:
         tell(claim.label(), "finding starts")
-        work = analyses.Work(output.seed, output.folder, sampling.ess, tell, fork=sampling.fork)
+        walk = Settings(ess=sampling.ess, sampler=sampling.sampler)
+        work = analyses.Work(output.seed, output.folder, sampling.ess, tell, walk, sampling.fork)
         found = analyses.sample(used.of(whole), claim, work, whole=whole)
     if found.result.interrupted:
         note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")
@@ -62,6 +64,8 @@ def jointly(
 
     if sampling.fork is not None:
         raise SettingsError("a joint run begins on its own", "--fork", "leave it out")
+    if sampling.sampler != "auto":
+        raise SettingsError("emcee's ensembles walk over several tests anyway", "--sampler", "leave it out")
     claim = beside.joint(material.material, tests)
     with resumable(output.folder), bars() as tell:
         tell(claim.label(), "finding starts")
@@ -80,7 +84,9 @@ def show(run: dict[str, Any], title: str) -> None:
         for name, v in run["posterior"].items()
     ]
     table(title, ["parameter", "mean", "sd", "94 % interval"], rows)
-    say(f"ESS {run['ess_bulk']:.0f}, R-hat {run['r_hat']:.3f}, {run['evaluations']} curves, {run['seconds']:.0f} s.")
+    say(f"ESS {run['ess_bulk']:.0f}, R-hat {run['r_hat']:.3f}, {run['evaluations']} curves, {run['seconds']:.1f} s.")
+    if (found := run.get("importance")) is not None:
+        say(f"ln Z {found['log_evidence']:.2f} +- {found['log_evidence_sd']:.2f}, from the weights of all proposals.")
     for sentence in run["sentences"]:
         say(sentence)
     say(f"Stored in {run['stored']}; bayesmembrane report {run['stored']} shows it.")

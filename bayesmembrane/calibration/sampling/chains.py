@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.ground.parameters import Array
 
 
@@ -25,6 +26,8 @@ class Chains:
     seconds : time spent until then
     lessons : steps after which the proposal was learned
     look : steps at which it is to be judged next whether all is there; 0 if that was not said yet
+    mixture : from which every step is proposed, whatever was walked before; None if ensembles move by emcee's moves
+    offered : (E, steps, walkers) ln of p / mixture at what was proposed, nan where nothing was; None without a mixture
     """
 
     x: Array
@@ -34,6 +37,8 @@ class Chains:
     seconds: float
     lessons: tuple[int, ...] = ()
     look: int = 0
+    mixture: Mixture | None = None
+    offered: Array | None = None
 
     @property
     def steps(self) -> int:
@@ -46,8 +51,10 @@ class Chains:
 
 def joined(parts: Sequence[Chains]) -> Chains:
     """One walk made of its parts, in order."""
+    offered = [p.offered for p in parts if p.offered is not None]
     return replace(
         parts[-1],
         x=np.concatenate([p.x for p in parts], axis=1),
         log_posterior=np.concatenate([p.log_posterior for p in parts], axis=1),
+        offered=np.concatenate(offered, axis=1) if len(offered) == len(parts) else None,
     )

@@ -22,6 +22,7 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import Outcomes
 from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.files import remove_parts, write_whole
 from bayesmembrane.ground.parameters import Array
@@ -102,9 +103,12 @@ class Segments:
         for part in self:
             if not at:
                 x, lp = (np.empty((len(v), steps, *v.shape[2:])) for v in (part.x, part.log_posterior))
+                offered = np.empty_like(lp) if part.offered is not None else None
             x[:, at : at + part.steps], lp[:, at : at + part.steps] = part.x, part.log_posterior
+            if offered is not None and part.offered is not None:
+                offered[:, at : at + part.steps] = part.offered
             at += part.steps
-        return replace(part, x=x, log_posterior=lp)
+        return replace(part, x=x, log_posterior=lp, offered=None if part.offered is None else offered)
 
     def thinned(self, every: int, first: int = 0) -> Iterator[Array]:
         """(E, n, walkers, k) the steps ``first``, ``first`` + ``every``, ... of each segment that holds some; one
@@ -144,6 +148,10 @@ def _packed(part: Chains) -> bytes:
         "lessons": part.lessons,
         "look": part.look,
     }
+    if part.mixture is not None and part.offered is not None:
+        g = part.mixture
+        about["degrees"] = g.degrees
+        states |= {"offered": part.offered, "log_weights": g.log_weights, "means": g.means, "roots": g.roots}
     file = io.BytesIO()
     np.savez(file, x=part.x, log_posterior=part.log_posterior, about=np.array(json.dumps(about)), **states)
     return file.getvalue()
@@ -160,7 +168,11 @@ def _unpacked(payload: bytes) -> Chains:
         lessons = tuple(int(s) for s in about["lessons"])
         counts, seconds, look = Outcomes(about["counts"]), float(about["seconds"]), int(about["look"])
         counts.examples = {str(label): tuple(map(float, at)) for label, at in about["examples"].items()}
-        return Chains(x, f["log_posterior"], states, counts, seconds, lessons, look)
+        chains = Chains(x, f["log_posterior"], states, counts, seconds, lessons, look)
+        if "degrees" not in about:
+            return chains
+        mixture = Mixture(f["log_weights"], f["means"], f["roots"], float(about["degrees"]))
+        return replace(chains, mixture=mixture, offered=f["offered"])
 
 
 def _read(path: Path) -> tuple[Head, Chains]:

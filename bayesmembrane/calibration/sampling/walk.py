@@ -1,4 +1,8 @@
-"""Draws from a posterior by two or more independent ensembles of walkers: emcee's loop, and when it may stop."""
+"""Draws from a posterior by two or more independent ensembles of walkers, and when they are enough.
+
+Where a mixture is found that is close to the posterior, every step is proposed by it; else, and always if that is
+asked for, emcee's ensembles walk.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +17,21 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.sampling.chains import Chains, joined
-from bayesmembrane.calibration.sampling.convergence import LEAST_TAUS, Convergence, convergence
+from bayesmembrane.calibration.sampling.convergence import BURN_TAUS, LEAST_TAUS, Convergence, convergence
+from bayesmembrane.calibration.sampling.leaps import BLOCK, blocks, leap, offers
+from bayesmembrane.calibration.sampling.proposals.independent import Independent, independent
 from bayesmembrane.calibration.sampling.proposals.learned import learn, next_lesson
-from bayesmembrane.calibration.starts import starting_points
+from bayesmembrane.calibration.starts import tried
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.interrupts import Stop, StopAsked, deferred, never
 from bayesmembrane.ground.parameters import Array
 
 SAVE_AFTER = 10.0  # s: what a run that is killed loses at most, beside the step that it was at
+SAMPLERS = ("auto", "emcee")
+SURE = 0.02
+"""Standard error of ln Z up to which a mixture is drawn from, if `MOST_FOR_Z` draws do for that."""
+MOST_FOR_Z = 10_000
+DOUBTED = 5000  # draws of a mixture after which it is looked at for the first time
 GROWTH = 1.25  # a look costs little, but nothing is learned from looking at every step
 
 
@@ -32,6 +43,8 @@ class Settings:
     ensembles, walkers : independent ensembles, and walkers in each (None: four a coordinate, in sixteens)
     chunk : steps before the first look at tau
     most_steps : each ensemble stops there, and the run says so
+    sampler : "auto" proposes from a mixture where one is close enough, and has emcee's ensembles walk elsewhere;
+        "emcee" has them walk everywhere
     """
 
     ess: float = 1000.0
@@ -39,8 +52,11 @@ class Settings:
     walkers: int | None = None
     chunk: int = 300
     most_steps: int = 20000
+    sampler: str = "auto"
 
     def __post_init__(self) -> None:
+        if self.sampler not in SAMPLERS:
+            raise SettingsError(f'there is no sampler "{self.sampler}"', remedy=f"choose {' or '.join(SAMPLERS)}")
         if not 0 < self.ess < np.inf or self.ensembles < 2 or self.chunk < 10 or self.most_steps < self.chunk:
             raise SettingsError(
                 "sampling needs a positive, finite ESS, two ensembles, and a limit of at least one chunk of steps"
@@ -128,26 +144,37 @@ def run_ensembles(
             found = convergence(walk.chains)
             if progress is not None:
                 progress(_progress(walk.chains, found, settings))
-            if found.enough(settings.ess):
+            good = _good(walk.chains)
+            if good and found.enough(settings.ess):
                 status = "converged"
                 break
             if walk.chains.steps >= settings.most_steps:
                 status = "step limit"
                 break
-            if walk.chains.steps >= next_lesson(walk.chains):
+            if walk.chains.steps >= next_lesson(walk.chains) or not good:
                 walk.learn()
-            target = min(settings.most_steps, _next_look(walk.chains.steps, found, settings))
+            target = min(settings.most_steps, _next_look(walk.chains, found, settings))
         if asked.signalled:  # a signal that came at the very end still ends what follows
             status = "interrupted"
     walk.save()
     return Sampled(walk.chains, convergence(walk.chains), status)
 
 
-def _next_look(steps: int, found: Convergence, settings: Settings) -> int:
+def _good(chains: Chains) -> bool:
+    """Whether what was offered so far allows to go on as before."""
+    return chains.mixture is None or offers(chains).good
+
+
+def _next_look(chains: Chains, found: Convergence, settings: Settings) -> int:
     """The steps at which everything may be there, within GROWTH of what was walked."""
+    steps = chains.steps
     tau = float(np.max(found.tau))
     needed = max(LEAST_TAUS * tau, (steps - found.burn) * settings.ess / float(np.min(found.ess)))
     guess = int(np.ceil(needed * 1.02)) + found.burn
+    if chains.mixture is not None:
+        judged, count = offers(chains), chains.log_posterior[:, 0].size
+        needed = min(MOST_FOR_Z, (1 / judged.efficiency - 1) / SURE**2) / count
+        return blocks(min(max(guess, needed, steps + BLOCK), 2 * steps))
     return int(
         min(max(guess, steps + settings.chunk // 2, int(1.1 * steps)), max(int(GROWTH * steps), 2 * settings.chunk))
     )
@@ -169,11 +196,33 @@ def walkers_of(posterior: Posterior, settings: Settings) -> int:
 
 
 def _start(posterior: Posterior, settings: Settings, seed: int) -> Chains:
-    """Ensembles at different overdispersed starts."""
+    """Ensembles at different overdispersed starts, or at draws of a mixture that is close to the posterior."""
     began, counts = time.perf_counter(), Outcomes()
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(settings.ensembles + 1)[-1])
-    x = starting_points(posterior, rng, settings.ensembles, walkers_of(posterior, settings), counts)
-    return replace(begun(posterior, x, seed), counts=counts, seconds=time.perf_counter() - began)
+    shape = settings.ensembles, walkers_of(posterior, settings)
+    found = tried(posterior, rng, shape[0] * shape[1], counts)
+    x, close = found.starts(rng, *shape), None
+    if settings.sampler == "auto":
+        close = independent(posterior, found, rng.spawn(1)[0], counts)
+    chains = begun(posterior, x, seed) if close is None else _close(posterior, close, settings, seed)
+    return replace(chains, counts=counts, seconds=time.perf_counter() - began)
+
+
+def _close(posterior: Posterior, close: Independent, settings: Settings, seed: int) -> Chains:
+    """Ensembles at states of a mixture, to be looked at where they may be worth enough."""
+    walkers = walkers_of(posterior, settings)
+    count = settings.ensembles * walkers
+    states = np.resize(close.states, (settings.ensembles, walkers, posterior.size))
+    chains = begun(posterior, states, seed)
+    judged = close.worth
+    needed = max(
+        (LEAST_TAUS + BURN_TAUS) * judged.tau,
+        BURN_TAUS * judged.tau + settings.ess * judged.tau / count,
+        min(MOST_FOR_Z, (1 / judged.efficiency - 1) / SURE**2) / count,
+    )
+    needed = min(needed, DOUBTED / count)
+    offered = np.full(chains.log_posterior.shape, np.nan)
+    return replace(chains, mixture=close.mixture, offered=offered, look=min(blocks(needed), settings.most_steps))
 
 
 def begun(posterior: Posterior, x: Array, seed: int) -> Chains:
@@ -186,10 +235,12 @@ def begun(posterior: Posterior, x: Array, seed: int) -> Chains:
 
 @dataclass
 class _Pile:
-    """The steps after ``first``, (E, walkers, k) and (E, walkers) each, until they are put together."""
+    """The steps after ``first`` until they are put together: (E, walkers, k), (E, walkers), and, where a mixture
+    proposes, what was offered, (E, walkers).
+    """
 
     first: int
-    steps: list[tuple[Array, Array]] = field(default_factory=list)
+    steps: list[tuple[Array, ...]] = field(default_factory=list)
 
     def taken(self, end: int, standing: Chains) -> Chains | None:
         """What was walked until ``end``, as one part that stands where ``standing`` does; None if that is nothing."""
@@ -197,8 +248,8 @@ class _Pile:
         self.first = end
         if not steps:
             return None
-        x, lp = (np.stack(values, axis=1) for values in zip(*steps, strict=True))
-        return replace(standing, x=x, log_posterior=lp)
+        x, lp, *offered = (np.stack(values, axis=1) for values in zip(*steps, strict=True))
+        return replace(standing, x=x, log_posterior=lp, offered=offered[0] if offered else None)
 
 
 @dataclass
@@ -223,8 +274,12 @@ class _Walk:
         self.known = learn(self.posterior, self.chains)
 
     def learn(self) -> None:
-        """Propose from now on what can be known by now."""
-        self.chains = replace(self.chains, lessons=(*self.chains.lessons, self.chains.steps))
+        """Have emcee's ensembles propose from now on what can be known by now."""
+        if self.chains.mixture is not None:
+            self.save()  # a segment holds steps of one kind
+        lessons = (*self.chains.lessons, self.chains.steps)
+        self.chains = replace(self.chains, lessons=lessons, mixture=None, offered=None)
+        self.standing = (self.chains.steps, self.chains)
         self.known = learn(self.posterior, self.chains)
 
     def on_to(self, look: int, asked: StopAsked) -> bool:
@@ -249,6 +304,9 @@ class _Walk:
         """At most ``steps`` more; what an interruption cuts is dropped."""
         if steps <= 0:
             return
+        if self.chains.mixture is not None:
+            self._leap(steps, look, asked)
+            return
         samplers = [self._sampler(steps, e) for e in range(len(self.chains.x))]
         for _ in range(steps):
             if asked():
@@ -256,21 +314,38 @@ class _Walk:
             states = [next(s) for s in samplers]
             # Copies, for emcee changes its state in place.
             made = np.stack([s.coords for s in states]), np.stack([s.log_prob for s in states])
-            self.ahead.steps.append(made)
-            self.unsaved.steps.append(made)
-            # In one go: an interruption must not part the steps from the state after them.
-            self.standing = (
-                self.standing[0] + 1,
-                replace(
-                    self.chains,
-                    random_states=tuple(s.random_state for s in states),
-                    counts=Outcomes(self.counts),
-                    seconds=time.perf_counter() - self.began,
-                    look=look,
-                ),
+            self._made([made], tuple(s.random_state for s in states), look)
+
+    def _leap(self, steps: int, look: int, asked: StopAsked) -> None:
+        """The same by proposals of the mixture, a block at a time."""
+        mixture, end = self.chains.mixture, self.standing[0] + steps
+        assert mixture is not None
+        standing = self.chains
+        while (at := self.standing[0]) < end and not asked():
+            found = leap(self.posterior, mixture, standing, min(end, at - at % BLOCK + BLOCK) - at, self.counts)
+            parts = (np.moveaxis(v, 1, 0) for v in (found.x, found.log_posterior, found.offered))
+            self._made(list(zip(*parts, strict=True)), found.random_states, look)
+            standing = replace(
+                standing, x=found.x, log_posterior=found.log_posterior, random_states=found.random_states
             )
-            if time.perf_counter() - self.saved >= SAVE_AFTER:
-                self.save()
+
+    def _made(self, steps: list[tuple[Array, ...]], random_states: tuple[Any, ...], look: int) -> None:
+        """Take ``steps`` into what was walked, and have it kept if it is time."""
+        self.ahead.steps += steps
+        self.unsaved.steps += steps
+        # In one go: an interruption must not part the steps from the state after them.
+        self.standing = (
+            self.standing[0] + len(steps),
+            replace(
+                self.chains,
+                random_states=random_states,
+                counts=Outcomes(self.counts),
+                seconds=time.perf_counter() - self.began,
+                look=look,
+            ),
+        )
+        if time.perf_counter() - self.saved >= SAVE_AFTER:
+            self.save()
 
     def _sampler(self, steps: int, ensemble: int) -> Any:
         """The steps of an ensemble that moves by differential evolution, snooker and stretch, and by what is known."""

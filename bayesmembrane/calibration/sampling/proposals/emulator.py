@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from bayesmembrane.calibration.posterior import Evaluation, Posterior
 from bayesmembrane.ground.parameters import Array
@@ -19,6 +20,8 @@ PER_TERM = 4  # draws for each coefficient of a polynomial
 RIDGE = 1e-8
 DOUBT = 0.02  # weight of the wide density for what the draws have not seen
 TAIL, WIDE = 4.0, 2.0  # its degrees of freedom, and its spread relative to the draws
+NEAR = 3.0  # standard deviations of the draws, in every direction, within which it is looked up where the prior is cut
+CUT = 0.1  # part of the points there that must be cut away to make that worth its time
 INNER = 100  # steps of a walk on the emulator
 FAR = 0.1  # part of them that jump the whole difference between two draws
 SHORT, FAINT = 0.5, 1e-8  # axes that must do for so many readings, and directions of curves that are left out
@@ -39,6 +42,42 @@ class Emulated(Given, Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class Seen:
+    """Where points were found possible and where not: a prior that is cut is not emulated, but looked up.
+
+    x : (M, k) points; possible : (M,)
+    """
+
+    x: Array
+    possible: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, x: Array, possible: NDArray[np.bool_]) -> Seen | None:
+        """What was seen; None if all of it is possible."""
+        return None if np.all(possible) else cls(x, possible)
+
+    def near(self, centre: Array, inverse: Array) -> Lookup | None:
+        """Of the points near the centre; None if nearly all of those are possible."""
+        z = (self.x - centre) @ inverse.T
+        close = np.sum(z * z, axis=1) < NEAR**2 * z.shape[1]
+        if not np.any(close) or np.mean(self.possible[close]) > 1 - CUT:
+            return None
+        return Lookup(KDTree(z[close]), self.possible[close])
+
+
+@dataclass(frozen=True, eq=False)
+class Lookup:
+    """Whether the nearest of some points is possible."""
+
+    tree: KDTree
+    possible: NDArray[np.bool_]
+
+    def __call__(self, z: Array) -> NDArray[np.bool_]:
+        """(B,) of whitened z (B, k)."""
+        return np.asarray(self.possible[self.tree.query(z, eps=0.3)[1]])
+
+
+@dataclass(frozen=True, eq=False)
 class Emulator:
     """ln q(x) = ln [(1 - e) p(x | F^(x)) + e t(x)], with F^ polynomial in x and t wide; not normalised.
 
@@ -49,6 +88,7 @@ class Emulator:
         their coordinates along a few axes
     level : ln of the height that the wide density is given at the centre
     archive : (M, k) draws whose differences are steps
+    lookup : tells of whitened points whether the prior is cut there; None where it is not
     """
 
     posterior: Given
@@ -59,12 +99,15 @@ class Emulator:
     coefficients: Array
     level: float
     archive: Array
+    lookup: Lookup | None = None
 
     def log_density(self, x: Array) -> Array:
         """ln q of x (B, k), shape (B,)."""
         z = (x - self.centre) @ self.inverse.T
         with np.errstate(all="ignore"):
             near = self.posterior.given(monomials(z, self.terms) @ self.coefficients, x)
+        if self.lookup is not None:
+            near = np.where(self.lookup(z), near, -np.inf)
         wide = self.level + _log_t(z)
         return np.asarray(np.logaddexp(np.where(np.isnan(near), -np.inf, near), wide))
 
@@ -87,10 +130,11 @@ class Emulator:
         return x, start - now
 
 
-def emulate(posterior: Emulated, x: Array, rng: np.random.Generator) -> Emulator | None:
+def emulate(posterior: Emulated, x: Array, rng: np.random.Generator, seen: Seen | None = None) -> Emulator | None:
     """An emulator learned from draws x (M, k), of the polynomial degree that predicts held-out densities best.
 
-    None where there are too few possible draws to learn from.
+    ``seen`` tells where the prior is cut; without it the cut is left to whoever judges. None where there are too few
+    possible draws to learn from.
     """
     x = np.unique(x, axis=0)
     x = x[rng.permutation(len(x))[:LEARN_FROM]]
@@ -105,7 +149,8 @@ def emulate(posterior: Emulated, x: Array, rng: np.random.Generator) -> Emulator
     z = (x - centre) @ inverse.T
     terms, coefficients = _best(z, curves, lambda f, held: _misfit(posterior.given(f, x[held]), truth[held]))
     given, shorter = _shortened(posterior, coefficients)
-    emulator = Emulator(given, centre, root, inverse, terms, shorter, -np.inf, x)
+    lookup = None if seen is None else seen.near(centre, inverse)
+    emulator = Emulator(given, centre, root, inverse, terms, shorter, -np.inf, x, lookup)
     level = float(np.median(emulator.log_density(x) - _log_t(z)) + np.log(DOUBT))
     return replace(emulator, level=level)
 

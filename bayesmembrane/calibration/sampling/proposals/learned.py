@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -66,5 +67,7 @@ def learn(posterior: Posterior, chains: Chains) -> Learned:
 
 
 def next_lesson(chains: Chains) -> int:
-    """Steps after which the proposal may be learned (anew)."""
+    """Steps after which the proposal may be learned (anew); none while all steps are proposed by one mixture."""
+    if chains.mixture is not None:
+        return sys.maxsize
     return int(NEXT_LESSON * chains.lessons[-1]) if chains.lessons else FIRST_LESSON

@@ -1,0 +1,73 @@
+"""Chains whose every step is proposed by one mixture, so that many steps are solved at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bayesmembrane.calibration.posterior import Outcomes, Posterior
+from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.proposals.generator import generator_of
+from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
+from bayesmembrane.calibration.sampling.weights import Worth, worth
+from bayesmembrane.ground.parameters import Array
+
+BLOCK = 32
+"""Steps that are solved at once. Blocks end at its multiples, so that a walk that goes on has the same ones."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leapt:
+    """Steps: x (E, S, W, k), ln p and ln p / mixture of what was offered (E, S, W), and the generators after them."""
+
+    x: Array
+    log_posterior: Array
+    offered: Array
+    random_states: tuple[Any, ...]
+
+
+def blocks(steps: float) -> int:
+    """The least multiple of `BLOCK` that is no less than ``steps``."""
+    return BLOCK * int(np.ceil(steps / BLOCK))
+
+
+def leap(posterior: Posterior, mixture: Mixture, standing: Chains, steps: int, counts: Outcomes) -> Leapt:
+    """``steps`` more of the walkers that stand at the end of ``standing``.
+
+    y ~ g whatever the place x, accepted with min(1, w(y) / w(x)), w = p / g (W. K. Hastings, Biometrika 57 (1970) 97):
+    what is proposed does not hang on where a walker stands, so that all of it can be solved before anybody moves.
+    """
+    x, lp = standing.x[:, -1], standing.log_posterior[:, -1]
+    ensembles, walkers, k = x.shape
+    drawn = [_drawn(mixture, state, steps * walkers) for state in standing.random_states]
+    y = np.stack([d[0] for d in drawn])
+    e = posterior.evaluate(y.reshape(-1, k))
+    counts.note(y.reshape(-1, k), e.outcome)
+    shape = (ensembles, steps, walkers)
+    log_y = e.log_posterior.reshape(shape)
+    offered = (e.log_posterior - mixture.log_density(y.reshape(-1, k))).reshape(shape)
+    chance = np.stack([d[1] for d in drawn]).reshape(shape)
+    y = y.reshape(*shape, k)
+    made, made_lp = np.empty_like(y), np.empty(shape)
+    now = lp - mixture.log_density(x.reshape(-1, k)).reshape(lp.shape)
+    for step in range(steps):
+        taken = chance[:, step] < offered[:, step] - now
+        x = np.where(taken[..., None], y[:, step], x)
+        lp, now = np.where(taken, log_y[:, step], lp), np.where(taken, offered[:, step], now)
+        made[:, step], made_lp[:, step] = x, lp
+    return Leapt(made, made_lp, offered, tuple(d[2] for d in drawn))
+
+
+def offers(chains: Chains) -> Worth:
+    """What all that it offered says of the mixture."""
+    return worth(np.empty(0) if chains.offered is None else chains.offered.ravel())
+
+
+def _drawn(mixture: Mixture, state: Any, count: int) -> tuple[Array, Array, Any]:
+    """Proposals (count, k), ln of uniform draws (count,), and the state of the generator after them."""
+    random = np.random.RandomState()
+    random.set_state(state)
+    rng = generator_of(random)
+    return mixture.draw(rng, count), np.log(rng.random(count)), random.get_state()
