@@ -3,7 +3,8 @@
     python -m tests.studies.contours
 
 simulates force curves and contours with the slow solvers of tests/reference (nothing that calibrates), samples the
-posterior of the force alone and of force and contour together, and writes docs/studies/contours.md.
+posterior of the force alone and of force and contour together, sets the curvature at the truth beside it, and writes
+docs/studies/contours.md. Rows in --out are not computed again; --films "" writes the page of what is there.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import material
+from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.noise.white import White
 from bayesmembrane.physics.rigs.annulus import Annulus
@@ -82,22 +84,40 @@ def row(name: str, sd_mm: float | None, seed: int) -> dict[str, Any]:
         "names": [n.split(".")[-1] for n in claim.names],
         "sd": np.std(x, axis=0).tolist(),
         "off": ((np.mean(x, axis=0) - truth) / np.std(x, axis=0)).tolist(),
-        "length": length(x),
-        "volume": volume(x),
+        "length": length(np.cov(x.T)),
+        "volume": volume(np.cov(x.T)),
         "ess": float(run.status["ess_bulk"]),
         "r_hat": float(run.status["r_hat"]),
         "seconds": time.time() - begun,
     }
 
 
-def length(x: Array) -> float:
-    """The standard deviation along the longest axis of draws (S, k)."""
-    return float(np.sqrt(np.linalg.eigvalsh(np.atleast_2d(np.cov(x.T)))[-1]))
+def linear(name: str, sd_mm: float) -> dict[str, Any]:
+    """The same by the curvature at the truth: C^-1 = C_0^-1 + sum over tests of J^T S^-1 J, without any walk."""
+    tests = [curve(name, 1), *([shape(name, 1e-3 * sd_mm, 1)] if sd_mm else [])]
+    claim = claimed(name)
+    x = material(name).to_coordinates(np.array(FILMS[name]))
+    precision = np.diag([float(p.prior.distribution().var()) ** -1 for p in claim.parameters])
+    for m in tests:
+        found = Forward(claim, m, m.deflection)(x, sensitivities=True)
+        assert found.sensitivity is not None
+        assert m.force_sd is not None
+        slopes = found.sensitivity[0] / m.force_sd[:, None]
+        precision += slopes.T @ slopes
+    c = np.linalg.inv(precision)
+    names = [p.name.split(".")[-1] for p in claim.parameters]
+    told = {"film": name, "height_sd_mm": sd_mm or None, "names": names, "sd": np.sqrt(np.diag(c)).tolist()}
+    return {**told, "length": length(c), "volume": volume(c)}
 
 
-def volume(x: Array) -> float:
+def length(covariance: Array) -> float:
+    """The standard deviation along the longest axis of a covariance (k, k)."""
+    return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+
+
+def volume(covariance: Array) -> float:
     """The geometric mean of the standard deviations along all axes."""
-    return float(np.exp(0.5 * np.linalg.slogdet(np.atleast_2d(np.cov(x.T)))[1] / x.shape[1]))
+    return float(np.exp(0.5 * np.linalg.slogdet(covariance)[1] / len(covariance)))
 
 
 def page(rows: list[Mapping[str, Any]]) -> str:
@@ -111,18 +131,23 @@ def page(rows: list[Mapping[str, Any]]) -> str:
         "stated. Numbers are posterior standard deviations of the sampling coordinates; length is the one along the "
         "longest axis of the posterior, that is of the valley, and mean axis the geometric mean over all axes. In "
         "brackets: part of what it is without a contour. Farthest is the largest distance of the posterior's mean from "
-        "the truth, in standard deviations.",
+        "the truth, in standard deviations. The second table is what the curvature of prior and likelihood at the true "
+        "parameters gives, without a walk: a long and bent valley is longer, or is cut off by bounds.",
         "",
     ]
     for film in FILMS:
-        own = [r for r in rows if r["film"] == film]
-        if not own:
-            continue
-        head = ["heights known to", *own[0]["names"], "length", "mean axis", "farthest", "ESS", "R-hat"]
-        parts += [f"## {material(film).title}", "", f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
-        alone = next((r for r in own if r["height_sd_mm"] is None), None)
-        parts += [f"| {' | '.join(_cells(r, alone))} |" for r in own] + [""]
+        parts += [f"## {material(film).title}", ""]
+        sampled = [r for r in rows if r["film"] == film]
+        parts += _table("Sampled:", sampled, ["farthest", "ESS", "R-hat"]) if sampled else ["Not sampled yet.", ""]
+        parts += _table("By the curvature at the truth:", [linear(film, sd) for sd in HEIGHTS_MM], [])
     return "\n".join(parts)
+
+
+def _table(title: str, rows: list[Mapping[str, Any]], more: list[str]) -> list[str]:
+    head = ["heights known to", *rows[0]["names"], "length", "mean axis", *more]
+    alone = next((r for r in rows if r["height_sd_mm"] is None), None)
+    lines = [title, "", f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    return [*lines, *(f"| {' | '.join(_cells(r, alone))} |" for r in rows), ""]
 
 
 def _cells(row: Mapping[str, Any], alone: Mapping[str, Any] | None) -> list[str]:
@@ -132,6 +157,8 @@ def _cells(row: Mapping[str, Any], alone: Mapping[str, Any] | None) -> list[str]
     told = ["no contour" if row["height_sd_mm"] is None else f"{row['height_sd_mm']:g} mm"]
     told += [beside(v, alone["sd"][i] if alone else None) for i, v in enumerate(row["sd"])]
     told += [beside(row[k], alone[k] if alone else None) for k in ("length", "volume")]
+    if "off" not in row:
+        return told
     return [*told, f"{np.max(np.abs(row['off'])):.1f}", f"{row['ess']:.0f}", f"{row['r_hat']:.3f}"]
 
 
@@ -143,15 +170,19 @@ def main() -> None:
     options.add_argument("--heights-mm", default=",".join(map(str, HEIGHTS_MM)), help="0: no contour")
     chosen = options.parse_args()
     chosen.out.mkdir(parents=True, exist_ok=True)
-    for name in chosen.films.split(","):
+    _write(chosen.out)
+    for name in filter(None, chosen.films.split(",")):
         for sd in map(float, chosen.heights_mm.split(",")):
             file = chosen.out / f"{name}_{sd:g}.json"
             if not file.exists():
                 file.write_text(json.dumps(row(name, sd or None, seed=1)), encoding="utf-8")
-            rows = [json.loads(f.read_text(encoding="utf-8")) for f in chosen.out.glob("*.json")]
-            rows.sort(key=lambda r: -(r["height_sd_mm"] or np.inf))
-            TARGET.write_text(page(rows), encoding="utf-8")
+            _write(chosen.out)
             print(name, sd, flush=True)
+
+
+def _write(folder: Path) -> None:
+    rows = [json.loads(f.read_text(encoding="utf-8")) for f in folder.glob("*.json")]
+    TARGET.write_text(page(sorted(rows, key=lambda r: -(r["height_sd_mm"] or np.inf))), encoding="utf-8")
 
 
 if __name__ == "__main__":
