@@ -143,6 +143,7 @@ class Sampling(_Section):
     walkers: Annotated[int, Field(ge=2, multiple_of=2)] | None = None
     chunk: Annotated[int, Field(ge=10)] | None = None
     most_steps: Annotated[int, Field(ge=10)] | None = None
+    sampler: Literal["auto", "emcee"] | None = None
 
     @model_validator(mode="after")
     def _walkable(self) -> Sampling:

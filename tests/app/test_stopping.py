@@ -33,7 +33,7 @@ def begun(words: list[str], program: str = "bayesmembrane", cwd: Path = ROOT) ->
 def test_sample_is_stopped_and_goes_on(number: int, tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = ["sample", *strip(tmp_path), "--material", "neo_hookean", "--out", str(out), "--json"]
-    first = begun([*words, "--ess", "1e5"])
+    first = begun([*words, "--ess", "1e7"])
     give_up = time.monotonic() + LONGEST
     while not list(out.glob("*/segments/*.seg")):
         assert time.monotonic() < give_up
@@ -44,7 +44,7 @@ def test_sample_is_stopped_and_goes_on(number: int, tmp_path: Path) -> None:
     assert first.returncode == 130, err
     assert not told
     assert "Traceback" not in err
-    assert shlex.split(err.split("The same command resumes it: ")[1].split("\n")[0])[1:] == [*words, "--ess", "1e5"]
+    assert shlex.split(err.split("The same command resumes it: ")[1].split("\n")[0])[1:] == [*words, "--ess", "1e7"]
     (run,) = out.glob("*/status.json")
     before = json.loads(run.read_text())
     assert before["status"] == "interrupted"

@@ -20,7 +20,7 @@ from bayesmembrane.ground import files
 from bayesmembrane.ground.errors import StorageError
 from tests.calibration.test_resume import CLAIM, how, strip
 
-TINY = Settings(ess=1e6, walkers=8, chunk=20, most_steps=20)
+TINY = Settings(ess=1e6, walkers=8, chunk=20, most_steps=20, sampler="emcee")
 
 Tree = dict[Path, bytes | None]
 """Files with what they hold, and folders (None), by path."""

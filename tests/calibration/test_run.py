@@ -145,7 +145,8 @@ def test_the_whole_walk_is_stored_in_means(stored: Run) -> None:
 
 
 def test_what_the_cache_did_is_stored(film, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    curve, short = film("neo_hookean", (7.5,), noise=0.02, seed=1), Settings(ess=1.0, chunk=30, most_steps=30)
+    curve = film("neo_hookean", (7.5,), noise=0.02, seed=1)
+    short = Settings(ess=1.0, chunk=30, most_steps=30, sampler="emcee")  # a walk that the last digit does not change
     cached = CachedSolver()
     how = RunSettings(settings=short, predictions=False)
     first = sample(curve, hypothesis("neo_hookean"), replace(how, out=tmp_path), solve=cached)
@@ -200,7 +201,7 @@ def test_damage_is_told(stored: Run, tmp_path: Path) -> None:
 
 def test_an_interrupted_run_is_stored_and_continued(film, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     curve = film("neo_hookean", (7.5,), noise=0.02, seed=1)
-    settings = Settings(ess=1000, chunk=100)
+    settings = Settings(ess=1000, chunk=100, sampler="emcee")
 
     def stop(progress: Progress) -> None:
         raise KeyboardInterrupt

@@ -32,7 +32,7 @@ def exact(name: str, convexity: str = "reached", range_name: str = "OP1") -> flo
 
 @cache
 def sampled(name: str, convexity: str = "reached", range_name: str = "OP1"):
-    found = run_ensembles(posterior(name, convexity, range_name), Settings(ess=400), 211)
+    found = run_ensembles(posterior(name, convexity, range_name), Settings(ess=400, sampler="emcee"), 211)
     burn = found.convergence.burn
     return found.chains.x[:, burn:], found.chains.log_posterior[:, burn:], float(np.min(found.convergence.ess))
 

@@ -21,6 +21,7 @@ from bayesmembrane.calibration.sampling.convergence import BURN_TAUS, LEAST_TAUS
 from bayesmembrane.calibration.sampling.leaps import BLOCK, blocks, leap, offers
 from bayesmembrane.calibration.sampling.proposals.independent import Independent, independent
 from bayesmembrane.calibration.sampling.proposals.learned import learn, next_lesson
+from bayesmembrane.calibration.sampling.weights import Worth
 from bayesmembrane.calibration.starts import tried
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.interrupts import Stop, StopAsked, deferred, never
@@ -172,12 +173,16 @@ def _next_look(chains: Chains, found: Convergence, settings: Settings) -> int:
     needed = max(LEAST_TAUS * tau, (steps - found.burn) * settings.ess / float(np.min(found.ess)))
     guess = int(np.ceil(needed * 1.02)) + found.burn
     if chains.mixture is not None:
-        judged, count = offers(chains), chains.log_posterior[:, 0].size
-        needed = min(MOST_FOR_Z, (1 / judged.efficiency - 1) / SURE**2) / count
-        return blocks(min(max(guess, needed, steps + BLOCK), 2 * steps))
+        for_z = _proposals_for_z(offers(chains)) / chains.log_posterior[:, 0].size
+        return blocks(min(max(guess, for_z, steps + BLOCK), 2 * steps))
     return int(
         min(max(guess, steps + settings.chunk // 2, int(1.1 * steps)), max(int(GROWTH * steps), 2 * settings.chunk))
     )
+
+
+def _proposals_for_z(judged: Worth) -> float:
+    """How many give ln Z to within `SURE`, as far as `MOST_FOR_Z` do."""
+    return min(MOST_FOR_Z, (1 / judged.efficiency - 1) / SURE**2) if judged.efficiency > 0 else 0.0
 
 
 def _progress(chains: Chains, found: Convergence, settings: Settings) -> Progress:
@@ -214,13 +219,9 @@ def _close(posterior: Posterior, close: Independent, settings: Settings, seed: i
     count = settings.ensembles * walkers
     states = np.resize(close.states, (settings.ensembles, walkers, posterior.size))
     chains = begun(posterior, states, seed)
-    judged = close.worth
-    needed = max(
-        (LEAST_TAUS + BURN_TAUS) * judged.tau,
-        BURN_TAUS * judged.tau + settings.ess * judged.tau / count,
-        min(MOST_FOR_Z, (1 / judged.efficiency - 1) / SURE**2) / count,
-    )
-    needed = min(needed, DOUBTED / count)
+    tau = close.worth.tau
+    enough = max((LEAST_TAUS + BURN_TAUS) * tau, (BURN_TAUS + settings.ess / count) * tau)
+    needed = min(max(enough, _proposals_for_z(close.worth) / count), DOUBTED / count)
     offered = np.full(chains.log_posterior.shape, np.nan)
     return replace(chains, mixture=close.mixture, offered=offered, look=min(blocks(needed), settings.most_steps))
 

@@ -78,8 +78,8 @@ def _enough(judged: Worth) -> bool:
 
 def _settled(found: list[Independent]) -> bool:
     """Whether the last two rounds found next to nothing better than those before."""
-    sizes = [f.worth.efficiency if f.worth.good else 0.0 for f in found]
-    return len(sizes) > 2 and sizes[-1] > 0 and max(sizes[-2:]) < GAIN * max(sizes[:-2])
+    sizes = [f.worth.efficiency for f in found]
+    return len(sizes) > 2 and max(sizes[-2:]) < GAIN * max(sizes[:-2])
 
 
 def _learned(posterior: Posterior, tried: Tried, states: Array, rng: np.random.Generator) -> Mixture:
