@@ -16,9 +16,8 @@ from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.calibration.fingerprint import fingerprint
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.calibration.fit import fit as run_fit
+from bayesmembrane.calibration.hierarchy.next_curve import population_of_runs
 from bayesmembrane.calibration.hierarchy.population import Population
-from bayesmembrane.calibration.hierarchy.population import population as run_population
-from bayesmembrane.calibration.hierarchy.specimens import of_runs
 from bayesmembrane.calibration.joint.claim import Joint
 from bayesmembrane.calibration.joint.fit import JointFit, fit_jointly
 from bayesmembrane.calibration.joint.run import JointRun, sample_jointly
@@ -202,13 +201,12 @@ def compare_joint(claims: Sequence[Joint], work: Work) -> Answer[dict[str, Compa
 
 def population(runs: Sequence[Run], work: Work, *, pool: Sequence[str] = ()) -> Answer[Population]:
     """The population behind the specimens of several runs."""
-    specimens = of_runs(runs, pool)
     settings = {"seed": work.seed, "pool": list(pool), "draws": [run.draws_name for run in runs]}
-    by = run_population
-    what = asked("population", by, [r.measurement for r in runs], [r.hypothesis for r in runs], settings)
+    by, tests = population_of_runs, [r.measurement for r in runs]
+    what = asked("population", by, tests, [r.hypothesis for r in runs], settings)
     model = runs[0].hypothesis.label()
-    found = by(specimens, work.seed)
-    named = replace(what, specimen="-".join(specimens.labels), model=model, end=float("nan"))
+    found = by(runs, pool, work.seed)
+    named = replace(what, specimen="-".join(found.specimens.labels), model=model, end=float("nan"))
     return kept("population", found, document(found), named, work.out)
 
 

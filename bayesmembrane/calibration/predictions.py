@@ -322,7 +322,8 @@ def _map(film: Material, states: Array) -> tuple[Array, Array, Array]:
     """Least eigenvalue of the Hessian over |G d| on stretches that hold the states (4, D, M) with room around them."""
     top = float(np.nanmax(states[2:])) if np.any(np.isfinite(states[2])) else 2.0
     low = float(np.nanmin(states[3])) if np.any(np.isfinite(states[3])) else 1.0
-    l1 = np.linspace(0.9, max(2.0, 1.12 * top), MAP[0])
+    short = float(np.nanmin(states[2])) if np.any(np.isfinite(states[2])) else 1.0
+    l1 = np.linspace(min(0.9, 0.95 * short), max(2.0, 1.12 * top), MAP[0])
     l2 = np.linspace(min(0.7, 0.85 * low), max(2.0, 0.5 * top), MAP[1])
     a, b = np.meshgrid(l1, l2, indexing="ij")
     hessian = film.hessian(a, b)

@@ -29,6 +29,8 @@ class Fixture(ABC):
     clamped : the film is held all round and spans the gap to a disc; else it is pulled at its ends
     homogeneous : the film is stretched alike everywhere
     has_path : readings are stations of one test, which a film may remember; else each is a state of its own
+    presses : the specimen gets shorter under a force that pushes
+    axes : what readers see along and up, in one word each, and the first one at rest: ("stretch", 1.0, "stress")
     ``check`` : what its lengths must satisfy among themselves
     """
 
@@ -39,6 +41,8 @@ class Fixture(ABC):
     clamped: ClassVar[bool] = False
     homogeneous: ClassVar[bool] = False
     has_path: ClassVar[bool] = True
+    presses: ClassVar[bool] = False
+    axes: ClassVar[tuple[str, float, str]] = ("deflection", 0.0, "force")
 
     def __post_init__(self) -> None:
         """Raise `DataError` unless every length is finite and positive, and `check` agrees."""
@@ -58,6 +62,10 @@ class Fixture(ABC):
     def from_columns(self, found: Mapping[str, Array], thickness: float) -> dict[str, Array]:
         """``deflection`` (m), ``force`` (N), their ``force_sd`` and others, from the columns of a curve in SI."""
         return dict(found)
+
+    def as_read(self, found: Mapping[str, Array]) -> Fixture:
+        """The fixture of the curve with these columns in SI: this one, or its other way of working that they show."""
+        return self
 
     def remarks(self, found: Mapping[str, Array]) -> tuple[str, ...]:
         """What must be said of readings, as `from_columns` gives them, that a film on this rig cannot bear."""

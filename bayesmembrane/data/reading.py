@@ -44,6 +44,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     specimen = _specimen(root.section("specimen"), rig, curve_csv.stem)
     options = root.section("measurement", required=False)
     columns, notes = curve_columns(table, rig.columns, rig.noise, PHASES if rig.has_path else {})
+    rig = rig.as_read(columns)
     found = _at(table.file, rig.from_columns, columns, specimen.thickness)
     deflection, force, across = found["deflection"], found["force"], found.get("across")
     motion = _said_motion(table, found, rig)

@@ -244,7 +244,7 @@ def cases(shown: Sequence[Shown]) -> list[Case]:
 def end_column(shown: Sequence[Shown]) -> Column:
     """How far runs were fitted, in a table; the values are those of `ends`."""
     how = alike(s.how for s in shown)
-    unit = "stretch" if how.rest else how.travel_scale[1]
+    unit = how.travel if how.bare else how.travel_scale[1]
     return Column(f"end_{unit}", f"fitted up to ({unit})")
 
 

@@ -328,7 +328,7 @@ def overview(cases: Sequence[Case]) -> str:
     materials = list(dict.fromkeys(c.name for c in cases))
     runs = f"{len(cases)} calibrations" if len(cases) > 1 else "One calibration"
     how = alike(c.how for c in cases)
-    if how.rest:
+    if how.bare:
         return f"{runs}: {listed(materials)}, fitted up to {listed(how.place(e) for e in ends)}."
     reach = f"{listed(f'{1e3 * e:.4g}' for e in ends)} mm of deflection"
     return f"{runs}: {listed(materials)}, fitted up to {reach}."

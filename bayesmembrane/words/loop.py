@@ -75,7 +75,8 @@ def sentence(found: Loop) -> str:
 def left_sentence(left: Discrepancy, how: Seen) -> str:
     """Size and scale of what is kept without a name."""
     length = f"{how.travel_scale[0] * left.length:.3g}"
-    way = f"{length} of stretch along the test" if how.rest else f"{length} {how.travel_scale[1]} of the disc's way"
+    disc = f"{length} {how.travel_scale[1]} of the disc's way"
+    way = f"{length} of {how.travel} along the test" if how.bare else disc
     return f"What is left is kept without a name: about {how.error(left.amplitude)}, varying over {way}."
 
 

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from bayesmembrane.calibration.hierarchy.next_curve import NextCurve
 from bayesmembrane.calibration.hierarchy.population import Population
 from bayesmembrane.calibration.hierarchy.specimens import LN_MODULUS
 from bayesmembrane.words.language import listed, percent, three_digits
+from bayesmembrane.words.seen import seen_on
 
 FEW = 5
 """Specimens below which the prior of the scatter is named."""
@@ -37,6 +41,10 @@ def sentences(found: Population) -> tuple[str, ...]:
             f"({percent(m['scatter']['mean'] / m['mean']['mean'])}) between specimens; the next one lies with 94 % "
             f"between {three_digits(m['next']['hdi_94'][0])} and {three_digits(m['next']['hdi_94'][1])} MPa."
         )
+    if found.next_curve is not None:
+        said.append(_next_curve(found.next_curve))
+        if found.next_curve.without_form:
+            said.append("The form error of the next specimen is not in the band of its curve.")
     if len(s.labels) < FEW:
         said.append(f"With {len(s.labels)} specimens the prior of the scatter has a say in it.")
     if s.skewed:
@@ -45,6 +53,21 @@ def sentences(found: Population) -> tuple[str, ...]:
             "intervals for rough."
         )
     return tuple(said)
+
+
+def _next_curve(c: NextCurve) -> str:
+    """The force of the next specimen at the last deflection at which there is one."""
+    how = seen_on(c.rig, c.thickness)
+    there = np.flatnonzero(np.isfinite(c.curve[1]))
+    if not there.size:
+        return "No force can be predicted for the next specimen: half of the films that may come have none."
+    k = int(there[-1])
+    low, middle, high = (how.force(float(v)) for v in c.curve[:, k])
+    place = how.place(float(c.deflection[k]))
+    return (
+        f"The next specimen, {1e6 * c.thickness:.4g} um thick, carries {middle} at {place}, "
+        f"with 90 % between {low} and {high}."
+    )
 
 
 def _interval(value: dict[str, Any]) -> str:

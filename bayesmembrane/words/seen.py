@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from bayesmembrane.calibration.fit import Fit
 
 MEASURED = "measured"
+FORCE = "force"
+BARE = "-"
+"""The unit of a number without one."""
 _NOT_MEASURED = ("reconstructed", "synthetic", "simulated")
 
 
@@ -31,7 +34,7 @@ def made(origin: str) -> str:
 class Seen:
     """Value shown = ``rest`` + factor times SI, for deflections (m) and forces (N).
 
-    travel, load : "deflection" and "force", or "stretch" and "stress"
+    travel, load : "deflection" and "force", or of a homogeneous test what its rig calls them: "stretch" and "stress"
     small : (factor, unit) of what a model leaves of the forces
     origin : "measured", "reconstructed", "synthetic", ...
     """
@@ -43,6 +46,11 @@ class Seen:
     load_scale: tuple[float, str]
     small: tuple[float, str]
     origin: str = MEASURED
+
+    @property
+    def bare(self) -> bool:
+        """True if deflections are seen as numbers without a unit: stretch, compression, shear."""
+        return self.travel_scale[1] == BARE
 
     def along(self, deflection: Array) -> Array:
         """(N,) what is on the horizontal axis."""
@@ -62,7 +70,7 @@ class Seen:
 
     def force(self, value: float) -> str:
         """A force in N in words, three digits: mN below 0.1 N; of a strip its stress."""
-        if not self.rest:
+        if self.load == FORCE:
             return newtons(value)
         return (
             f"{digits(self.load_scale[0] * value)} {self.load_scale[1]}" if math.isfinite(value) else f"no {self.load}"
@@ -75,7 +83,7 @@ class Seen:
     def place(self, deflection: float) -> str:
         """A deflection in m in words, to follow "up to": ``30 mm``, ``a stretch of 2.5``."""
         value = self.rest + self.travel_scale[0] * deflection
-        return f"a {self.travel} of {value:.4g}" if self.rest else f"{value:.4g} {self.travel_scale[1]}"
+        return f"a {self.travel} of {value:.4g}" if self.bare else f"{value:.4g} {self.travel_scale[1]}"
 
     @property
     def curve(self) -> str:
@@ -110,8 +118,10 @@ def seen_on(rig: Fixture, thickness: float, origin: str = "") -> Seen:
     """How a curve on this rig is seen; ``origin`` is the statement of where its points come from."""
     shown = rig.shown(thickness)
     if rig.homogeneous:
-        return Seen("stretch", (shown["m"][0], "-"), 1.0, "stress", shown["N"], shown["N"], made(origin))
-    return Seen("deflection", shown["m"], 0.0, "force", (1.0, "N"), shown["N"], made(origin))
+        travel, rest, load = rig.axes
+        return Seen(travel, (shown["m"][0], BARE), rest, load, shown["N"], shown["N"], made(origin))
+    travel, rest, load = rig.axes
+    return Seen(travel, shown["m"], rest, load, (1.0, "N") if load == FORCE else shown["N"], shown["N"], made(origin))
 
 
 def seen_by_fit(found: Fit) -> Seen:

@@ -125,9 +125,18 @@ def test_runs_of_specimens_make_a_population(run: Run, short_walks: None) -> Non
     assert answer["specimens"] == ["strip", "sheet"]
     assert answer["modulus_MPa"]["mean"]["mean"] == pytest.approx(0.4, rel=0.3)
     assert "the prior of the scatter has a say" in " ".join(answer["sentences"])
+    assert "The next specimen, 100 um thick, carries" in " ".join(answer["sentences"])
+    following = answer["next_curve"]
+    assert (following["rig"], following["thickness_um"]) == ("uniaxial", pytest.approx(100))
+    middle, wide = (np.array(list(following[k].values())) for k in ("mean_specimen_N", "force_N"))
+    assert wide.shape == (3, len(following["deflection_mm"]))
+    assert np.all(np.diff(wide, axis=0) > 0)
+    assert np.all(np.ptp(middle, axis=0) < np.ptp(wide, axis=0))
     assert run("population", *runs, "--out", "p")[0] == 0
     assert run("report", answer["stored"], "--out", "page")[0] == 0
-    assert "The population of specimens" in Path("page/index.html").read_text()
+    page = Path("page/index.html").read_text()
+    assert "The population of specimens" in page
+    assert "90 % bands of its curve" in page
     code, out, err = run("population", runs[0], "--out", "p")
     assert (code, out) == (1, "")
     assert "two specimens at least" in err

@@ -105,3 +105,29 @@ def force_curve_bvp(
         p1 = material.tension(y[1, 0], 1.0)[0]
         forces[i] = 2 * np.pi * inner_radius * p1 * np.sin(y[2, 0])
     return forces
+
+
+def contour(
+    material: Material, lift: float, inner_radius: float, outer_radius: float, tol: float = 1e-7
+) -> tuple[Array, Array]:
+    """(radius, height above the ring) in m along the film whose disc is lifted by ``lift`` (m), by collocation.
+
+    The lift grows in steps, each started from the one before. Raises `ArithmeticError` where it fails.
+    """
+    span = float(np.log(outer_radius / inner_radius))
+    t, d = np.linspace(0, span, 41), lift / inner_radius
+    first = min(0.5, d)
+    y = np.stack([1.0 + 0.0 * t, 1.0 + 0.1 * first**2 + 0.0 * t, first / span * np.exp(-t), first * t / span])
+    for step in np.linspace(first, d, max(1, int(np.ceil(d / 0.4)))):
+
+        def edges(a: Array, b: Array, step: float = step) -> Array:
+            return np.array([a[0] - 1, b[0] - 1, a[3], b[3] - step])
+
+        with np.errstate(all="ignore"):
+            found = solve_bvp(lambda s, v: rates(s, v, material), edges, t, y, tol=tol, max_nodes=20000)
+        if not found.success:
+            raise ArithmeticError(f"no shape at {1e3 * step * inner_radius:.3g} mm")
+        t, y = found.x, found.y
+    fine = np.linspace(0, span, 2001)
+    l2, _, _, fallen = found.sol(fine)
+    return inner_radius * np.exp(fine) * l2, lift - inner_radius * fallen

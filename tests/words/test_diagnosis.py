@@ -69,7 +69,7 @@ def test_units_of_a_strip_undo_what_its_size_does() -> None:
 def test_every_rig_shows_the_same_quantities() -> None:
     rigs: dict[str, type[Rig]] = components("rigs")
     for kind in rigs.values():
-        rig = kind(0.01, 0.035) if kind is Annulus else kind()
+        rig = kind.example()
         assert set(rig.shown(THICKNESS)) == set(SCALES)
     assert Annulus(0.010, 0.035).shown(THICKNESS) == SCALES
 

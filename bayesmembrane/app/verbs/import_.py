@@ -63,7 +63,7 @@ class FilmAndRigOptions(OptionGroup):
     """Film and rig, where neither the file nor a specimen file says them."""
 
     specimen: Annotated[Path | None, typer.Option("--specimen", help="TOML with film and rig, if there is one.")] = None
-    rig: Annotated[str, typer.Option("--rig", help="annulus, uniaxial, equibiaxial, planar or biaxial.")] = ""
+    rig: Annotated[str, typer.Option("--rig", help="annulus, uniaxial, planar, compression or another.")] = ""
     name: Annotated[str, typer.Option("--name", help="Name of the specimen.")] = ""
     thickness_um: Annotated[float | None, typer.Option("--thickness-um", help="Thickness at rest.")] = None
     gauge_length_mm: Annotated[float | None, typer.Option("--gauge-length-mm", help="Length of a strip at rest.")] = (

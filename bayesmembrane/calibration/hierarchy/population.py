@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import stats
@@ -14,6 +14,9 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.ground.showable import Showable
+
+if TYPE_CHECKING:
+    from bayesmembrane.calibration.hierarchy.next_curve import NextCurve
 
 WIDE = 0.25
 """Scale of the half-normal prior on the scatter of a coordinate, in standard deviations of the coordinate's prior:
@@ -34,6 +37,7 @@ class Population(Showable):
     following : (D, q) draws of theta of a specimen that nobody has tested
     own : (D, J, q) draws of theta_j, drawn towards the others as far as they are alike
     effective : how many independent draws these are worth
+    next_curve : the force curve of the next specimen, where the population is one of runs (`NextCurve`)
     """
 
     specimens: Specimens
@@ -42,6 +46,7 @@ class Population(Showable):
     following: Array
     own: Array
     effective: float
+    next_curve: NextCurve | None = None
 
     def summary(self) -> dict[str, Any]:
         """Plain values of the JSON answer of ``population``."""
@@ -69,6 +74,8 @@ class Population(Showable):
         }
         if LN_MODULUS in s.names:
             answer["modulus_MPa"] = self.modulus()
+        if self.next_curve is not None:
+            answer["next_curve"] = self.next_curve.summary()
         return answer
 
     def modulus(self) -> dict[str, Any]:

@@ -118,7 +118,11 @@ def _homogeneous(rig: str) -> bool:
         raise SettingsError(
             "a biaxial test has two forces", remedy="bring stretch_1, stretch_2 and both stresses as CSV"
         )
-    return bool(component("rigs", rig).homogeneous)
+    kind = component("rigs", rig)
+    if kind.homogeneous and "stretch" not in kind.columns:
+        names = " and ".join(kind.columns)
+        raise SettingsError(f'the rig "{rig}" is not read from exports', remedy=f"bring {names} as CSV")
+    return bool(kind.homogeneous)
 
 
 def _time(export: Export) -> Array | None:
@@ -270,4 +274,4 @@ def _refuse_nonsense(export: Export, columns: Mapping[str, Array]) -> None:
     pulls = columns.get("stretch")
     if pulls is not None and COMPRESSION.search(text) and float(np.max(pulls)) > 1.02 and not export.hints.sign:
         fault = "the file speaks of compression, and the film gets longer in it"
-        raise DataError(fault, export.block.place, "say --sign flip if it was pressed, keep if it was pulled")
+        raise DataError(fault, export.block.place, "say --rig compression if it was pressed, --sign keep if not")

@@ -8,6 +8,7 @@ from bayesmembrane.data.exports.columns import Read
 from bayesmembrane.data.exports.export import Export
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import component
 
 RESTS = 0.02
 """A force below this part of the largest counts as none: the film is at rest there."""
@@ -26,6 +27,11 @@ def signed(export: Export, x: Array, f: Array, free: bool) -> tuple[Array, Array
         return flips[said][0] * x, flips[said][1] * f
     at = int(np.argmax(np.abs(f)))
     back, pushed = bool(x[at] < x[0]), bool(f[at] < 0)
+    if not free and export.hints.rig and component("rigs", export.hints.rig).presses:
+        if not back or not pushed:
+            why = "the rig presses, and the file counts that as positive"
+            export.guess("sign", "turned round where positive", why, "--sign")
+        return (x if back else -x), (f if pushed else -f)
     if not back and not pushed:
         return x, f
     if not free:

@@ -14,6 +14,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import component
 from bayesmembrane.ground.units import FORCE, RATIO, STRESS
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics import api
@@ -25,6 +26,7 @@ Law = Any
 """(deflection (B, N), excess (B, N) or None) -> (force (B, N), slope (B, N)), as `FilmLaw` and `StripLaw` are."""
 
 PUSHED = 0.01  # of the largest force: a negative one beyond it is no noise about the zero of a slack film
+ABOVE_REST = 0.02  # of the largest compression: so far above rest a test in compression may start
 STATES = 40  # at which a closed form is asked for its convexity
 
 
@@ -111,16 +113,13 @@ def rig_of(measurement: Measurement) -> Rig:
     return rig
 
 
-class Strip(Rig, ABC):
-    """A homogeneous test: one stretch l, read as the deflection L (l - 1), gives the nominal stress P1 / thickness.
-
-    The force is the nominal stress times width times thickness, so that deflections and forces are those of a specimen
-    of this length and width; where the specimen file gives none, 50 mm and 10 mm.
+class Homogeneous(Rig, ABC):
+    """A specimen deformed alike everywhere: its deflection is ``length`` times what deforms it, its force the nominal
+    stress times ``width`` times thickness; where the specimen file gives none, they are 50 mm and 10 mm.
     """
 
     length: float
     width: float
-    columns: ClassVar[Mapping[str, str]] = {"stretch": RATIO, "nominal_stress": STRESS}
     noise: ClassVar[Mapping[str, str]] = {"force_sd": FORCE, "nominal_stress_sd": STRESS}
     homogeneous: ClassVar[bool] = True
     closed_form: ClassVar[bool] = True
@@ -130,6 +129,51 @@ class Strip(Rig, ABC):
 
     def size(self) -> float:
         return self.length
+
+    def newton(self, quantity: str, thickness: float) -> float:
+        return self.width * thickness if quantity == STRESS else 1.0
+
+    def stated(self, found: Mapping[str, Array], thickness: float) -> dict[str, Array]:
+        """``force_sd`` (N,) N, if a column states it in whatever quantity; raises `DataError` if two do."""
+        names = [k for k in self.noise if k in found]
+        if len(names) > 1:
+            raise DataError(f"the columns {' and '.join(names)} both give the noise", remedy="remove one of them")
+        if not names:
+            return {}
+        return {"force_sd": found[names[0]] * self.newton(self.noise[names[0]], thickness)}
+
+    def shown(self, thickness: float) -> Mapping[str, tuple[float, str]]:
+        """Nominal stress, force over width and thickness, and what deforms it: as measured, whatever the size."""
+        MPa = 1e-6 / (self.width * thickness)
+        return {
+            "m": (1 / self.length, f"in {self.axes[0]}"),
+            "m/N": (1 / (self.length * MPa), "1/MPa"),
+            "N": (MPa, "MPa"),
+            "N/s": (MPa, "MPa/s"),
+        }
+
+    def remark_on_units(self, thickness: float) -> str:
+        shown = self.shown(thickness)
+        return (
+            f"forces are nominal stress times width times thickness, 1 N for {shown['N'][0]:.4g} MPa, and 1 mm of "
+            f"deflection is {1e-3 * shown['m'][0]:.4g} of {self.axes[0]}"
+        )
+
+    def place(self, deflection: float) -> str:
+        return f"a {self.axes[0]} of {self.axes[1] + deflection / self.length:.3g}"
+
+
+class Strip(Homogeneous, ABC):
+    """A homogeneous test: one stretch l, read as the deflection L (l - 1), gives the nominal stress P1 / thickness.
+
+    The force is the nominal stress times width times thickness, so that deflections and forces are those of a specimen
+    of this length and width; where the specimen file gives none, 50 mm and 10 mm.
+    """
+
+    columns: ClassVar[Mapping[str, str]] = {"stretch": RATIO, "nominal_stress": STRESS}
+    axes: ClassVar[tuple[str, float, str]] = ("stretch", 1.0, "stress")
+    pressed: ClassVar[str] = ""
+    """The kind of this test where the specimen is pressed and not pulled, if there is one."""
 
     @staticmethod
     @abstractmethod
@@ -167,8 +211,12 @@ class Strip(Rig, ABC):
 
     # ---- readings --------------------------------------------------------------------------------------------------
 
-    def newton(self, quantity: str, thickness: float) -> float:
-        return self.width * thickness if quantity == STRESS else 1.0
+    def as_read(self, found: Mapping[str, Array]) -> Fixture:
+        """Where no stretch is above 1 and the stress pushes, the rig on which such a specimen is pressed."""
+        if not self.pressed or not only_pressed(found["stretch"]) or float(np.sum(found["nominal_stress"])) >= 0:
+            return self
+        kind: type[Fixture] = component("rigs", self.pressed)
+        return kind(**self.lengths)
 
     def from_columns(self, found: Mapping[str, Array], thickness: float) -> dict[str, Array]:
         rest = {k: v for k, v in found.items() if k not in self.columns and k not in self.noise}
@@ -176,24 +224,15 @@ class Strip(Rig, ABC):
         out = {**rest, "deflection": deflection, "force": found["nominal_stress"] * self.width * thickness}
         return out | self.stated(found, thickness)
 
-    def stated(self, found: Mapping[str, Array], thickness: float) -> dict[str, Array]:
-        """``force_sd`` (N,) N, if a column states it in whatever quantity; raises `DataError` if two do."""
-        names = [k for k in self.noise if k in found]
-        if len(names) > 1:
-            raise DataError(f"the columns {' and '.join(names)} both give the noise", remedy="remove one of them")
-        if not names:
-            return {}
-        return {"force_sd": found[names[0]] * self.newton(self.noise[names[0]], thickness)}
-
     def check_readings(self, columns: Mapping[str, Array], file: str, lines: Sequence[int]) -> None:
         """What pushes has a stretch below 1 and a negative stress, and something must pull."""
         places = [f"{file}, line {k}" for k in lines]
         deflection, force, across = columns["deflection"], columns["force"], columns.get("across")
-        if across is None:
-            check_sequence(columns, places)
-        else:
-            places = 2 * places
         pulled, pushed = deflection > 0, deflection < 0
+        if across is not None:
+            places = 2 * places
+        elif np.any(pulled):  # else the signs come first: pressed, its order is another one
+            check_sequence(columns, places)
         if across is not None:  # held wide a film pulls below rest, and held narrow it may push above
             pulled, pushed = pulled & (across >= 1), pushed & (across <= 1)
         against = ((pulled & (force < 0)) | (pushed & (force > 0))) & (np.abs(force) > 0.01 * np.max(np.abs(force)))
@@ -201,9 +240,11 @@ class Strip(Rig, ABC):
             k = int(np.argmax(against))
             fault = "at most points the stress is negative above a stretch of 1 or positive below it"
             remedy = "write the stretch as length over length at rest, and the stress positive where it pulls"
+            if self.pressed and not np.any(pulled):
+                remedy += f', or say kind = "{self.pressed}" if it is positive where it pushes'
             raise DataError(fault, places[k], remedy)
         if not np.any(deflection > 0):
-            fault = "no stretch is above 1, and a test in compression alone cannot be calibrated"
+            fault = "no stretch is above 1, and this rig only pulls"
             raise DataError(fault, file, "keep the signs as they are, and add the readings in tension of this rubber")
         check_deviations(columns, places)
 
@@ -213,25 +254,11 @@ class Strip(Rig, ABC):
         out["nominal_stress_MPa"] = 1e-6 * arrays["force"] / (self.width * thickness)
         return out | ({"force_sd_N": arrays["force_sd"]} if "force_sd" in arrays else {})
 
-    def shown(self, thickness: float) -> Mapping[str, tuple[float, str]]:
-        """Nominal stress, force over width and thickness, and stretch: what was measured, whatever the strip's size."""
-        MPa = 1e-6 / (self.width * thickness)
-        return {
-            "m": (1 / self.length, "in stretch"),
-            "m/N": (1 / (self.length * MPa), "1/MPa"),
-            "N": (MPa, "MPa"),
-            "N/s": (MPa, "MPa/s"),
-        }
 
-    def remark_on_units(self, thickness: float) -> str:
-        shown = self.shown(thickness)
-        return (
-            f"forces are nominal stress times width times thickness, 1 N for {shown['N'][0]:.4g} MPa, and 1 mm of "
-            f"deflection is {1e-3 * shown['m'][0]:.4g} of stretch"
-        )
-
-    def place(self, deflection: float) -> str:
-        return f"a stretch of {1 + deflection / self.length:.3g}"
+def only_pressed(stretch: Array) -> bool:
+    """True if the stretches (N,) lie below 1, but for what is noise about the rest."""
+    above, below = float(np.max(stretch)) - 1.0, 1.0 - float(np.min(stretch))
+    return above <= ABOVE_REST * below
 
 
 def _pushes(m: Measurement) -> bool:

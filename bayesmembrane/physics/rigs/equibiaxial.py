@@ -21,6 +21,7 @@ class Equibiaxial(Strip):
     name: ClassVar[str] = "equibiaxial"
     title: ClassVar[str] = "equibiaxial film"
     proposal: ClassVar[str] = "a sheet pulled equally both ways (equibiaxial)"
+    pressed: ClassVar[str] = "equibiaxial_compression"
 
     @staticmethod
     def lateral(stretch: Array, across: Array | None = None) -> tuple[Array, Array]:

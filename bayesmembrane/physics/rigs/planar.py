@@ -21,6 +21,7 @@ class Planar(Strip):
     name: ClassVar[str] = "planar"
     title: ClassVar[str] = "planar strip (pure shear)"
     proposal: ClassVar[str] = "a wide short strip pulled lengthwise (planar)"
+    pressed: ClassVar[str] = "planar_compression"
 
     @staticmethod
     def lateral(stretch: Array, across: Array | None = None) -> tuple[Array, Array]:

@@ -21,6 +21,7 @@ class Uniaxial(Strip):
     name: ClassVar[str] = "uniaxial"
     title: ClassVar[str] = "uniaxial strip"
     proposal: ClassVar[str] = "a strip pulled lengthwise (uniaxial)"
+    pressed: ClassVar[str] = "compression"
 
     @staticmethod
     def lateral(stretch: Array, across: Array | None = None) -> tuple[Array, Array]:

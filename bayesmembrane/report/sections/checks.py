@@ -65,7 +65,8 @@ def masses_table(shown: Sequence[Shown]) -> Table:
 
 def crosscheck_table(shown: Sequence[Shown]) -> Table:
     """What the second solver found."""
-    unit = "stretch" if alike(s.how for s in shown).rest else "mm"
+    how = alike(s.how for s in shown)
+    unit = how.travel if how.bare else how.travel_scale[1]
     columns = (
         Column("run", "material"),
         end_column(shown),

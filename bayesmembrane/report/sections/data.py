@@ -38,7 +38,7 @@ def _table(s: Shown, before: str, end: str) -> Table:
     """What is known of a measurement; an origin that is that of the table ``before`` is not told again."""
     d, film, how = s.digest, s.film, s.how
     factor, unit = how.small
-    of = "" if how.rest else f" of {how.travel}"
+    of = "" if how.bare else f" of {how.travel}"
     low, high = (float(f(how.carried(d.force))) for f in (np.min, np.max))
     noise = (
         f"stated noise {factor * float(np.min(d.sd)):.3g} to {factor * float(np.max(d.sd)):.3g} {unit} (sd)"
@@ -50,7 +50,7 @@ def _table(s: Shown, before: str, end: str) -> Table:
         "thickness": f"{1e6 * film.thickness:.4g} um",
         "rig": _rig(film),
         "points": f"{d.at.size}, from {how.place(float(np.min(d.at)))} to {s.end}{of}",
-        "stresses" if how.rest else "forces": f"{low:.4g} to {high:.4g} {how.load_scale[1]}; {noise}",
+        "stresses" if how.bare else "forces": f"{low:.4g} to {high:.4g} {how.load_scale[1]}; {noise}",
         "whole measurement": f"up to {how.place(d.full_range)}",
         "files": ", ".join(f for f in film.files if f) or "-",
         "origin": "as above" if before and film.origin == before else film.origin or "not stated",

@@ -84,7 +84,7 @@ def optima_table(fits: Sequence[Fit]) -> Table:
     load, small = how.load_scale, how.small
     columns = (
         Column("model", "model"),
-        Column("end_mm" if not how.rest else "end", f"fitted up to, {how.travel_label}"),
+        Column("end_mm" if not how.bare else "end", f"fitted up to, {how.travel_label}"),
         Column("loss", "loss"),
         Column(f"loss_{load[1]}", f"loss ({load[1]})"),
         Column(f"rmse_{small[1]}", f"rms residual ({small[1]})", ".3g"),

@@ -148,6 +148,9 @@ def _tests(run: JointRun) -> Table:
             )
         )
     caption = "Every test at the most probable draw. Chi-square and p-value use the noise that the test states."
+    for part in run.joint.parts:
+        if not part.measurement.rig.homogeneous and (said := part.measurement.rig.remark_on_units(1.0)):
+            caption += f" {part.label}: {said}."
     return Table("joint tests", caption, columns, tuple(rows))
 
 

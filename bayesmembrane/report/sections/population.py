@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.calibration.hierarchy.next_curve import NextCurve
 from bayesmembrane.calibration.hierarchy.population import Population
 from bayesmembrane.ground.stored import read
 from bayesmembrane.report.blocks import Block, Column, Figure, Picture, Table, points
-from bayesmembrane.report.canvas import encoded, new_figure, style
+from bayesmembrane.report.canvas import Shade, band, encoded, new_figure, style
 from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
 from bayesmembrane.report.style import FAINT, INK, MUTED, RANGE_COLOURS
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.population import rows, sentences
+from bayesmembrane.words.seen import seen_on
 
 
 class PopulationSection(Section):
@@ -40,6 +42,7 @@ class PopulationSection(Section):
                 "of the next specimen (orange).",
             )
             out += [*points(list(sentences(found))), _table(found), figure]
+            out += [] if found.next_curve is None else [_next_curve(found.next_curve)]
         return out
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
@@ -66,6 +69,37 @@ def _table(found: Population) -> Table:
     )
     caption = "The population: its mean, the standard deviation between specimens, and a specimen not yet tested."
     return Table("population", caption, columns, tuple(rows(found)))
+
+
+def _next_curve(curve: NextCurve) -> Figure:
+    return Figure(
+        next_picture(curve),
+        alt="The force curve of the next specimen as a band, with the curves of those that were tested",
+        caption=f"The next specimen, {1e6 * curve.thickness:.4g} um thick, on the rig {curve.rig.name}: 90 % bands of "
+        "its curve (orange) and of a measurement of it (light), and of a middling specimen, known as well as the mean "
+        "of the population is (blue). Points: the specimens that were tested, as if all were as thick.",
+    )
+
+
+def next_picture(curve: NextCurve) -> Picture:
+    """The bands of the next curve over the tested ones."""
+    how, here = seen_on(curve.rig, curve.thickness), np.isfinite(curve.curve[1])
+    x = how.along(curve.deflection)
+    with style():
+        figure = new_figure(4.6)
+        ax = figure.subplots()
+        band(ax, x, how.carried(curve.reading), here, Shade(RANGE_COLOURS[1], 0.15))
+        band(ax, x, how.carried(curve.curve), here, Shade(RANGE_COLOURS[1], 0.35))
+        band(ax, x, how.carried(curve.middle), here, Shade(RANGE_COLOURS[0], 0.5))
+        ax.plot(x[here], how.carried(curve.curve[1])[here], color=RANGE_COLOURS[1], label="next specimen")
+        for label, at, force in curve.tested:
+            ax.plot(how.along(at), how.carried(force), ".", markersize=3.5, label=label)
+        ax.set_xlabel(how.travel_label)
+        ax.set_ylabel(how.load_label)
+        ax.set_ylim(bottom=0.0)
+        ax.grid(color=FAINT, linewidth=0.6)
+        ax.legend(loc="upper left", ncols=2)
+        return encoded(figure, "svg")
 
 
 def specimens_picture(found: Population) -> Picture:

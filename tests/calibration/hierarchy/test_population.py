@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from bayesmembrane.calibration.beside_paper import paper_break_points
+from bayesmembrane.calibration.hierarchy.next_curve import population_of_runs
 from bayesmembrane.calibration.hierarchy.population import WIDE, Population, population
 from bayesmembrane.calibration.hierarchy.specimens import LN_MODULUS, Specimens, of_runs
 from bayesmembrane.calibration.run import Run, RunSettings, sample
@@ -125,6 +126,51 @@ def test_runs_of_films_of_any_thickness_become_one_population() -> None:
     assert set(told["parameters"]["ln_modulus"]["specimens"]) == set(found.labels)
     with pytest.raises(SettingsError, match="coordinate"):
         of_runs(runs, ["bend"])
+
+
+def test_the_band_of_the_next_curve_is_that_of_its_modulus() -> None:
+    """A neo-Hookean strip: F = G d width (l - l^-2), so that every quantile of F is one of G."""
+    runs = walked((10.0, 12.0, 11.0))
+    found = population_of_runs(runs)
+    curve = found.next_curve
+    assert curve is not None
+    assert not curve.without_form
+    stretch = 1 + curve.deflection / STRIP.length
+    unit = STRIP.width * 1e-4 * (stretch - stretch**-2)
+    for theta, band in ((found.following, curve.curve), (found.mean, curve.middle)):
+        modulus = np.exp(theta[:, 0])
+        for q, force in zip((0.05, 0.5, 0.95), band, strict=True):
+            at = force / unit
+            assert at == pytest.approx(at[0], rel=1e-9)
+            share = np.mean(modulus < at[0])
+            assert abs(share - q) < 5.5 * np.sqrt(q * (1 - q) / 400)
+    assert np.all(curve.reading[2] > curve.curve[1])
+    assert np.all(curve.lost == 0)
+    assert [label for label, *_ in curve.tested] == list(found.specimens.labels)
+    for (_, at, force), c1 in zip(curve.tested, (10.0, 12.0, 11.0), strict=True):  # as if all were 0.1 mm thick
+        stretch = 1 + at / STRIP.length
+        assert force == pytest.approx(STRIP.width * 2 * c1 * (stretch - stretch**-2), rel=0.2, abs=0.1)
+    told = found.summary()["next_curve"]
+    assert told["force_N"]["q95"] == curve.curve[2].tolist()
+
+
+def test_what_is_not_pooled_is_that_of_a_tested_specimen() -> None:
+    """Only the modulus is pooled: the shape of the next curve is one that was calibrated."""
+    how = RunSettings(settings=Settings(ess=1e6, walkers=16, chunk=60, most_steps=60))
+    claim = hypothesis("mooney_rivlin", convexity="none")
+    runs = [
+        sample(made(STRIP, "mooney_rivlin", (c, 0.5 * c), seed=i, specimen=f"strip {i}"), claim, how)
+        for i, c in enumerate((10.0, 11.0))
+    ]
+    found = population_of_runs(runs, ["ln_modulus"])
+    curve = found.next_curve
+    assert curve is not None
+    share = np.concatenate([run.draws()[:, 1] for run in runs])
+    stretch = 1 + curve.deflection[-1] / STRIP.length
+    shape = (stretch - stretch**-2) * ((1 - share) + share / stretch)  # of G d (1 - s, s) / 2
+    force = STRIP.width * 1e-4 * np.exp(found.following[:, [0]]) * shape[::7]  # every modulus with every shape
+    for q, at in zip((0.05, 0.5, 0.95), curve.curve[:, -1], strict=True):
+        assert abs(np.mean(force < at) - q) < 5.5 * np.sqrt(q * (1 - q) / 400)
 
 
 def test_what_makes_no_population_is_said() -> None:

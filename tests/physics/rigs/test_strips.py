@@ -369,11 +369,10 @@ def compressed(stretch: np.ndarray, sign: float = 1.0) -> str:
     return "stretch,nominal_stress_MPa\n" + rows
 
 
-def test_compression_alone_is_refused_and_no_sign_is_to_be_changed(files: Files) -> None:
+def test_an_order_that_no_press_has_is_refused(files: Files) -> None:
     said = files.fault(compressed(np.linspace(0.5, 0.98, 9)))
-    assert "a test in compression alone cannot be calibrated" in said
-    assert "change the sign" not in said
-    assert "keep the signs as they are" in said
+    assert "the stretch rises from the first line on" in said
+    assert "from a stretch of 1 down" in said
 
 
 @pytest.mark.parametrize(

@@ -206,7 +206,8 @@ def _map(s: Shown) -> Figure:
     d = s.digest
     shares = listed(f"{m} {percent(v)}" for m, v in d.convex.items())
     alike = s.film.rig.homogeneous
-    places = "stretches (-)" if alike else "deflections (mm)"
+    along = "stretches" if s.how.travel == "stretch" else f"values of {s.how.travel}"
+    places = f"{along} (-)" if alike else "deflections (mm)"
     states = "the state of the film" if alike else "the states that its film passes from the ring to the disc"
     plane = Plane(d.map_1, d.map_2, d.eigenvalue, d.shape_at, d.state_1, d.state_2, s.how)
     return Figure(

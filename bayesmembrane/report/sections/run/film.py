@@ -82,7 +82,7 @@ def convexity_map(plane: Plane, material: str) -> Picture:
         for k in range(deflections.size):
             ax.plot(state_1[k], state_2[k], marker=spot, color="white", linewidth=4)
             value = plane.how.rest + plane.how.travel_scale[0] * float(deflections[k])
-            name = f"{value:.3g}" if plane.how.rest else f"{value:.3g} {plane.how.travel_scale[1]}"
+            name = f"{value:.3g}" if plane.how.bare else f"{value:.3g} {plane.how.travel_scale[1]}"
             ax.plot(state_1[k], state_2[k], marker=spot, color=shades[k], linewidth=2.2, label=name)
         ax.set_xlim(float(l1[0]), float(l1[-1]))
         ax.set_ylim(float(l2[0]), float(l2[-1]))
@@ -92,7 +92,7 @@ def convexity_map(plane: Plane, material: str) -> Picture:
         bar.set_label("least eigenvalue / $Gd$ (-)")
         bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:.4g}"))
         ax.legend(
-            title="reached at a stretch of" if plane.how.rest else "reached at",
+            title=f"reached at a {plane.how.travel} of" if plane.how.bare else "reached at",
             loc="upper right",
             frameon=True,
             framealpha=0.9,
