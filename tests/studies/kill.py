@@ -35,19 +35,25 @@ MOMENTS = ("begun", "written", "synced", "renamed")
 """Of the writing of a segment: its file is there and empty, holds all, is on the disk, has its name."""
 SAVE_AFTER, USUAL = 0.05, walk.SAVE_AFTER  # s, so that there are many
 MOST_KILLS = 4  # of one run
+LEAPS = 150  # steps by a mixture in the time of one by emcee's ensembles, about
 
 
 @dataclass(frozen=True)
 class Case:
-    """A run, by the name of what it samples, and its seed."""
+    """A run, by the name of what it samples, and its seed: by a mixture if that is odd, else by emcee's ensembles."""
 
     name: str
     seed: int
-    steps: int
+    walked: int
+
+    @property
+    def steps(self) -> int:
+        return self.walked * LEAPS if self.seed % 2 else self.walked
 
     def sampled(self, out: Path) -> Run:
         measurement, claim = _question(self.name, self.seed)
-        settings = Settings(ess=1e6, walkers=8, chunk=30, most_steps=self.steps)
+        sampler = "auto" if self.seed % 2 else "emcee"
+        settings = Settings(ess=1e9, walkers=8, chunk=30, most_steps=self.steps, sampler=sampler)
         how = RunSettings(self.seed, out, settings=settings, predictions=False)
         solver = CachedSolver(out / "curves") if self.name.startswith("ring") else solve
         return sample(measurement, claim, how, solve=solver)
@@ -237,10 +243,11 @@ def table(count: Count, steps: int, seed: int) -> str:
     return f"""# Runs that are killed
 
 `make study-kill` (`python -m tests.studies.kill --kills {count.kills} --steps {steps} --seed {seed}`):
-bands and rings, neo-Hookean and Mooney-Rivlin, white and AR(1) noise, {steps} steps with {1000 * SAVE_AFTER:.0f} ms
-between segments instead of {USUAL:.0f} s, so that there are many to be hit. A child is killed at a random moment, or
-where it writes a segment: its file is begun, written, synced, or renamed and its folder not yet synced. Up to
-{MOST_KILLS} kills a run, then it is let finish and compared: walk, generators, counts, every stored array.
+bands and rings, neo-Hookean and Mooney-Rivlin, white and AR(1) noise, half of them {steps} steps of emcee's
+ensembles and half {steps * LEAPS} proposed by a mixture, with {1000 * SAVE_AFTER:.0f} ms between segments instead of
+{USUAL:.0f} s, so that there are many to be hit. A child is killed at a random moment, or where it writes a segment: its
+file is begun, written, synced, or renamed and its folder not yet synced. Up to {MOST_KILLS} kills a run, then it is let
+finish and compared: walk, generators, counts, every stored array.
 
 | | |
 |---|---|
