@@ -27,6 +27,7 @@ class Chains:
     lessons : steps after which the proposal was learned
     look : steps at which it is to be judged next whether all is there; 0 if that was not said yet
     mixture : from which every step is proposed, whatever was walked before; None if ensembles move by emcee's moves
+    leapt : steps that a mixture proposed before emcee's ensembles went on
     offered : (E, steps, walkers) ln of p / mixture at what was proposed, nan where nothing was; None without a mixture
     """
 
@@ -39,6 +40,7 @@ class Chains:
     look: int = 0
     mixture: Mixture | None = None
     offered: Array | None = None
+    leapt: int = 0
 
     @property
     def steps(self) -> int:

@@ -147,6 +147,7 @@ def _packed(part: Chains) -> bytes:
         "seconds": part.seconds,
         "lessons": part.lessons,
         "look": part.look,
+        "leapt": part.leapt,
     }
     if part.mixture is not None and part.offered is not None:
         g = part.mixture
@@ -168,7 +169,7 @@ def _unpacked(payload: bytes) -> Chains:
         lessons = tuple(int(s) for s in about["lessons"])
         counts, seconds, look = Outcomes(about["counts"]), float(about["seconds"]), int(about["look"])
         counts.examples = {str(label): tuple(map(float, at)) for label, at in about["examples"].items()}
-        chains = Chains(x, f["log_posterior"], states, counts, seconds, lessons, look)
+        chains = Chains(x, f["log_posterior"], states, counts, seconds, lessons, look, leapt=int(about.get("leapt", 0)))
         if "degrees" not in about:
             return chains
         mixture = Mixture(f["log_weights"], f["means"], f["roots"], float(about["degrees"]))

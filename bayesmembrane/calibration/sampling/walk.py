@@ -32,6 +32,7 @@ SAMPLERS = ("auto", "emcee")
 SURE = 0.02
 """Standard error of ln Z up to which a mixture is drawn from, if `MOST_FOR_Z` draws do for that."""
 MOST_FOR_Z = 10_000
+SLOW = 1000  # steps for `LEAST_TAUS`, from which on emcee's ensembles are as fast as a mixture that holds them up
 DOUBTED = 5000  # draws of a mixture after which it is looked at for the first time
 GROWTH = 1.25  # a look costs little, but nothing is learned from looking at every step
 
@@ -145,14 +146,13 @@ def run_ensembles(
             found = convergence(walk.chains)
             if progress is not None:
                 progress(_progress(walk.chains, found, settings))
-            good = _good(walk.chains)
-            if good and found.enough(settings.ess):
+            if found.enough(settings.ess) and _good(walk.chains):
                 status = "converged"
                 break
             if walk.chains.steps >= settings.most_steps:
                 status = "step limit"
                 break
-            if walk.chains.steps >= next_lesson(walk.chains) or not good:
+            if walk.chains.steps >= next_lesson(walk.chains) or not _worth_it(walk.chains, found):
                 walk.learn()
             target = min(settings.most_steps, _next_look(walk.chains, found, settings))
         if asked.signalled:  # a signal that came at the very end still ends what follows
@@ -164,6 +164,12 @@ def run_ensembles(
 def _good(chains: Chains) -> bool:
     """Whether what was offered so far allows to go on as before."""
     return chains.mixture is None or offers(chains).good
+
+
+def _worth_it(chains: Chains, found: Convergence) -> bool:
+    """Whether it is still worth while to have a mixture propose, if one does."""
+    slow = LEAST_TAUS * float(np.max(found.tau)) > SLOW
+    return chains.mixture is None or (not slow and _good(chains))
 
 
 def _next_look(chains: Chains, found: Convergence, settings: Settings) -> int:
@@ -278,8 +284,8 @@ class _Walk:
         """Have emcee's ensembles propose from now on what can be known by now."""
         if self.chains.mixture is not None:
             self.save()  # a segment holds steps of one kind
-        lessons = (*self.chains.lessons, self.chains.steps)
-        self.chains = replace(self.chains, lessons=lessons, mixture=None, offered=None)
+            self.chains = replace(self.chains, mixture=None, offered=None, leapt=self.chains.steps)
+        self.chains = replace(self.chains, lessons=(*self.chains.lessons, self.chains.steps))
         self.standing = (self.chains.steps, self.chains)
         self.known = learn(self.posterior, self.chains)
 

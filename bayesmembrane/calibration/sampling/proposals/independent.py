@@ -18,8 +18,10 @@ ROUNDS, EACH = 6, 400
 """Rounds at most, and draws of the mixture that are solved in each."""
 ENOUGH, GAIN = 0.5, 1.15
 """A proposal of this efficiency is good enough, and one that gains less than this factor in two rounds the last."""
-LEAST = 0.03
-"""A chain with less than this efficiency is stuck for too long: then ensembles walk."""
+LEAST = 0.25
+"""A chain of less than this efficiency is stuck for so long that ensembles are as fast."""
+HOPELESS, TRIED = 0.1, 3
+"""Where the best of so many rounds is below this, no more are tried."""
 DEPTH = 6.0
 """An emulator is learned where ln p is less than this, and one for each coordinate, below its largest value: nearly
 all of the posterior is there, and a polynomial that must follow more follows less well."""
@@ -79,7 +81,8 @@ def _enough(judged: Worth) -> bool:
 def _settled(found: list[Independent]) -> bool:
     """Whether the last two rounds found next to nothing better than those before."""
     sizes = [f.worth.efficiency for f in found]
-    return len(sizes) > 2 and max(sizes[-2:]) < GAIN * max(sizes[:-2])
+    hopeless = len(sizes) >= TRIED and max(sizes) < HOPELESS
+    return hopeless or (len(sizes) > 2 and max(sizes[-2:]) < GAIN * max(sizes[:-2]))
 
 
 def _learned(posterior: Posterior, tried: Tried, states: Array, rng: np.random.Generator) -> Mixture:

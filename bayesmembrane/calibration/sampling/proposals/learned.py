@@ -70,4 +70,8 @@ def next_lesson(chains: Chains) -> int:
     """Steps after which the proposal may be learned (anew); none while all steps are proposed by one mixture."""
     if chains.mixture is not None:
         return sys.maxsize
-    return int(NEXT_LESSON * chains.lessons[-1]) if chains.lessons else FIRST_LESSON
+    if not chains.lessons:
+        return FIRST_LESSON
+    # What a mixture proposed counts as the steps before the first lesson, however many those were.
+    walked = max(FIRST_LESSON, chains.lessons[-1] - chains.leapt) if chains.leapt else chains.lessons[-1]
+    return int(chains.lessons[-1] + (NEXT_LESSON - 1) * walked)
