@@ -143,7 +143,7 @@ def tested(d: Diagnosis) -> str:
 def _probabilities(course: Course) -> tuple[str, ...]:
     """``98 % friction in the guide (level 12 mN)``, ``1 % no effect``: what each round named, then the last answer."""
     d = course.telling
-    earlier = [_told(x, set_name(x.best, x.null.names), course) for x in course.named if x is not d]
+    earlier = [_probable_set(x, set_name(x.best, x.null.names), course) for x in course.named if x is not d]
     first, *others = _every(course)
     return *earlier, f"then {first}" if earlier else first, *others
 
@@ -153,7 +153,7 @@ def _every(course: Course) -> list[str]:
     p = d.probabilities
     probable = [name for name, q in p.effects.items() if q >= WORDS.probable][:MOST_TOLD]
     sizes = np.cumsum([len(name.split("+")) for name in probable])
-    told = [_told(d, n, course, bool(k <= MOST_SIZES)) for n, k in zip(probable, sizes, strict=True)]
+    told = [_probable_set(d, n, course, bool(k <= MOST_SIZES)) for n, k in zip(probable, sizes, strict=True)]
     foreign = p.anything_foreign
     if foreign >= WORDS.probable:
         told.insert(0 if foreign > 0.5 else len(told), f"{percent(foreign)} something foreign")
@@ -162,7 +162,7 @@ def _every(course: Course) -> list[str]:
     return told
 
 
-def _told(d: Diagnosis, name: str, course: Course, sized: bool = True) -> str:
+def _probable_set(d: Diagnosis, name: str, course: Course, sized: bool = True) -> str:
     """A set of effects with its probability; where the answer rests on it with the sizes, as they were fitted last."""
     p = percent(d.probabilities.effects.get(name, 0.0))
     of = next((j.candidate for j in d.members if set_name(j.candidate, d.null.names) == name), None)

@@ -55,7 +55,11 @@ def verb(
     settings = {"parameters": made.vector.tolist(), "box": edges}
     what = Asked("convexity", "", made.name, float("nan"), digest(settings))
     kept_as = kept("convexity", {**document, **settings}, document, what, stored.folder)
-    answer(kept_as.document, output.as_json, lambda: say(f"{sentence}\n{_told(document['stability_limits'])}"))
+    answer(
+        kept_as.document,
+        output.as_json,
+        lambda: say(f"{sentence}\n{_stability_sentence(document['stability_limits'])}"),
+    )
 
 
 def _limits(film: Material) -> dict[str, dict[str, float | None]]:
@@ -68,7 +72,7 @@ def _limits(film: Material) -> dict[str, dict[str, float | None]]:
     return found
 
 
-def _told(limits: Any) -> str:
+def _stability_sentence(limits: Any) -> str:
     """The limits in a line."""
     said = [f"{mode} {side} {limit:.4g}" for mode, sides in limits.items() for side, limit in sides.items() if limit]
     return f"It loses stability (Drucker) at the stretches: {', '.join(said) or 'none between 0.1 and 10'}."

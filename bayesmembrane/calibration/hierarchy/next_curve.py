@@ -49,16 +49,16 @@ class NextCurve:
     def summary(self) -> dict[str, Any]:
         """Plain values of the JSON answer: quantiles by name at every deflection."""
 
-        def told(band: Array) -> dict[str, list[float]]:
+        def quantiles(band: Array) -> dict[str, list[float]]:
             return {f"q{100 * q:02.0f}": band[i].tolist() for i, q in enumerate(QUANTILES)}
 
         return {
             "rig": self.rig.name,
             "thickness_um": 1e6 * self.thickness,
             "deflection_mm": (1e3 * self.deflection).tolist(),
-            "force_N": told(self.curve),
-            "reading_N": told(self.reading),
-            "mean_specimen_N": told(self.middle),
+            "force_N": quantiles(self.curve),
+            "reading_N": quantiles(self.reading),
+            "mean_specimen_N": quantiles(self.middle),
             "lost": self.lost.tolist(),
         }
 

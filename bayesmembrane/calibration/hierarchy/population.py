@@ -9,10 +9,10 @@ import numpy as np
 from scipy import stats
 
 from bayesmembrane.calibration.hierarchy.specimens import LN_MODULUS, Specimens
+from bayesmembrane.calibration.outcome import marginal
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.ground.showable import Showable
 
 if TYPE_CHECKING:
@@ -54,14 +54,14 @@ class Population(Showable):
         parameters = {}
         for i, name in enumerate(s.names):
             parameters[name] = {
-                "mean": _told(self.mean[:, i]),
-                "scatter": _told(self.scatter[:, i]),
-                "next": _told(self.following[:, i]),
+                "mean": marginal(self.mean[:, i]),
+                "scatter": marginal(self.scatter[:, i]),
+                "next": marginal(self.following[:, i]),
                 "scatter_prior_scale": float(WIDE * s.spread[i]),
                 "specimens": {
                     label: {
                         "alone": {"mean": float(s.values[j, i]), "sd": float(np.sqrt(s.covariances[j, i, i]))},
-                        "pooled": _told(self.own[:, j, i]),
+                        "pooled": marginal(self.own[:, j, i]),
                     }
                     for j, label in enumerate(s.labels)
                 },
@@ -83,11 +83,11 @@ class Population(Showable):
         i = self.specimens.names.index(LN_MODULUS)
         middle = 1e-6 * np.exp(self.mean[:, i])
         return {
-            "mean": _told(middle),
-            "scatter": _told(
+            "mean": marginal(middle),
+            "scatter": marginal(
                 middle * np.sqrt(np.expm1(self.scatter[:, i] ** 2)) * np.exp(0.5 * self.scatter[:, i] ** 2)
             ),
-            "next": _told(1e-6 * np.exp(self.following[:, i])),
+            "next": marginal(1e-6 * np.exp(self.following[:, i])),
         }
 
 
@@ -203,8 +203,3 @@ def _proposed(proposal: tuple[Array, Array], scale: Array, rng: np.random.Genera
     near = np.reshape(stats.multivariate_t(*proposal, df=DEGREES, seed=rng).rvs(TRIED), (TRIED, -1))
     far = np.log(np.abs(rng.standard_normal((TRIED, scale.size))) * scale)
     return np.where(rng.random((TRIED, 1)) < FROM_PRIOR, far, near)
-
-
-def _told(values: Array) -> dict[str, Any]:
-    low, high = arviz.hdi(values, hdi_prob=0.94)  # type: ignore[no-untyped-call]
-    return {"mean": float(np.mean(values)), "sd": float(np.std(values)), "hdi_94": [float(low), float(high)]}

@@ -18,7 +18,7 @@ REGULAR, SKIPS = 0.01, 5
 """Times whose steps differ by no more than this part are regular, and so few steps of twice the size are gaps."""
 
 
-def apart(what: str, said: Array, other: Array, lines: Sequence[int], tolerance: float = APART) -> str:
+def contradiction(what: str, said: Array, other: Array, lines: Sequence[int], tolerance: float = APART) -> str:
     """A sentence on the rows in which ``said`` (N,) and ``other`` (N,) differ; "" if they agree.
 
     ``what`` names both, "A and B".
@@ -63,7 +63,7 @@ def speed_against(travel: Array, time: Array, speed: float, lines: Sequence[int]
     if first < 5:
         return ""
     t, x = time[:first] - time[0], np.abs(travel[:first] - travel[0])
-    return apart(
+    return contradiction(
         f"the stated speed of {6e4 * speed:.4g} mm/min times the time and the travel (mm)",
         1e3 * speed * t,
         1e3 * x,

@@ -9,7 +9,7 @@ import numpy as np
 from bayesmembrane.data.exports.columns import Read, best, read
 from bayesmembrane.data.exports.export import Export
 from bayesmembrane.data.exports.film import Film
-from bayesmembrane.data.exports.relations import apart, gauge_length_behind, logarithmic_length_behind
+from bayesmembrane.data.exports.relations import contradiction, gauge_length_behind, logarithmic_length_behind
 from bayesmembrane.data.exports.signs import signed, zeroed
 from bayesmembrane.data.exports.words import STRAIN, STRETCH, TRAVEL
 from bayesmembrane.ground.errors import DataError
@@ -25,7 +25,7 @@ def stretch_of(export: Export, film: Film, load: Read | None) -> tuple[Array, Ar
     if by_length is not None and (stated is None or export.hints.gauge_length):
         if stated is not None:
             export.contradict(
-                apart("travel over gauge length and the file's own strain", by_length, stated, export.lines)
+                contradiction("travel over gauge length and the file's own strain", by_length, stated, export.lines)
             )
         export.guess(
             "stretch", "1 + travel / gauge length", f"the gauge length is {1e3 * (film.length or 0):g} mm", "--columns"
@@ -35,7 +35,9 @@ def stretch_of(export: Export, film: Film, load: Read | None) -> tuple[Array, Ar
         fault = "the travel cannot become a stretch: the gauge length is not known"
         raise DataError(fault, export.block.place, "say --gauge-length-mm")
     if by_length is not None:
-        export.contradict(apart("travel over gauge length and the file's own strain", by_length, stated, export.lines))
+        export.contradict(
+            contradiction("travel over gauge length and the file's own strain", by_length, stated, export.lines)
+        )
     return stated, travel
 
 
@@ -130,13 +132,13 @@ def nominal_of(
         true, stress = stress, None
     if true is not None and stress is not None:
         export.contradict(
-            apart(
+            contradiction(
                 "true stress and engineering stress times stretch", true.values, stress.values * stretch, export.lines
             )
         )
     if stress is not None and by_force is not None:
         export.contradict(
-            apart("stress and force over width and thickness (Pa)", stress.values, by_force, export.lines)
+            contradiction("stress and force over width and thickness (Pa)", stress.values, by_force, export.lines)
         )
     if by_force is not None and (stress is None or (export.hints.width and export.hints.thickness)):
         size = f"{1e3 * (film.width or 0):g} mm times {1e3 * (film.thickness or 0):g} mm"

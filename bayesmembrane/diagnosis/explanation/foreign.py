@@ -92,7 +92,7 @@ def foreign(search: Search, base: Candidate) -> list[Foreign]:
         trace = family.traces[:, best * family.width : (best + 1) * family.width] @ mean[-family.width :]
         gain = z.log_evidence - weighed(model, base.theta).log_evidence + spread
         found = Foreign(family.kind, base, gain, spread, trace=trace, share=_share(search, base, trace))
-        out.append(_told(m, found, best, float(mean[-family.width])))
+        out.append(_with_size(m, found, best, float(mean[-family.width])))
     out += [f for f in (_unnamed(search, base), _clipped(search, base)) if f is not None]
     return out
 
@@ -176,7 +176,7 @@ def _slope(deflection: Array, force: Array) -> Array:
     return np.asarray(fit.deriv()(deflection))
 
 
-def _told(m: Measurement, found: Foreign, best: int, coefficient: float) -> Foreign:
+def _with_size(m: Measurement, found: Foreign, best: int, coefficient: float) -> Foreign:
     """With what the most probable member says of itself."""
     if found.kind == PLAY:
         return replace(found, size=abs(coefficient) * FOREIGN.play * m.path.full_range)

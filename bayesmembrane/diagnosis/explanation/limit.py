@@ -41,7 +41,7 @@ def limit_of(search: Search, base: Candidate) -> Limit | None:
         # Each is within rounding of the limit.
         constant = -(flat.readings - 1) * float(np.log(max(flat.step, 1e-6 * flat.force)))
         found = _beside(search, base, at)
-        return None if found is None else _told(search, base, found, at, flat.force, constant)
+        return None if found is None else _with_evidence(search, base, found, at, flat.force, constant)
     return _noisy(search, base)
 
 
@@ -57,7 +57,7 @@ def _noisy(search: Search, base: Candidate) -> Limit | None:
         if found is None:
             return None
         level = float(np.mean(m.force[at]))
-        told = _told(search, base, found, at, level, _constant(search, at))
+        told = _with_evidence(search, base, found, at, level, _constant(search, at))
         whole = search.at(found.hypothesis, found.x)
         beyond = at if whole is None else m.force - whole.residual > level
         if np.array_equal(beyond, at):
@@ -97,7 +97,7 @@ def _others(search: Search, at: NDArray[np.bool_]) -> Search:
     return Search(m, search.noise.part(m, ~at), search.seed, search.solve)
 
 
-def _told(
+def _with_evidence(
     search: Search, base: Candidate, others: Candidate, at: NDArray[np.bool_], force: float, constant: float
 ) -> Limit:
     """With the evidence of the ``others``; the limit itself lies anywhere up to twice the force."""

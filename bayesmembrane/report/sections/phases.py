@@ -43,11 +43,11 @@ class PhasesSection(Section):
                 "far. Hollow marks are turning points that were read off the curve, full ones were said by its columns."
             )
             alt = f"The {how.travel} along the test in {int(phases.cycle.max())} cycles"
-            out += [Text(told(phases, how)), Figure(picture(phases, how), alt, caption), table(phases, how)]
+            out += [Text(phases_sentence(phases, how)), Figure(picture(phases, how), alt, caption), table(phases, how)]
         return tuple(out)
 
 
-def told(phases: Phases, how: Seen) -> str:
+def phases_sentence(phases: Phases, how: Seen) -> str:
     """What was read off, and by which rule."""
     cycles = int(phases.cycle.max())
     found = f"{len(phases.parts)} phases in {cycles} cycle{'s' if cycles > 1 else ''}"
