@@ -17,6 +17,7 @@ Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.mark.usefixtures("short_walks")
+@pytest.mark.study
 def test_force_and_contour_at_the_command_line(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     d = np.linspace(5 * MM, 35 * MM, 8)

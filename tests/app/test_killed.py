@@ -60,6 +60,7 @@ def test_killed_and_asked_again_is_as_if_it_had_not_been(verb: str, more: list[s
     assert not list((disturbed / "out").glob(f"*/{FOLDER}")), "the answer is there, and its pieces are gone"
 
 
+@pytest.mark.study
 def test_a_worker_killed_in_a_loop_and_a_valley_of_a_campaign(tmp_path: Path) -> None:
     """Whoever takes their tasks finds the same to the last bit, and the page has their row and their links."""
     wanted = {"hypotheses": 'materials = ["neo_hookean"]', "analyses": 'wanted = ["valleys", "loop"]\npages = false'}

@@ -136,7 +136,7 @@ def test_killed_anywhere_and_continued_equals_never_killed(tmp_path: Path, monke
     whole = sample(strip(), claim, replace(how, out=tmp_path / "whole"))
     assert whole.status["sampler"] == "mixture"
     wanted, needed = Segments(whole.path).read(), calls["made"]  # type: ignore[arg-type]
-    for fatal in (needed // 4, needed // 2, needed - 4, needed - 3):
+    for fatal in (needed // 2, needed - 4):
         calls.update({"made": -calls["made"], "fatal": fatal - calls["fatal"]})
         with pytest.raises(KilledError):
             sample(strip(), claim, replace(how, out=tmp_path / f"{fatal}"))
@@ -159,7 +159,7 @@ def test_more_draws_go_on_with_the_same_mixture(tmp_path: Path) -> None:
     assert more.status["importance"]["log_evidence_sd"] < few.status["importance"]["log_evidence_sd"]
 
 
-@pytest.mark.parametrize("material", ["neo_hookean", "gent", "mooney_rivlin"])
+@pytest.mark.parametrize("material", ["neo_hookean", "gent", pytest.param("mooney_rivlin", marks=pytest.mark.study)])
 def test_mixture_equals_emcee(material: str) -> None:
     """Means and spreads of all coordinates are those of emcee's walk, within six errors of the difference."""
     claim = hypothesis(material)
