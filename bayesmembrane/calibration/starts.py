@@ -54,11 +54,11 @@ class Tried:
 def starting_points(
     posterior: Posterior, rng: np.random.Generator, ensembles: int, walkers: int, counts: Outcomes
 ) -> Array:
-    """`Tried.starts` (E, W, k) of what was `tried`; raises `SettingsError` as that does."""
-    return tried(posterior, rng, ensembles * walkers, counts).starts(rng, ensembles, walkers)
+    """`Tried.starts` (E, W, k) of what `try_points` found; raises `SettingsError` as that does."""
+    return try_points(posterior, rng, ensembles * walkers, counts).starts(rng, ensembles, walkers)
 
 
-def tried(posterior: Posterior, rng: np.random.Generator, wanted: int, counts: Outcomes) -> Tried:
+def try_points(posterior: Posterior, rng: np.random.Generator, wanted: int, counts: Outcomes) -> Tried:
     """Points around the valleys of the posterior, at least ``wanted`` of them possible.
 
     They are prior draws brought to their best modulus, draws around the valleys that a descent finds from them, and

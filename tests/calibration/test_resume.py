@@ -177,7 +177,7 @@ def test_more_draws_go_on_from_fewer_and_leave_them(tmp_path: Path, monkeypatch:
     first = sample(strip(), CLAIM, how(tmp_path, short))
     before = load_run(first.path)  # type: ignore[arg-type]
     with monkeypatch.context() as patch:
-        patch.setattr(walk, "tried", None)
+        patch.setattr(walk, "try_points", None)
         more = sample(strip(), CLAIM, how(tmp_path, long))
     assert more.path != first.path
     assert more.status["steps"] == 70

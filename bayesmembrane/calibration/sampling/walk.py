@@ -22,7 +22,7 @@ from bayesmembrane.calibration.sampling.leaps import BLOCK, blocks, leap, offers
 from bayesmembrane.calibration.sampling.proposals.independent import Independent, independent
 from bayesmembrane.calibration.sampling.proposals.learned import learn, next_lesson
 from bayesmembrane.calibration.sampling.weights import Worth
-from bayesmembrane.calibration.starts import tried
+from bayesmembrane.calibration.starts import try_points
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.interrupts import Stop, StopAsked, deferred, never
 from bayesmembrane.ground.parameters import Array
@@ -211,15 +211,15 @@ def _start(posterior: Posterior, settings: Settings, seed: int) -> Chains:
     began, counts = time.perf_counter(), Outcomes()
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(settings.ensembles + 1)[-1])
     shape = settings.ensembles, walkers_of(posterior, settings)
-    found = tried(posterior, rng, shape[0] * shape[1], counts)
+    found = try_points(posterior, rng, shape[0] * shape[1], counts)
     x, close = found.starts(rng, *shape), None
     if settings.sampler == "auto":
         close = independent(posterior, found, rng.spawn(1)[0], counts)
-    chains = begun(posterior, x, seed) if close is None else _close(posterior, close, settings, seed)
+    chains = begun(posterior, x, seed) if close is None else _begun_from_mixture(posterior, close, settings, seed)
     return replace(chains, counts=counts, seconds=time.perf_counter() - began)
 
 
-def _close(posterior: Posterior, close: Independent, settings: Settings, seed: int) -> Chains:
+def _begun_from_mixture(posterior: Posterior, close: Independent, settings: Settings, seed: int) -> Chains:
     """Ensembles at states of a mixture, to be looked at where they may be worth enough."""
     walkers = walkers_of(posterior, settings)
     count = settings.ensembles * walkers
