@@ -149,8 +149,10 @@ def test_fit_finds_effects_in_a_curve_of_the_other_solver(run: Run, tmp_path: Pa
     code, out, _ = run(*base, "--effects", "zero_offset,machine_compliance")
     found = json.loads(out)["parameters"]
     assert code == 0
-    for name, truth in (("zero_offset.shift", shift), ("machine_compliance.compliance", compliance), ("c1", film[0])):
+    known = (("zero_offset.shift", shift), ("c1", film[0]), ("machine_compliance.exponent", 1.0))
+    for name, truth in (*known, ("machine_compliance.compliance", compliance)):
         assert abs(found[name]["value"] - truth) < 4 * found[name]["sd"]
+    for name, truth in known:
         assert found[name]["sd"] < 0.2 * truth
     _, plain, _ = run(*base)
     assert json.loads(plain)["rmse_N"] > 2 * json.loads(out)["rmse_N"]

@@ -31,7 +31,7 @@ def coordinates(name: str, effects: tuple[str, ...] = ()) -> np.ndarray:
 @pytest.mark.parametrize("name", FILMS)
 def test_at_null_the_posterior_is_that_of_the_film(name: str, film: Film) -> None:
     """The film law is good to 1e-6 of the force, and the convexity prior looks at other states on the way."""
-    m = film("yeoh", FILMS["yeoh"], noise=2e-3)
+    m = film("yeoh", FILMS["yeoh"], points=16, noise=2e-3)
     effects = ("force_offset", "mullins", "machine_compliance")
     plain = Posterior(hypothesis(name), m).evaluate(coordinates(name))
     with_effects = Posterior(hypothesis(name, effects), m).evaluate(coordinates(name, effects))

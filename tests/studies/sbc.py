@@ -151,6 +151,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run what is not stored, then print or write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", default="", help="designs whose name begins so")
+    parser.add_argument("--without", default="", help="leave out designs in whose name this stands")
     parser.add_argument("--limit", type=int, default=10**6, help="replicates of each design")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=float("inf"), help="begin no replicate after this time")
@@ -160,6 +161,7 @@ def main(arguments: list[str] | None = None) -> int:
     asked = parser.parse_args(arguments)
     done = {(r["design"], r["replicate"]) for r in stored(asked.results)}
     some = [d for d in designs() if d.name.startswith(asked.only)]
+    some = [d for d in some if not asked.without or asked.without not in d.name]
     # Round by round, so that what is there is balanced whenever it ends.
     most = min(asked.limit, max((d.replicates for d in some), default=0))
     todo = [(d.name, i) for i in range(most) for d in some if i < d.replicates and (d.name, i) not in done]

@@ -7,15 +7,21 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.ground.parameters import Array, HalfNormal
+from bayesmembrane.ground.parameters import Array, HalfNormal, Normal
 from bayesmembrane.physics.effects.base import Compliance, EffectParameter
+
+
+NEWTON = 1.0  # N: the force at which the compliance is what its name says, whatever the exponent
+SMALLEST = 1e-9  # N: below it a power less than one has no slope
 
 
 @dataclass(frozen=True)
 class MachineCompliance(Compliance):
-    """delta_film = delta - compliance F.
+    """delta_film = delta - compliance F |F / 1 N|^(exponent - 1).
 
-    Joints seat and grips give: the compliance of real frames changes with the load, by tens of percents.
+    Beams and load cells yield in proportion to the force (1), contacts of round bodies as F^(2/3) (H. Hertz, J. Reine
+    Angew. Math. 92 (1882) 156), joints that open the other way round: the compliance of real frames changes with the
+    load, by tens of percents.
     """
 
     name: ClassVar[str] = "machine_compliance"
@@ -27,8 +33,11 @@ class MachineCompliance(Compliance):
     )
     remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
-        EffectParameter("compliance", "m/N", "travel lost per newton", HalfNormal(3e-4), (0.0, 1e-2), 0.0),
+        EffectParameter("compliance", "m/N", "travel lost by the first newton", HalfNormal(3e-4), (0.0, 1e-2), 0.0),
+        EffectParameter("exponent", "-", "of the force that the travel lost grows with", Normal(0.9, 0.15), (0.4, 1.4)),
     )
 
     def yielding(self, p: Array, force: Array) -> tuple[Array, Array]:
-        return p[:, :1] * force, np.broadcast_to(p[:, :1], force.shape)
+        compliance, exponent = p[:, :1], p[:, 1:2]
+        secant = compliance * (np.maximum(np.abs(force), SMALLEST) / NEWTON) ** (exponent - 1)
+        return secant * force, exponent * secant
