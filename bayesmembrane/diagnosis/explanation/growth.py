@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects, without_effect
+from bayesmembrane.diagnosis.candidates.evidence import Linear
 from bayesmembrane.diagnosis.candidates.search import Search, starts_with
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.standard import expected_size
@@ -28,12 +29,14 @@ class Grown:
     """Every hypothesis that was fitted, by energy and effects; the search under whose noise they were weighed.
 
     starts : by energy, draws of its prior brought to their best modulus
+    followed : sets of effects that larger ones were grown from
     """
 
     case: OpenCase
     search: Search
     found: dict[Key, Candidate] = field(default_factory=dict)
     starts: dict[str, list[Array]] = field(default_factory=dict)
+    followed: set[frozenset[str]] = field(default_factory=set)
 
     def add(self, candidate: Candidate | None) -> None:
         """Keep the better of two fits of one hypothesis."""
@@ -84,27 +87,42 @@ def _key(candidate: Candidate) -> Key:
 def grown(case: OpenCase) -> Grown:
     """All hypotheses that could carry weight: each single effect, and sets that grow from the most probable ones.
 
-    Growth ends where a larger set has less than `GROWTH.worth` of what the smaller ones have together.
+    Sets that turn out to be among these only as parts of larger ones are grown from in their turn.
     """
     out = Grown(case, case.search)
     for c in case.plain.values():
         out.add(c)
-    most = 1 if case.question.quick else BELIEFS.most
+    _grow(out)
+    _with_less(out)
+    if _grow(out):
+        _with_less(out)
+    _with_twins(out)
+    return out
+
+
+def _grow(out: Grown) -> bool:
+    """Sets one effect larger than the most probable of every size that none was grown from; True if there were any.
+
+    Growth ends where a larger set has less than `GROWTH.worth` of what the smaller ones have together.
+    """
+    most, any_new = 1 if out.case.question.quick else BELIEFS.most, False
     for size in range(1, most + 1):
-        bases = [case.best_plain] if size == 1 else _beam(out, size - 1)
+        beam = [out.case.best_plain] if size == 1 else _beam(out, size - 1)
+        bases = [c for c in beam if frozenset(c.names) not in out.followed]
         for base in bases:
+            out.followed.add(frozenset(base.names))
             for effect in _promising(out, base, size):
                 out.add(_added(out, base, effect))
         if not out.of_size(size):
             break
-        out.renew()
-        _with_other_energies(out, size)
-        out.polish(size)
+        if bases:
+            any_new = True
+            out.renew()
+            _with_other_energies(out, size)
+            out.polish(size)
         if not _worth_more(out, size):
             break
-    _with_less(out)
-    _with_twins(out)
-    return out
+    return any_new
 
 
 def _with_less(out: Grown) -> None:
@@ -175,7 +193,8 @@ def first_order(search: Search, base: Candidate, effect: Effect) -> float:
     """ln K of a little of ``effect`` beside ``base``, to first order, at the best of several shapes.
 
     ln K = (s.r)^2 / (s.s + 1) / 2 - ln(1 + s.s) / 2 of the slope s by the expected size, both freed of what the base
-    can follow.
+    can follow. A form error that has grown to carry what the effect would explain takes its trace as well: the base
+    with one no larger than usual is tried too, with what that costs.
     """
     model = search.linear(base)
     size = expected_size(effect, search.measurement)
@@ -183,14 +202,23 @@ def first_order(search: Search, base: Candidate, effect: Effect) -> float:
     if not slopes:
         return -np.inf
     white = search.noise.white(np.column_stack([s for s, _ in slopes]))
-    freed = model.freed(base.theta, white)
+    sides = np.array([side if effect.size.one_sided else 0 for _, side in slopes])
+    usual = np.minimum(base.theta, model.priors[:, 0])
+    costs = model.log_density(base.theta).value - model.log_density(usual).value
+    return max(_gain(model, base.theta, white, sides), _gain(model, usual, white, sides) - costs)
+
+
+def _gain(model: Linear, theta: Array, white: Array, sides: Array) -> float:
+    """The best ln K of slopes (N, m), freed of noise, at the sizes ``theta`` (h,) of noise and form error; only of the
+    sign of ``sides`` (m,) where that is not zero.
+    """
+    freed = model.freed(theta, white)
     along, square = freed.T @ model.data, np.sum(white * freed, axis=0)
     # Of a slope that the base follows wholly nothing is left but round-off, which may be negative.
     left = square > GROWTH.round_off * np.sum(white * white, axis=0)
     along, square = np.where(left, along, 0.0), np.where(left, square, 0.0)
-    allowed = np.array([not effect.size.one_sided or side * a > 0 for a, (_, side) in zip(along, slopes, strict=True)])
-    gain = 0.5 * along**2 / (square + 1) * allowed - 0.5 * np.log1p(square)
-    return float(np.max(gain))
+    allowed = (sides == 0) | (sides * along > 0)
+    return float(np.max(0.5 * along**2 / (square + 1) * allowed - 0.5 * np.log1p(square)))
 
 
 def _added(out: Grown, base: Candidate, effect: Effect) -> Candidate | None:
