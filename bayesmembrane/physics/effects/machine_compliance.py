@@ -10,7 +10,6 @@ import numpy as np
 from bayesmembrane.ground.parameters import Array, HalfNormal, Normal
 from bayesmembrane.physics.effects.base import Compliance, EffectParameter
 
-
 NEWTON = 1.0  # N: the force at which the compliance is what its name says, whatever the exponent
 SMALLEST = 1e-9  # N: below it a power less than one has no slope
 
