@@ -54,7 +54,8 @@ def _diagnosed(case: OpenCase) -> Diagnosis:
     # A declared energy may follow the curve by parameters that nobody would expect: then all are weighed none the less.
     if case.detection.adequate and (case.null is case.best_plain or case.tested(case.best_plain).adequate):
         found = adequate(case)
-        if found.probabilities.effects[NOTHING] > VERDICT.doubted:
+        p = found.probabilities
+        if min(p.effects[NOTHING], p.foreign[NOTHING]) > VERDICT.doubted:
             return _concluded(case, case.search, found)
     every = grown(case)
     return _concluded(case, every.search, decided(case, summed(every)))

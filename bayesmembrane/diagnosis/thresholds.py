@@ -252,8 +252,13 @@ class ForeignThresholds:
     """Of the readings at either end where no step is looked for: a start or an end is none."""
     widths: tuple[float, ...] = (1e-6, 0.006, 0.018)
     """Of the whole test: how long a step takes, from at once to a few seconds."""
-    waves: int = 400
-    """Waves that are tried over time, and as many over deflection."""
+    waves: int = 800
+    """Waves that are tried over time, and as many over deflection, at most."""
+    wave_step: float = 0.35
+    """Of a wave over the range, between two that are tried: half of it off, a wave loses a tenth of its squares."""
+    promise: float = 0.0
+    """ln of the Bayes factor of the most probable member, its chance left out, from which on the noise is estimated
+    beside it, too."""
     least_waves: float = 4.0
     """Over the range: fewer are a bend."""
     plays: tuple[float, ...] = (0.002, 0.006, 0.02)
@@ -262,18 +267,42 @@ class ForeignThresholds:
     """Of the largest deflection: the expected play."""
     plateau: int = 5
     """Readings that share the largest force: as many are no chance."""
-    limit_band: float = 4.0
-    """Standard deviations of the noise below the largest reading, within which a limit is first looked for."""
-    limit_rounds: int = 2
-    """In which the readings at the limit and the film fitted to the others are found by turns."""
-    limit_gain: float = 8.0
-    """Squares, in those of the noise, by which a constant must be nearer to these readings than the model is."""
     spare: int = 6
     """Readings beyond the parameters that must be left beside those at the limit."""
     ln_unnamed: tuple[float, float] = (-4.6, 1.0)
     """Mean and sd of ln of what is smooth and has no name, in parts of the force: 1 % within a factor of three."""
     bases: int = 3
     """Of the most probable sets, and the plain model, beside which it is looked for."""
+
+
+@dataclass(frozen=True)
+class SaturationThresholds:
+    """A load cell that yields before its limit: what is expected of it, and how it is looked for."""
+
+    ln_width: tuple[float, float] = (-5.3, 1.2)
+    """Mean and sd of ln(1 / p): half of the prior yields within 0.5 % of the limit, 95 % within 0.05 to 5 %."""
+    sharpness: float = 100.0
+    """Of the first step: what yields within one per cent is seen to be softer or harder."""
+    lower: tuple[float, ...] = (0.97, 0.9, 0.75)
+    """Of the largest reading: films are fitted to the readings below, for one that sees the others is bent."""
+    highest: int = 5
+    """Readings whose mean is the first guess of a limit."""
+    promise: float = 8.0
+    """Squares, in those of the noise, that a limit must promise to take away, to first order, to be looked for."""
+    tried: tuple[float, ...] = (0.95, 0.98, 1.0, 1.02, 1.05)
+    """Of the largest reading: limits for that."""
+    sharpnesses: tuple[float, ...] = (30.0, 100.0, 300.0)
+    """And how sharp they are."""
+    spare: int = 6
+    """Readings beyond the parameters that must be left below."""
+    steps: int = 12
+    """Of a search, at most."""
+    halvings: int = 5
+    """Of a step that gains nothing, at most."""
+    largest_step: float = 0.2
+    """In ln of the limit."""
+    tolerance: float = 0.05
+    """In ln p: a search ends where a step gains less."""
 
 
 @dataclass(frozen=True)
@@ -419,6 +448,8 @@ class WordsThresholds:
     """Of a stretch: as near to 1, it is told with five digits, for three would say nothing."""
     smallest_p: float = 1e-4
     """A p-value below it is told as that: its own size rests on tails that nobody knows."""
+    soft_limit: float = 0.01
+    """Of a limit, over what part of it the reading yields: from there on it is told to be soft."""
     same_reading: float = 0.01
     """Of the load cell's step: readings that differ by less are the same."""
 
@@ -434,6 +465,7 @@ OTHER_TESTS = OtherTestsThresholds()
 GROWTH = GrowthThresholds()
 TWINS = TwinsThresholds()
 FOREIGN = ForeignThresholds()
+SATURATION = SaturationThresholds()
 VERDICT = VerdictThresholds()
 HELD_OUT = HeldOutThresholds()
 DISCREPANCY = DiscrepancyThresholds()

@@ -273,7 +273,8 @@ def _foreign(f: Foreign, m: Measurement) -> str:
     if f.kind == PLAY:
         return f"a play of {size_in_words(f.size, 'm', shown)} in the drive"
     if f.kind == CLIPPED:
-        return f"the load cell at its limit of {size} from reading {f.place + 1} on"
+        limit = "soft limit" if f.soft >= WORDS.soft_limit else "limit"
+        return f"the load cell at its {limit} of {size} from reading {f.place + 1} on"
     return f"something smooth, about {100 * f.size:.2g} % of the force, that no effect here leaves"
 
 

@@ -220,8 +220,10 @@ def foreign_sentence(f: Foreign, shown: Units) -> str:
             "counter."
         )
     if f.kind == CLIPPED:
+        softly = f" and yields within about {100 * f.soft:.1g} % of it" if f.soft >= WORDS.soft_limit else ""
         return (
-            f"The load cell is at its limit of {f.size:.4g} N from reading {f.place + 1} on: leave these readings out."
+            f"The load cell is at its limit of {f.size:.4g} N from reading {f.place + 1} on{softly}: leave these "
+            "readings out."
         )
     assert f.kind == UNNAMED
     return (
@@ -244,7 +246,7 @@ def _adequate(found: Diagnosis) -> str:
     return (
         f"{_model(found.null)} describes the curve to within its noise (p = {found.detection.p_value:.2g}; "
         f"{factor * found.before.rmse_N:.3g} {unit} root mean square). Nothing is seen to be missing. "
-        f"{_power(found)}"
+        f"{_power(found)}{_beside(found)}"
     )
 
 

@@ -41,20 +41,22 @@ def periodicity(measurement: Measurement, model: Whitened) -> Periodicity | None
     if n < DETECTION.fewest_points:
         return None
     t = np.arange(n, dtype=float) if measurement.time is None else measurement.time
-    found = [_strongest(t, model, "time", DETECTION.slowest_part * n / 2)]
-    # Where the disc stands still, all times have one deflection.
-    if not measurement.holds:
-        found.append(_strongest(measurement.deflection, model, "deflection", REFERENCE.spline_columns / 2))
+    found = [_strongest(t, model, "time", (DETECTION.slowest_part * n / 2, n / 2))]
+    # In a hold a wave of the deflection stands still like the disc: only the readings in between tell two of them apart.
+    moving = n - sum(hold.size for hold in measurement.holds)
+    if moving >= DETECTION.fewest_points:
+        ends = REFERENCE.spline_columns / 2, moving / 2
+        found.append(_strongest(measurement.deflection, model, "deflection", ends))
     best = min(found, key=lambda f: f.p_value)
     return replace(best, p_value=min(1.0, len(found) * best.p_value))
 
 
-def _strongest(place: Array, model: Whitened, against: str, least: float) -> Periodicity:
-    """The strongest of at least ``least`` waves: what the smooth reference has removed is no evidence."""
+def _strongest(place: Array, model: Whitened, against: str, ends: tuple[float, float]) -> Periodicity:
+    """The strongest of so many waves over the range: of slower ones the smooth reference has taken the evidence."""
     rest, q = model.rest, model.reference
     span, freedom = float(np.ptp(place)), rest.size - q.shape[1]
     # As many frequencies as half the points could tell apart, were they evenly spaced.
-    waves = np.arange(max(DETECTION.least_waves, least), rest.size / 2)
+    waves = np.arange(max(DETECTION.least_waves, ends[0]), ends[1])
     if span == 0 or waves.size < 2 or freedom < 4:
         return Periodicity(against, np.inf, 0.0, 1.0)
     power = np.asarray(lombscargle(place - place.min(), rest, 2 * np.pi * waves / span))

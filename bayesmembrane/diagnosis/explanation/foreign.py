@@ -6,8 +6,9 @@ out beside all that the model can follow.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.special import expit
@@ -17,6 +18,8 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import Block, extended, weighed
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation.limit import limit_of
+from bayesmembrane.diagnosis.reference.inferred import own_noise
+from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.diagnosis.thresholds import FOREIGN
 from bayesmembrane.ground.parameters import Array
 
@@ -40,6 +43,7 @@ class Foreign:
     against : "time" or "deflection": what a wave repeats with
     share : part of the squares that the model leaves, which it takes away
     trace : (N,) N, what it changes
+    soft : of a limit, over what part of it the reading yields; 0 where it is met at once
     """
 
     kind: str
@@ -54,18 +58,37 @@ class Foreign:
     against: str = ""
     share: float = 0.0
     trace: Array | None = None
+    soft: float = 0.0
 
     def counted(self, counts: float) -> float:
         """ln of the Bayes factor of which a part ``counts``: laws may be off, yet not where a thing could have been."""
         return counts * (self.gain - self.chance) + self.chance
 
 
+def beside(search: Search, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
+    """What is foreign beside the ``bases``, and a limit beside the ``others`` too; the most probable first.
+
+    A film that is fitted through a limit takes another energy for it, so that the energy that is most probable without
+    one says little. Other things leave traces that no energy has.
+    """
+    found = [f for base in bases for f in foreign(search, base)]
+    if len(search.measurement) >= FOREIGN.least_points:
+        smooth = smooth_reference(search.measurement)
+        limits = [_with_its_own_noise(search, smooth, partial(_clipped, base)) for base in others]
+        found += [f for f in limits if f is not None]
+    return sorted(found, key=lambda f: -(f.gain + f.base.log_evidence))
+
+
 @dataclass(frozen=True, eq=False)
 class _Family:
-    """Traces (N, m) of one unit of their expected size, in groups of ``width`` that act together; in N."""
+    """Traces (N, m) of one unit of their expected size, in groups of ``width`` that act together; in N.
+
+    told : what is found, with what its most probable member, of that number and coefficient, says of itself
+    """
 
     kind: str
     traces: Array
+    told: Callable[[Foreign, int, float], Foreign]
     width: int = 1
 
 
@@ -74,27 +97,57 @@ def foreign(search: Search, base: Candidate) -> list[Foreign]:
     m = search.measurement
     if len(m) < FOREIGN.least_points:
         return []
+    smooth = smooth_reference(m)
+    finders: list[Callable[[Search], Foreign | None]] = [partial(_of_family, base, f) for f in _families(m, base)]
+    finders.append(partial(_clipped, base))
+    found = [_with_its_own_noise(search, smooth, find) for find in finders]
+    return [f for f in (*found, _unnamed(search, base)) if f is not None]
+
+
+def _with_its_own_noise(search: Search, smooth: Array, find: Callable[[Search], Foreign | None]) -> Foreign | None:
+    """What is found under the noise as it is, or under the one that is left beside what was found, if that is likelier.
+
+    What is foreign looks like noise, and like noise with a memory: it hides in the one that is inferred without it.
+    Both models are weighed under both noises, each of which is as likely as it makes the readings.
+    """
+    found = find(search)
+    if found is None or found.trace is None or found.gain - found.chance < FOREIGN.promise:
+        return found
+    base = found.base
+    noise = own_noise(search.measurement, np.column_stack([smooth, base.slopes, found.trace]))
+    other = replace(search, noise=noise)
+    again = find(other)
+    if again is None:
+        return found
+    apart = _plain_evidence(other, base) - _plain_evidence(search, base)
+    gain = again.gain + min(apart, 0.0)
+    return replace(again, gain=gain) if gain > found.gain else found
+
+
+def _plain_evidence(search: Search, base: Candidate) -> float:
+    """ln Z of the model alone, comparable between noises."""
+    return weighed(search.linear(base), base.theta).log_evidence - search.noise.log_root
+
+
+def _of_family(base: Candidate, family: _Family, search: Search) -> Foreign:
+    """The most probable member of a family beside ``base``, and the evidence of them all."""
     model = search.linear(base)
     # Beside noise and form error as they are expected: what is foreign has driven the fitted ones up.
     plain = np.minimum(base.theta, model.priors[:, 0])
-    data = model.data[:, None]
-    out = []
-    for family in _families(m, base):
-        white = search.noise.white(family.traces)
-        freed = model.freed(plain, white)
-        gains = _gains(freed, white, freed.T @ data[:, 0], family.width)
-        best = int(np.argmax(gains))
-        columns = white[:, best * family.width : (best + 1) * family.width]
-        spread = float(np.logaddexp.reduce(gains) - np.log(gains.size) - gains[best])
-        wider = extended(model, [Block(columns)])
-        z = weighed(wider, base.theta)
-        mean, _ = wider.coefficients(z.theta)
-        trace = family.traces[:, best * family.width : (best + 1) * family.width] @ mean[-family.width :]
-        gain = z.log_evidence - weighed(model, base.theta).log_evidence + spread
-        found = Foreign(family.kind, base, gain, spread, trace=trace, share=_share(search, base, trace))
-        out.append(_with_size(m, found, best, float(mean[-family.width])))
-    out += [f for f in (_unnamed(search, base), _clipped(search, base)) if f is not None]
-    return out
+    white = search.noise.white(family.traces)
+    freed = model.freed(plain, white)
+    gains = _gains(freed, white, freed.T @ model.data, family.width)
+    best = int(np.argmax(gains))
+    members = slice(best * family.width, (best + 1) * family.width)
+    spread = float(np.logaddexp.reduce(gains) - np.log(gains.size) - gains[best])
+    wider = extended(model, [Block(white[:, members])])
+    z = weighed(wider, base.theta)
+    mean, _ = wider.coefficients(z.theta)
+    own = mean[-family.width :]
+    trace = family.traces[:, members] @ own
+    gain = z.log_evidence - weighed(model, base.theta).log_evidence + spread
+    found = Foreign(family.kind, base, gain, spread, trace=trace, share=_share(search, base, trace))
+    return family.told(found, best, float(own[0]))
 
 
 def _gains(freed: Array, white: Array, along: Array, width: int) -> Array:
@@ -111,9 +164,9 @@ def _gains(freed: Array, white: Array, along: Array, width: int) -> Array:
 
 
 def _families(m: Measurement, base: Candidate) -> list[_Family]:
-    out = [_Family(SUDDEN, _steps(m, base)), _Family(WAVE, _waves(m), 2)]
+    out = [_steps(m, base), _waves(m)]
     if np.any(m.leg < 0):
-        out.append(_Family(PLAY, _plays(m, base)))
+        out.append(_plays(m, base))
     return out
 
 
@@ -123,28 +176,49 @@ def _places(m: Measurement) -> Array:
     return np.unique(np.linspace(*ends, min(FOREIGN.places, n)).astype(int))
 
 
-def _steps(m: Measurement, base: Candidate) -> Array:
+def _steps(m: Measurement, base: Candidate) -> _Family:
     """Steps of the force that take several times: by a constant first, then by a factor."""
-    clock = m.path.clock[m.on_path]
-    since = (clock[:, None] - clock[_places(m)]) / np.ptp(clock)
+    clock, places = m.path.clock[m.on_path], _places(m)
+    since = (clock[:, None] - clock[places]) / np.ptp(clock)
     after = np.concatenate([expit(since / width) for width in FOREIGN.widths], axis=1)
     fitted = m.force - base.residual
     largest = float(np.max(np.abs(m.force)))
-    return FOREIGN.size * np.concatenate([after * largest, after * fitted[:, None]], axis=1)
+    traces = FOREIGN.size * np.concatenate([after * largest, after * fitted[:, None]], axis=1)
+
+    def told(found: Foreign, best: int, coefficient: float) -> Foreign:
+        place = int(places[best % places.size])
+        relative = best >= after.shape[1]
+        size = coefficient * FOREIGN.size * (1.0 if relative else largest)
+        moment = None if m.time is None else float(m.time[place])
+        return replace(found, size=size, relative=relative, place=place, moment=moment)
+
+    return _Family(SUDDEN, traces, told)
 
 
-def _frequencies(m: Measurement) -> Array:
-    most = len(m) / 2
-    return np.linspace(FOREIGN.least_waves, max(most, FOREIGN.least_waves + 1), FOREIGN.waves)
+def _frequencies(readings: int) -> Array:
+    """Waves over the range that so many readings may show, near enough for none to be missed between two of them."""
+    most = max(readings / 2, FOREIGN.least_waves + 1)
+    count = min(int(np.ceil((most - FOREIGN.least_waves) / FOREIGN.wave_step)) + 1, FOREIGN.waves)
+    return np.linspace(FOREIGN.least_waves, most, count)
 
 
-def _waves(m: Measurement) -> Array:
-    """Cosines and sines over the readings' time, then over the deflection where the disc does not stand still."""
+def _waves(m: Measurement) -> _Family:
+    """Cosines and sines over the readings' time, then over the deflection where the disc moves."""
     size = FOREIGN.size / 3 * float(np.max(np.abs(m.force)))
-    places = [m.path.clock[m.on_path]] + ([] if m.holds else [m.deflection])
-    phase = np.concatenate([_phase(p, _frequencies(m)) for p in places], axis=1)
+    moving = len(m) - sum(hold.size for hold in m.holds)
+    places = [("time", m.path.clock[m.on_path], _frequencies(len(m)))]
+    if moving >= FOREIGN.least_points:  # a wave of the deflection stands still in a hold, like the disc
+        places.append(("deflection", m.deflection, _frequencies(moving)))
+    phase = np.concatenate([_phase(place, frequencies) for _, place, frequencies in places], axis=1)
     both = np.stack([np.cos(phase), np.sin(phase)], axis=2)
-    return np.asarray(size * both.reshape(len(m), -1))
+    periods = [(against, float(np.ptp(place)) / f) for against, place, waves in places for f in waves.tolist()]
+
+    def told(found: Foreign, best: int, _: float) -> Foreign:
+        assert found.trace is not None
+        against, period = periods[best]
+        return replace(found, size=float(np.max(np.abs(found.trace))), period=period, against=against)
+
+    return _Family(WAVE, np.asarray(size * both.reshape(len(m), -1)), told, 2)
 
 
 def _phase(place: Array, frequencies: Array) -> Array:
@@ -152,11 +226,12 @@ def _phase(place: Array, frequencies: Array) -> Array:
     return np.asarray(2 * np.pi * ((place - place.min()) / span)[:, None] * frequencies)
 
 
-def _plays(m: Measurement, base: Candidate) -> Array:
+def _plays(m: Measurement, base: Candidate) -> _Family:
     """-dF/d(deflection) times how far a play of the drive is taken up: 0 on loading, 1 on unloading."""
     path = m.path
     fitted = m.force - base.residual
     slope = _slope(m.deflection, fitted)
+    unit = FOREIGN.play * path.full_range
     out = []
     for part in FOREIGN.plays:
         travel = part * path.full_range
@@ -165,7 +240,8 @@ def _plays(m: Measurement, base: Candidate) -> Array:
             kept = np.exp(-path.steps[i] / travel)
             lag[i] = lag[i - 1] * kept + (1 - kept) * (path.leg[i] < 0)
         out.append(slope * lag[m.on_path])
-    return FOREIGN.play * path.full_range * np.column_stack(out)
+    traces = unit * np.column_stack(out)
+    return _Family(PLAY, traces, lambda found, _, coefficient: replace(found, size=abs(coefficient) * unit))
 
 
 def _slope(deflection: Array, force: Array) -> Array:
@@ -174,25 +250,6 @@ def _slope(deflection: Array, force: Array) -> Array:
     most = min(9, max(np.unique(deflection).size // 6, 1))
     fit, _ = np.polynomial.Chebyshev.fit(deflection[order], force[order], most, full=True)  # of few places: no warning
     return np.asarray(fit.deriv()(deflection))
-
-
-def _with_size(m: Measurement, found: Foreign, best: int, coefficient: float) -> Foreign:
-    """With what the most probable member says of itself."""
-    if found.kind == PLAY:
-        return replace(found, size=abs(coefficient) * FOREIGN.play * m.path.full_range)
-    if found.kind == WAVE:
-        number, count = best, FOREIGN.waves
-        against = "time" if number < count else "deflection"
-        span = float(np.ptp(m.path.clock[m.on_path] if against == "time" else m.deflection))
-        period = span / float(_frequencies(m)[number % count])
-        assert found.trace is not None
-        return replace(found, size=float(np.max(np.abs(found.trace))), period=period, against=against)
-    places = _places(m)
-    place = int(places[best % places.size])
-    relative = best >= len(FOREIGN.widths) * places.size
-    scale = 1.0 if relative else float(np.max(np.abs(m.force)))
-    moment = None if m.time is None else float(m.time[place])
-    return replace(found, size=coefficient * FOREIGN.size * scale, relative=relative, place=place, moment=moment)
 
 
 def _share(search: Search, base: Candidate, trace: Array) -> float:
@@ -220,10 +277,15 @@ def _unnamed(search: Search, base: Candidate) -> Foreign | None:
     return Foreign(UNNAMED, base, gain, size=float(np.exp(z.theta[-1])), relative=True, share=share, trace=trace)
 
 
-def _clipped(search: Search, base: Candidate) -> Foreign | None:
+def _clipped(base: Candidate, search: Search) -> Foreign | None:
     """A load cell at its limit."""
     found = limit_of(search, base)
-    return None if found is None else Foreign(CLIPPED, base, found.gain, size=found.force, place=found.first)
+    if found is None:
+        return None
+    share = _share(search, base, found.trace)
+    return Foreign(
+        CLIPPED, base, found.gain, size=found.force, place=found.first, share=share, trace=found.trace, soft=found.width
+    )
 
 
 def kinds_of(found: Sequence[Foreign]) -> int:

@@ -13,7 +13,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.foreign import Foreign, foreign, kinds_of
+from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown
 from bayesmembrane.diagnosis.explanation.twins import Stands, levelled, twins
 from bayesmembrane.diagnosis.thresholds import FOREIGN, TWINS, VERDICT
@@ -171,15 +171,17 @@ def _plausible(candidate: Candidate, measurement: Measurement) -> bool:
 
 
 def _foreign(grown: Grown, every: Sequence[Candidate], given: Sequence[str]) -> list[Foreign]:
-    """What is foreign beside the best energy of the first few sets, and beside the plain model."""
+    """What is foreign beside the best energy of the first few sets, and beside the plain model; a limit beside every
+    plain energy.
+    """
     bases: dict[str, Candidate] = {}
     for c in every:
         bases.setdefault(set_name(c, given), c)
     chosen = dict(list(bases.items())[: FOREIGN.bases])
     chosen.setdefault(NOTHING, bases[NOTHING])
     grown.case.tell("looking for what no effect describes")
-    found = [f for base in chosen.values() for f in foreign(grown.search, base)]
-    return sorted(found, key=lambda f: -(f.gain + f.base.log_evidence))
+    plain = [c for c in every if set_name(c, given) == NOTHING and c is not chosen[NOTHING]]
+    return beside(grown.search, list(chosen.values()), plain)
 
 
 def _normalised(log_weights: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase
-from bayesmembrane.diagnosis.explanation.foreign import Foreign
+from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import first_order
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, Total, set_name
 from bayesmembrane.diagnosis.thresholds import VERDICT
@@ -35,11 +35,19 @@ class Verdict:
 
 
 def adequate(case: OpenCase) -> Verdict:
-    """The tests see nothing. What single effects could still be there is told to first order."""
+    """The tests see nothing. What single effects could still be there is told to first order.
+
+    What is foreign is weighed all the same: it may have been taken for noise, or be of a shape that no test asks for.
+    """
     null = case.null
     dof = max(null.residual.size - null.x.size, 1)
     judged = Judged(null, 1.0, 0.0, 1.0, case.search.excess(null) / dof + 1)
-    return Verdict("adequate", (judged,), (judged,), _first_order(case))
+    case.tell("looking for what no effect describes")
+    others = [c for c in case.plain.values() if c is not case.best_plain]
+    found = beside(case.search, [case.best_plain], others)
+    p = _first_order(case, found)
+    told = found[0] if p.anything_foreign > VERDICT.foreign_told else None
+    return Verdict("adequate", (judged,), (judged,), p, told)
 
 
 def decided(case: OpenCase, total: Total) -> Verdict:
@@ -106,8 +114,8 @@ def _without_effects(case: OpenCase, total: Total, members: tuple[Judged, ...]) 
     return Verdict("adequate", members, total.ranking, p)
 
 
-def _first_order(case: OpenCase) -> Probabilities:
-    """Probabilities of single effects beside the energies, from their traces alone."""
+def _first_order(case: OpenCase, found: Sequence[Foreign]) -> Probabilities:
+    """Probabilities of single effects beside the energies, from their traces alone, and of what is foreign."""
     count, visible = len(case.plain), case.visible
     log_energy = {
         name: c.log_evidence + BELIEFS.log_energy(name, case.question.energy, count) for name, c in case.plain.items()
@@ -118,7 +126,13 @@ def _first_order(case: OpenCase) -> Probabilities:
         gain = first_order(case.search, case.null, e)
         if gain > BELIEFS.supported:
             sets[e.name] = BELIEFS.log_set(1, len(visible)) + gain
-    return Probabilities(_shares(sets), _shares({n: w - none for n, w in log_energy.items()}), {NOTHING: 1.0})
+    kinds = kinds_of(found)
+    strange = {NOTHING: none + (BELIEFS.log_foreign(0) if kinds else 0.0)}
+    for f in found:
+        if f.gain > BELIEFS.supported:
+            weight = log_energy[f.base.hypothesis.material.name] + f.gain + BELIEFS.log_foreign(kinds)
+            strange[f.kind] = float(np.logaddexp(strange.get(f.kind, -np.inf), weight))
+    return Probabilities(_shares(sets), _shares({n: w - none for n, w in log_energy.items()}), _shares(strange))
 
 
 def _shares(log_weights: dict[str, float]) -> dict[str, float]:

@@ -29,7 +29,7 @@ def effects(monkeypatch: pytest.MonkeyPatch, takes: float, gain: float) -> dict[
     """Probabilities where friction explains the curve, and Mullins beside it ``takes`` squares and ``gain`` in ln Z."""
     monkeypatch.setattr(total, "twins", lambda _: frozenset())
     monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
-    monkeypatch.setattr(total, "foreign", lambda *_: [])
+    monkeypatch.setattr(total, "beside", lambda *_: [])
     squares = {frozenset(): LEFT, frozenset({"friction"}): 20.0, frozenset({"friction", "mullins"}): 20.0 - takes}
     search = SimpleNamespace(excess=lambda c: squares[frozenset(c.names)])
     plain = candidate(log_evidence=-60.0)

@@ -1,0 +1,111 @@
+"""What is foreign is found beside a film, under the noise that is left beside it, and in holds, too."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.explanation import foreign as foreign_module
+from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, SUDDEN, WAVE, Foreign, beside, foreign
+from bayesmembrane.diagnosis.reference.inferred import own_noise
+from bayesmembrane.diagnosis.reference.smooth import smooth_reference
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.mechanics import api
+from tests.diagnosis.curves import SD, measured, triangle
+
+CLAIM = hypothesis("neo_hookean")
+PITCH = 2.6e-3
+
+
+def film_on(deflection: Array, time: Array) -> Measurement:
+    """A neo-Hookean film without noise."""
+    empty = measured(np.ones(deflection.size), deflection, time)
+    film = Forward(CLAIM, empty, deflection, api.solve)(np.array([[np.log(16.0)]]), reached=False).force[0]
+    return replace(empty, force=film)
+
+
+def searched(m: Measurement, change: Array, seed: int, rho: float = 0.0) -> tuple[Search, Candidate]:
+    """The plain fit of a film with a change of its force and noise, which is inferred."""
+    rng = np.random.default_rng(seed)
+    noise = SD * rng.standard_normal(len(m))
+    for i in range(1, len(m)):
+        noise[i] = rho * noise[i - 1] + np.sqrt(1 - rho**2) * noise[i]
+    m = replace(m, force=m.force + change + noise)
+    search = Search(m, own_noise(m, smooth_reference(m)), 0, api.solve)
+    base = search.fit(CLAIM, search.material_starts(CLAIM))
+    assert base is not None
+    return search, base
+
+
+def kind(found: list[Foreign], name: str) -> Foreign:
+    return next(f for f in found if f.kind == name)
+
+
+def cycles(points: int = 400) -> tuple[Array, Array]:
+    return triangle(points, (0.02, 0.04, 0.03, 0.04)), np.arange(1.0, points + 1)
+
+
+def with_holds() -> tuple[Array, Array]:
+    """Two cycles, with a hold of 20 readings at each peak; no two legs at the same places, which would leave aliases."""
+    ends, counts = ((0, 0.04), (0.04, 0), (0, 0.04), (0.04, 0)), (73, 67, 71, 69)
+    legs = [np.linspace(a, b, n, endpoint=False) for (a, b), n in zip(ends, counts, strict=True)]
+    d = np.concatenate([legs[0], np.full(20, 0.04), legs[1], legs[2], np.full(20, 0.04), legs[3]])[1:]
+    return d, np.arange(1.0, d.size + 1)
+
+
+@pytest.mark.parametrize("path", [cycles, with_holds])
+def test_a_wave_of_the_deflection_is_found_with_its_length_with_and_without_holds(path) -> None:
+    m = film_on(*path())
+    found = kind(foreign(*searched(m, SD * np.sin(2 * np.pi * m.deflection / PITCH + 1.0), 4401)), WAVE)
+    assert found.gain > 20.0
+    assert found.against == "deflection"
+    assert found.period == pytest.approx(PITCH, rel=0.03)
+
+
+def test_a_wave_that_was_taken_for_noise_with_a_memory_is_weighed_by_the_noise_beside_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nine readings a wave look like neighbours that are correlated by cos(40 degrees)."""
+    m = film_on(*cycles())
+    search, base = searched(m, 1.5 * SD * np.sin(2 * np.pi * m.time / 9.0), 4402)
+    assert search.noise.rho > 0.3
+    found = kind(foreign(search, base), WAVE)
+    monkeypatch.setattr(foreign_module, "_with_its_own_noise", lambda search, _, find: find(search))
+    before = kind(foreign(search, base), WAVE)
+    assert found.gain > before.gain + 10.0
+    assert found.period == pytest.approx(9.0, rel=0.03)
+
+
+@pytest.mark.parametrize(("seed", "rho"), [(4403, 0.0), (4404, 0.0), (4405, 0.0), (4406, 0.5), (4407, 0.5)])
+def test_in_noise_nothing_is_foreign(seed: int, rho: float) -> None:
+    m = film_on(*cycles())
+    search, base = searched(m, np.zeros(len(m)), seed, rho)
+    assert max(f.gain for f in foreign(search, base)) < 1.0
+
+
+def test_a_step_is_told_with_its_moment_and_its_part_of_the_force() -> None:
+    m = film_on(*cycles())
+    found = kind(foreign(*searched(m, 0.02 * m.force * (m.time > 140.0), 4408)), SUDDEN)
+    assert found.gain > 20.0
+    assert found.relative
+    assert found.moment == pytest.approx(140.0, abs=4.0)
+    assert found.size == pytest.approx(0.02, abs=0.006)
+
+
+def test_a_limit_is_looked_for_beside_every_energy_and_other_things_beside_the_bases() -> None:
+    m = film_on(*cycles())
+    search, base = searched(m, np.minimum(m.force, 0.93 * np.max(m.force)) - m.force, 4409)
+    other = search.fit(hypothesis("gent"), search.material_starts(hypothesis("gent")))
+    assert other is not None
+    found = beside(search, [base], [other])
+    limits = [f for f in found if f.kind == CLIPPED]
+    assert {f.base.hypothesis.material.name for f in limits} == {"neo_hookean", "gent"}
+    assert {f.base.hypothesis.material.name for f in found if f.kind == WAVE} == {"neo_hookean"}
+    best = max(limits, key=lambda f: f.gain + f.base.log_evidence)
+    assert best.gain > 20.0
+    assert best.share > 0.3
