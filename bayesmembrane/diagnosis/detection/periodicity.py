@@ -42,7 +42,7 @@ def periodicity(measurement: Measurement, model: Whitened) -> Periodicity | None
         return None
     t = np.arange(n, dtype=float) if measurement.time is None else measurement.time
     found = [_strongest(t, model, "time", (DETECTION.slowest_part * n / 2, n / 2))]
-    # In a hold a wave of the deflection stands still like the disc: only the readings in between tell two of them apart.
+    # In a hold a wave of the deflection stands still like the disc: only the readings in between tell two apart.
     moving = n - sum(hold.size for hold in measurement.holds)
     if moving >= DETECTION.fewest_points:
         ends = REFERENCE.spline_columns / 2, moving / 2

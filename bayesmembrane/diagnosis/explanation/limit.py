@@ -1,8 +1,8 @@
 """A load cell, or whatever follows it, at its limit: readings there say no more than that it was reached.
 
-Where the converter saturates, readings share their last digit: ln K compares the model of all readings with that of the
-others, and those at the limit with a constant. Where what comes before it saturates, at once or softly, readings scatter
-about the limit as everywhere: then it is a law of the reading (`saturation.py`).
+Where the converter saturates, readings share their last digit: ln K compares the model of all readings with that of
+the others, and those at the limit with a constant. Where what comes before it saturates, at once or softly, readings
+scatter about the limit as everywhere: then it is a law of the reading (`saturation.py`).
 """
 
 from __future__ import annotations

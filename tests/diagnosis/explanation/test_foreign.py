@@ -51,7 +51,7 @@ def cycles(points: int = 400) -> tuple[Array, Array]:
 
 
 def with_holds() -> tuple[Array, Array]:
-    """Two cycles, with a hold of 20 readings at each peak; no two legs at the same places, which would leave aliases."""
+    """Two cycles, with a hold of 20 readings at each peak; no two legs at the same places, which would alias."""
     ends, counts = ((0, 0.04), (0.04, 0), (0, 0.04), (0.04, 0)), (73, 67, 71, 69)
     legs = [np.linspace(a, b, n, endpoint=False) for (a, b), n in zip(ends, counts, strict=True)]
     d = np.concatenate([legs[0], np.full(20, 0.04), legs[1], legs[2], np.full(20, 0.04), legs[3]])[1:]

@@ -1,4 +1,4 @@
-"""A load cell that yields: the law, its slopes, and that a softer one of another law is found; and a peak that is none."""
+"""A load cell that yields: the law, its slopes, a softer one of another law that is found, a peak that is none."""
 
 from dataclasses import replace
 
