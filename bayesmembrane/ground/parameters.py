@@ -108,6 +108,28 @@ class HalfNormal(Prior):
 
 
 @dataclass(frozen=True)
+class Lomax(Prior):
+    """3 / scale (1 + x / scale)^-4 for x >= 0: of what can only be positive, and may be many times what is expected.
+
+    Its mean is half of ``scale``, its root mean square ``scale`` itself. K. S. Lomax, J. Am. Stat. Assoc. 49 (1954)
+    847.
+    """
+
+    scale: float
+
+    def distribution(self) -> Any:
+        return _stats().lomax(3.0, scale=self.scale)
+
+    def log_density(self, x: ArrayLike) -> Array:
+        z = np.asarray(x, dtype=float) / self.scale
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.where(z >= 0, -4 * np.log1p(z) + np.log(3.0 / self.scale), -np.inf)
+
+    def __str__(self) -> str:
+        return f"Lomax of index 3, scale {self.scale:g}"
+
+
+@dataclass(frozen=True)
 class LogNormal(Prior):
     """median exp(spread z) with z ~ N(0, 1): of what is positive and known to a factor exp(spread)."""
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from bayesmembrane.ground.parameters import HalfNormal, LogNormal, Normal, Prior, Uniform
+from bayesmembrane.ground.parameters import HalfNormal, LogNormal, Lomax, Normal, Prior, Uniform
 
-PRIORS = [Normal(1.0, 2.0), Uniform(-1.0, 3.0), HalfNormal(0.3), HalfNormal(0.02, 1.0), LogNormal(2.0, 0.7)]
+PRIORS = [Normal(1.0, 2.0), Uniform(-1.0, 3.0), HalfNormal(0.3), HalfNormal(0.02, 1.0), LogNormal(2.0, 0.7), Lomax(0.4)]
 
 
 @pytest.mark.parametrize("prior", PRIORS, ids=str)

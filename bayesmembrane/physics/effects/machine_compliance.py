@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.ground.parameters import Array, HalfNormal, Normal
+from bayesmembrane.ground.parameters import Array, Lomax, Normal
 from bayesmembrane.physics.effects.base import Compliance, EffectParameter
 
 NEWTON = 1.0  # N: the force at which the compliance is what its name says, whatever the exponent
@@ -20,7 +20,8 @@ class MachineCompliance(Compliance):
 
     Beams and load cells yield in proportion to the force (1), contacts of round bodies as F^(2/3) (H. Hertz, J. Reine
     Angew. Math. 92 (1882) 156), joints that open the other way round: the compliance of real frames changes with the
-    load, by tens of percents.
+    load, by tens of percents. And frames differ by orders of magnitude: a prior that falls like a normal one would
+    rather let the film be softer than the frame.
     """
 
     name: ClassVar[str] = "machine_compliance"
@@ -32,7 +33,7 @@ class MachineCompliance(Compliance):
     )
     remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
-        EffectParameter("compliance", "m/N", "travel lost by the first newton", HalfNormal(3e-4), (0.0, 1e-2), 0.0),
+        EffectParameter("compliance", "m/N", "travel lost by the first newton", Lomax(5e-4), (0.0, 1e-2), 0.0),
         EffectParameter("exponent", "-", "of the force that the travel lost grows with", Normal(0.9, 0.15), (0.4, 1.4)),
     )
 
