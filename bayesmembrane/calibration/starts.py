@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesmembrane.calibration.descent import descend
+from bayesmembrane.calibration.descent import Patience, descend
 from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.sampling.convergence import effective_draws
@@ -17,6 +17,8 @@ from bayesmembrane.ground.parameters import Array
 BROAD, CLOSE, ROUNDS, EACH = 256, 256, 5, 192
 HALVINGS = 40  # of the interval of tempering powers
 VALLEYS, ITERATIONS, TURNS = 8, 40, 8
+ROUGH = Patience(behind=10.0, slow_below=1e-2)
+"""Draws this wide do not ask for an optimum: a descent is done where its last steps won a hundredth of |r|^2 each."""
 WIDER = 1.5  # of the Laplace approximation
 DEGREES = 4.0  # of freedom of the t-distribution around a valley
 SPARE = 1.5  # effective number of candidates for each walker
@@ -134,7 +136,7 @@ def _around_valleys(objective: Objective, pool: Array, rms: float, rng: np.rando
 
     x = np.array(separated(pool, objective.spread, VALLEYS))
     for turn in range(TURNS):
-        x, size = descend(residuals, x, (low, high), ITERATIONS)
+        x, size = descend(residuals, x, (low, high), ITERATIONS, patience=ROUGH)
         best, before = x[int(np.argmin(size))], sigma
         sigma = max(float(np.sqrt(np.mean(objective(best)[0] ** 2))), floor)
         # With too large a noise the prior keeps the optimum off the data: of fine ones it takes several turns.
