@@ -58,6 +58,7 @@ def _diagnosed(case: OpenCase) -> Diagnosis:
         if min(p.effects[NOTHING], p.foreign[NOTHING]) > VERDICT.doubted:
             return _concluded(case, case.search, found)
     every = grown(case)
+    assert isinstance(every.search, Search)
     return _concluded(case, every.search, decided(case, summed(every)))
 
 

@@ -7,16 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
-from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.detection.scores import Signature
 from bayesmembrane.diagnosis.reference.noise import orthonormal
 from bayesmembrane.diagnosis.thresholds import DETECTION
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
-from bayesmembrane.physics.forward import Forward
 
 
-def signatures(search: Search, model: Candidate, effects: Sequence[Effect]) -> list[Signature]:
+def signatures(search: Weighing, model: Candidate, effects: Sequence[Effect]) -> list[Signature]:
     """Signatures of ``effects`` beside the model's own slopes, at its parameters; invisible ones are left out."""
     own = orthonormal(search.noise.white(model.slopes))
     found = []
@@ -31,12 +30,10 @@ def signatures(search: Search, model: Candidate, effects: Sequence[Effect]) -> l
     return found
 
 
-def slopes_of_effect(search: Search, model: Candidate, effect: Effect) -> list[tuple[Array, int]]:
+def slopes_of_effect(search: Weighing, model: Candidate, effect: Effect) -> list[tuple[Array, int]]:
     """((N,) d (reading) / d (size), side on which it was taken) for several shapes; without those that have no film."""
     rows = _rows(model, effect)
-    whole = search.measurement
-    forward = Forward(with_effects(model.hypothesis, [effect]), whole, whole.deflection, search.solve)
-    force = forward(rows, reached=False).force
+    force = search.curves(with_effects(model.hypothesis, [effect]), rows)
     steps = rows[1:, model.x.size] - rows[0, model.x.size]
     found = [((moved - force[0]) / h, int(np.sign(h))) for moved, h in zip(force[1:], steps, strict=True)]
     return [(slope, side) for slope, side in found if np.all(np.isfinite(slope))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,10 +13,13 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, available
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.candidates.signatures import signatures
+from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.detection.detect import Detection, detect
 from bayesmembrane.diagnosis.detection.scores import Signature
+from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside
+from bayesmembrane.diagnosis.explanation.twins import Pairs, twins, twins_in_time
 from bayesmembrane.diagnosis.reference.inferred import own_noise
-from bayesmembrane.diagnosis.reference.noise import orthonormal, whitened
+from bayesmembrane.diagnosis.reference.noise import Whitened, orthonormal, whitened
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.diagnosis.thresholds import SEARCH
 from bayesmembrane.ground.errors import SettingsError
@@ -50,11 +54,11 @@ class Question:
 
 
 @dataclass(frozen=True, eq=False)
-class OpenCase:
+class Case(ABC):
     """Everything that the steps of a diagnosis need, and what they have found so far.
 
     question : what is asked
-    search : fits candidates; it has the measurement, its noise, the seed and the solver
+    search : fits candidates; it has the readings and their noise
     smooth : (N, p) the reference that no physics could beat
     plain : by energy, the fit without any but the given effects
     null : the one of these that was asked about: with the declared energy, or else the most probable
@@ -67,7 +71,7 @@ class OpenCase:
     """
 
     question: Question
-    search: Search
+    search: Weighing
     smooth: Array
     plain: Mapping[str, Candidate]
     null: Candidate
@@ -77,10 +81,6 @@ class OpenCase:
     detection: Detection
     rng: np.random.Generator
     tell: Tell
-
-    @property
-    def measurement(self) -> Measurement:
-        return self.search.measurement
 
     @property
     def visible(self) -> list[Effect]:
@@ -101,7 +101,48 @@ class OpenCase:
         effects = [e for e in self.effects if e.name not in candidate.names]
         found = signatures(self.search, candidate, effects)
         white = whitened(candidate.residual, candidate.slopes, self.smooth, self.search.noise.cautious())
+        return self.detected(white, found)
+
+    @abstractmethod
+    def detected(self, white: Whitened, found: Sequence[Signature]) -> Detection:
+        """The tests of a model that is freed of noise."""
+
+    @abstractmethod
+    def renewed(self, search: Weighing, best: Candidate) -> Weighing:
+        """The search with the noise that is left by the reference together with the slopes of the best candidate."""
+
+    @abstractmethod
+    def twins(self) -> Pairs:
+        """The pairs of effects that cannot be told apart here."""
+
+    @abstractmethod
+    def foreign(self, search: Weighing, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
+        """What is foreign beside the ``bases``, and a limit beside the ``others`` too; the most probable first."""
+
+
+@dataclass(frozen=True, eq=False)
+class OpenCase(Case):
+    """The case of one measurement."""
+
+    search: Search
+
+    @property
+    def measurement(self) -> Measurement:
+        return self.search.measurement
+
+    def detected(self, white: Whitened, found: Sequence[Signature]) -> Detection:
         return detect(self.measurement, white, found, self.rng)
+
+    def renewed(self, search: Weighing, best: Candidate) -> Search:
+        assert isinstance(search, Search)
+        return renewed(search, self.smooth, best)
+
+    def twins(self) -> Pairs:
+        return twins(self.effects, self.signatures) | twins_in_time(self.effects, self.measurement)
+
+    def foreign(self, search: Weighing, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
+        assert isinstance(search, Search)
+        return beside(search, bases, others)
 
 
 def opened(measurement: Measurement, question: Question, seed: int, solve: Solve, tell: Tell) -> OpenCase:
@@ -130,7 +171,7 @@ def opened(measurement: Measurement, question: Question, seed: int, solve: Solve
 
 
 def _seen_elsewhere(
-    search: Search, plain: Mapping[str, Candidate], effects: Sequence[Effect], seen: Collection[str]
+    search: Weighing, plain: Mapping[str, Candidate], effects: Sequence[Effect], seen: Collection[str]
 ) -> frozenset[str]:
     """Names of the effects that are not ``seen``, and leave a trace beside one of the plain fits."""
     hidden = {e.name: e for e in effects if e.name not in seen}

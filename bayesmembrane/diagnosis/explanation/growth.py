@@ -9,12 +9,11 @@ import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects, without_effect
 from bayesmembrane.diagnosis.candidates.evidence import Linear
-from bayesmembrane.diagnosis.candidates.search import Search, starts_with
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
-from bayesmembrane.diagnosis.candidates.standard import expected_size
+from bayesmembrane.diagnosis.candidates.weighing import Weighing, starts_with
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.case import OpenCase, renewed
-from bayesmembrane.diagnosis.explanation.twins import swapped, twins
+from bayesmembrane.diagnosis.explanation.case import Case
+from bayesmembrane.diagnosis.explanation.twins import swapped
 from bayesmembrane.diagnosis.thresholds import GROWTH, TWINS
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
@@ -32,8 +31,8 @@ class Grown:
     followed : sets of effects that larger ones were grown from
     """
 
-    case: OpenCase
-    search: Search
+    case: Case
+    search: Weighing
     found: dict[Key, Candidate] = field(default_factory=dict)
     starts: dict[str, list[Array]] = field(default_factory=dict)
     followed: set[frozenset[str]] = field(default_factory=set)
@@ -76,7 +75,7 @@ class Grown:
     def renew(self) -> None:
         """Noise from the best candidate, and all of them weighed under it."""
         best = max(self.found.values(), key=lambda c: c.log_evidence)
-        self.search = renewed(self.search, self.case.smooth, best)
+        self.search = self.case.renewed(self.search, best)
         self.found = {key: self.search.weighed_anew(c) for key, c in self.found.items()}
 
 
@@ -84,7 +83,7 @@ def _key(candidate: Candidate) -> Key:
     return candidate.hypothesis.material.name, frozenset(candidate.names)
 
 
-def grown(case: OpenCase) -> Grown:
+def grown(case: Case) -> Grown:
     """All hypotheses that could carry weight: each single effect, and sets that grow from the most probable ones.
 
     Sets that turn out to be among these only as parts of larger ones are grown from in their turn.
@@ -159,7 +158,7 @@ def _with_twins(out: Grown) -> None:
     energy, known = best.hypothesis.material.name, {e.name: e for e in out.case.effects}
     unseen = [
         (old, new)
-        for old, new, names in swapped(frozenset(best.names), twins(out.case))
+        for old, new, names in swapped(frozenset(best.names), out.case.twins())
         if (energy, names) not in out.found and new in known
     ]
     for old, new in unseen[: TWINS.added]:
@@ -189,7 +188,7 @@ def _promising(out: Grown, base: Candidate, size: int) -> list[Effect]:
     return promising[: GROWTH.refits] if len(promising) > GROWTH.least_refits else rest[: GROWTH.least_refits]
 
 
-def first_order(search: Search, base: Candidate, effect: Effect) -> float:
+def first_order(search: Weighing, base: Candidate, effect: Effect) -> float:
     """ln K of a little of ``effect`` beside ``base``, to first order, at the best of several shapes.
 
     ln K = (s.r)^2 / (s.s + 1) / 2 - ln(1 + s.s) / 2 of the slope s by the expected size, both freed of what the base
@@ -197,7 +196,7 @@ def first_order(search: Search, base: Candidate, effect: Effect) -> float:
     with one no larger than usual is tried too, with what that costs.
     """
     model = search.linear(base)
-    size = expected_size(effect, search.measurement)
+    size = search.expected_size(effect)
     slopes = [(slope * size, side) for slope, side in slopes_of_effect(search, base, effect)]
     if not slopes:
         return -np.inf
@@ -226,7 +225,7 @@ def _added(out: Grown, base: Candidate, effect: Effect) -> Candidate | None:
     names = [e.title for e in base.hypothesis.effects if e.name not in out.case.null.names]
     out.case.tell(f"refitting with {' and '.join([*names, effect.title])}")
     hypothesis = with_effects(base.hypothesis, [effect])
-    return out.search.fit(hypothesis, starts_with(_bases(out, base), effect, out.case.measurement), base)
+    return out.search.fit(hypothesis, starts_with(_bases(out, base), effect, out.search.expected_size(effect)), base)
 
 
 def _bases(out: Grown, base: Candidate) -> list[Array]:

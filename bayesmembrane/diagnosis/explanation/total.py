@@ -9,13 +9,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
-from bayesmembrane.diagnosis.candidates.standard import expected_size
+from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside, kinds_of
+from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown
-from bayesmembrane.diagnosis.explanation.twins import Stands, levelled, twins
+from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
 from bayesmembrane.diagnosis.thresholds import FOREIGN, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
 
@@ -155,17 +154,17 @@ def _raised(grown: Grown, weights: Mapping[int, float]) -> dict[frozenset[str], 
         same = [c for (_, own), c in grown.found.items() if own == names]
         total[names] = float(np.logaddexp.reduce([weights[id(c)] for c in same]))
         best = max(same, key=lambda c: weights[id(c)])
-        left = grown.search.excess(best) / before if _plausible(best, grown.case.measurement) else np.inf
+        left = grown.search.excess(best) / before if _plausible(best, grown.search) else np.inf
         stands[names] = Stands(left, best.log_evidence)
-    return levelled(total, stands, twins(grown.case))
+    return levelled(total, stands, grown.case.twins())
 
 
-def _plausible(candidate: Candidate, measurement: Measurement) -> bool:
+def _plausible(candidate: Candidate, search: Weighing) -> bool:
     """True if every effect of it is of a size that occurs, and away from its bound."""
     sizes = [(e, f"{e.name}.{e.size.name}") for e in candidate.hypothesis.effects]
     return all(
         name not in candidate.at_bound
-        and abs(candidate.parameters[name] - (e.size.null or 0.0)) < TWINS.usual * expected_size(e, measurement)
+        and abs(candidate.parameters[name] - (e.size.null or 0.0)) < TWINS.usual * search.expected_size(e)
         for e, name in sizes
     )
 
@@ -181,7 +180,7 @@ def _foreign(grown: Grown, every: Sequence[Candidate], given: Sequence[str]) -> 
     chosen.setdefault(NOTHING, bases[NOTHING])
     grown.case.tell("looking for what no effect describes")
     plain = [c for c in every if set_name(c, given) == NOTHING and c is not chosen[NOTHING]]
-    return beside(grown.search, list(chosen.values()), plain)
+    return grown.case.foreign(grown.search, list(chosen.values()), plain)
 
 
 def _normalised(log_weights: Array) -> Array:

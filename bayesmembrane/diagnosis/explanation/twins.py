@@ -8,16 +8,16 @@ and stand nearly as well, none is told to be more than `BELIEFS.apart` times as 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.diagnosis.detection.scores import confounded
+from bayesmembrane.diagnosis.detection.scores import Signature, confounded
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.thresholds import TWINS
+from bayesmembrane.physics.effects.base import Effect
 
 Set = frozenset[str]
 
@@ -45,14 +45,18 @@ class Stands:
 Pairs = Mapping[Set, Near]
 
 
-def twins(case: OpenCase) -> Pairs:
-    """The pairs that this test cannot tell apart."""
-    still = {e.name for e in case.effects if not e.remembers}
+def twins(effects: Sequence[Effect], signatures: Sequence[Signature]) -> dict[Set, Near]:
+    """Pairs of ``effects`` that are functions of the deflection alone, and nearly coincide."""
+    still = {e.name for e in effects if not e.remembers}
     alike = Near(TWINS.alike, TWINS.behind)
-    out = {frozenset((a, b)): alike for a, b, _ in confounded(case.signatures) if {a, b} <= still}
-    if one_speed(case.measurement):
-        out |= {frozenset((e.name, o)): Near(TWINS.alike_in_time) for e in case.effects for o in e.twins_at_one_speed}
-    return out
+    return {frozenset((a, b)): alike for a, b, _ in confounded(signatures) if {a, b} <= still}
+
+
+def twins_in_time(effects: Sequence[Effect], measurement: Measurement) -> dict[Set, Near]:
+    """Pairs of ``effects`` of which one follows time and the other the way, where the disc moved at one speed."""
+    if not one_speed(measurement):
+        return {}
+    return {frozenset((e.name, o)): Near(TWINS.alike_in_time) for e in effects for o in e.twins_at_one_speed}
 
 
 def one_speed(measurement: Measurement) -> bool:

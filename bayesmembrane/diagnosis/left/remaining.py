@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
-from bayesmembrane.diagnosis.candidates.search import Search, beyond_noise
+from bayesmembrane.diagnosis.candidates.weighing import Weighing, beyond_noise
 from bayesmembrane.diagnosis.thresholds import VERDICT
 
 
@@ -45,7 +45,7 @@ class Remaining:
         return self.reduced_chi2 >= max(VERDICT.noise_chi2, 1.0 + by_chance) and not forms
 
 
-def remaining(search: Search, model: Candidate, plain: Candidate) -> Remaining:
+def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining:
     """What ``model`` leaves, beside what the ``plain`` one does; both as they were fitted, with their form error."""
     dof = max(model.residual.size - model.x.size, 1)
     left, before = search.excess(model), search.excess(plain)

@@ -10,8 +10,9 @@ from scipy.stats import cauchy, multivariate_t, norm
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.evidence import log_inside
-from bayesmembrane.diagnosis.candidates.search import Search, starts_with
+from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.candidates.standard import standard
+from bayesmembrane.diagnosis.candidates.weighing import starts_with
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.form_error import form_columns, traces
@@ -44,7 +45,7 @@ def single() -> tuple[Search, Candidate]:
 def beside(search: Search, plain: Candidate, name: str) -> Candidate:
     effect = components("effects")[name]()
     claim = with_effects(plain.hypothesis, [effect])
-    found = search.fit(claim, starts_with([plain.x], effect, search.measurement), plain)
+    found = search.fit(claim, starts_with([plain.x], effect, search.expected_size(effect)), plain)
     assert found is not None
     return search.polished(found)
 
