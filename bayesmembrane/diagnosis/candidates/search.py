@@ -68,8 +68,8 @@ class Search(Weighing):
     def axes(self, hypothesis: Hypothesis) -> Standard:
         return standard(hypothesis, self.measurement)
 
-    def expected_size(self, effect: Effect) -> float:
-        return expected_size(effect, self.measurement)
+    def expected_sizes(self, effect: Effect) -> Array:
+        return np.array([expected_size(effect, self.measurement)])
 
     def material_starts(self, hypothesis: Hypothesis) -> list[Array]:
         """Starts (k,) from draws of the material's prior brought to their best modulus, without any effect.

@@ -42,13 +42,13 @@ def slopes_of_effect(search: Weighing, model: Candidate, effect: Effect) -> list
 def _rows(model: Candidate, effect: Effect) -> Array:
     """Coordinates without the effect (first) and with a little of it, at several shapes."""
     null, size = effect.null, effect.size
-    step = DETECTION.small_size * size.scale
-    if (size.null or 0.0) + step > size.bounds[1]:
-        step = -step
+    side = 1 if (size.null or 0.0) + DETECTION.small_size * size.scale <= size.bounds[1] else -1
     rows = [np.concatenate([model.x, null])]
     shapes = [p for p in effect.coordinates if p.null is None]
     for q in DETECTION.shapes if shapes else DETECTION.shapes[:1]:
         theta = np.array([float(p.prior.quantile(q)) if p.null is None else p.null for p in effect.coordinates])
-        theta[0] = (size.null or 0.0) + step
+        for i in effect.sizes:
+            own = effect.coordinates[i]
+            theta[i] = (own.null or 0.0) + side * DETECTION.small_size * own.scale
         rows.append(np.concatenate([model.x, effect.within_bounds(theta)]))
     return np.array(rows)

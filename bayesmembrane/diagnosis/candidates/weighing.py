@@ -72,8 +72,8 @@ class Weighing(ABC):
         """The coordinates that are stepped in."""
 
     @abstractmethod
-    def expected_size(self, effect: Effect) -> float:
-        """The size of an effect that is expected before the data, in the unit of that parameter."""
+    def expected_sizes(self, effect: Effect) -> Array:
+        """(s,) of an effect, as many as it has, expected before the data, in the units of these parameters."""
 
     @abstractmethod
     def material_starts(self, hypothesis: Hypothesis) -> list[Array]:
@@ -242,9 +242,9 @@ def _freed(freeing: Freeing, r: Array, j: Array) -> tuple[Array, Array]:
     return out[:, :, 0], out[:, :, 1:]
 
 
-def starts_with(bases: Sequence[Array], effect: Effect, expected: float) -> list[Array]:
-    """Starts for ``bases`` (k,) with one more effect, in parts of its ``expected`` size: from the first a small and a
-    middling one, from the others a small one, and both signs where both are allowed.
+def starts_with(bases: Sequence[Array], effect: Effect, expected: Array) -> list[Array]:
+    """Starts for ``bases`` (k,) with one more effect, in parts of its ``expected`` (s,) sizes: from the first a small
+    and a middling one, from the others a small one, and both signs where both are allowed.
     """
     signs = (1.0,) if effect.size.one_sided else (1.0, -1.0)
     small, middling = SEARCH.small_share, SEARCH.middling_share
@@ -254,7 +254,8 @@ def starts_with(bases: Sequence[Array], effect: Effect, expected: float) -> list
             for share in (small, middling) if i == 0 else (small,):
                 for shape in [{}, *effect.starts] if i == 0 else [{}]:
                     theta = np.array([shape.get(p.name, p.typical) for p in effect.coordinates])
-                    theta[0] = (effect.size.null or 0.0) + sign * share * expected
+                    for j, scale in zip(effect.sizes, expected.tolist(), strict=True):
+                        theta[j] = (effect.coordinates[j].null or 0.0) + sign * share * scale
                     out.append(np.concatenate([base, effect.within_bounds(theta)]))
     return out
 

@@ -196,7 +196,7 @@ def first_order(search: Weighing, base: Candidate, effect: Effect) -> float:
     with one no larger than usual is tried too, with what that costs.
     """
     model = search.linear(base)
-    size = search.expected_size(effect)
+    size = float(search.expected_sizes(effect)[0])
     slopes = [(slope * size, side) for slope, side in slopes_of_effect(search, base, effect)]
     if not slopes:
         return -np.inf
@@ -225,7 +225,7 @@ def _added(out: Grown, base: Candidate, effect: Effect) -> Candidate | None:
     names = [e.title for e in base.hypothesis.effects if e.name not in out.case.null.names]
     out.case.tell(f"refitting with {' and '.join([*names, effect.title])}")
     hypothesis = with_effects(base.hypothesis, [effect])
-    return out.search.fit(hypothesis, starts_with(_bases(out, base), effect, out.search.expected_size(effect)), base)
+    return out.search.fit(hypothesis, starts_with(_bases(out, base), effect, out.search.expected_sizes(effect)), base)
 
 
 def _bases(out: Grown, base: Candidate) -> list[Array]:

@@ -161,12 +161,15 @@ def _raised(grown: Grown, weights: Mapping[int, float]) -> dict[frozenset[str], 
 
 def _plausible(candidate: Candidate, search: Weighing) -> bool:
     """True if every effect of it is of a size that occurs, and away from its bound."""
-    sizes = [(e, f"{e.name}.{e.size.name}") for e in candidate.hypothesis.effects]
-    return all(
-        name not in candidate.at_bound
-        and abs(candidate.parameters[name] - (e.size.null or 0.0)) < TWINS.usual * search.expected_size(e)
-        for e, name in sizes
-    )
+    for e in candidate.hypothesis.effects:
+        for i, expected in zip(e.sizes, search.expected_sizes(e).tolist(), strict=True):
+            p, name = e.coordinates[i], f"{e.name}.{e.coordinates[i].name}"
+            if (
+                name in candidate.at_bound
+                or abs(candidate.parameters[name] - (p.null or 0.0)) >= TWINS.usual * expected
+            ):
+                return False
+    return True
 
 
 def _foreign(grown: Grown, every: Sequence[Candidate], given: Sequence[str]) -> list[Foreign]:

@@ -70,6 +70,7 @@ class Effect(ABC):
     absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
     exact : True if it has no law that could be off: an offset is an offset
     remembers : False if it changes the curve by a function of the deflection alone, alike on every leg
+    of_the_material : True if all tests of one material have it, or none of them
     twins_at_one_speed : names of effects that only another speed, or a hold, tells from this one
     rank : orders effects within a stage; equal ranks go by name
     """
@@ -84,6 +85,7 @@ class Effect(ABC):
     absorbed: ClassVar[str] = ""
     exact: ClassVar[bool] = False
     remembers: ClassVar[bool] = True
+    of_the_material: ClassVar[bool] = False
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ()
     rank: ClassVar[int] = 0
     stage: ClassVar[str]
@@ -102,6 +104,11 @@ class Effect(ABC):
     def size(self) -> EffectParameter:
         """The parameter whose null value switches it off."""
         return self.coordinates[0]
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Numbers of the coordinates that switch it off together: of all but sets of effects the first alone."""
+        return (0,)
 
     @property
     def starts(self) -> list[dict[str, float]]:

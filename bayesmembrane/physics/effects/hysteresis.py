@@ -34,6 +34,7 @@ class Hysteresis(Carried):
         "do not close at rest and do not remember the largest deflection."
     )
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ("viscoelastic",)
+    of_the_material = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("level", "-", "half of the width of a loop over the force", HalfNormal(0.1), (0.0, 0.9), 0.0),
         EffectParameter(

@@ -28,6 +28,7 @@ class Mullins(Carried):
         "Unloading and reloading below the previous maximum are softer than first loading and coincide with each "
         "other; the curve rejoins first loading where the previous maximum is passed."
     )
+    of_the_material = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "softening",

@@ -29,6 +29,7 @@ class PermanentSet(Deflection):
         "reloading starts there, and the shift grows with the largest deflection, not with time."
     )
     rank: ClassVar[int] = 1
+    of_the_material = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "set", "m", "deflection at which the film is slack after the test", HalfNormal(1e-3), (0.0, 2e-2), 0.0

@@ -34,6 +34,7 @@ class Viscoelastic(Memory):
         "Unloading below loading in every cycle, with a gap that depends on time and speed and closes at rest; force "
         "falls in holds and recovers at zero."
     )
+    of_the_material = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "strength", "-", "part of the instantaneous force that relaxes", HalfNormal(0.2), (0.0, 0.98), 0.0

@@ -45,7 +45,7 @@ def single() -> tuple[Search, Candidate]:
 def beside(search: Search, plain: Candidate, name: str) -> Candidate:
     effect = components("effects")[name]()
     claim = with_effects(plain.hypothesis, [effect])
-    found = search.fit(claim, starts_with([plain.x], effect, search.expected_size(effect)), plain)
+    found = search.fit(claim, starts_with([plain.x], effect, search.expected_sizes(effect)), plain)
     assert found is not None
     return search.polished(found)
 

@@ -14,7 +14,6 @@ from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.explanation.growth import Grown
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import hypothesis
-from tests.diagnosis.curves import measured
 
 LEFT = 100.0
 
@@ -27,18 +26,19 @@ def candidate(*effects: str, log_evidence: float) -> Candidate:
 
 def effects(monkeypatch: pytest.MonkeyPatch, takes: float, gain: float) -> dict[str, float]:
     """Probabilities where friction explains the curve, and Mullins beside it ``takes`` squares and ``gain`` in ln Z."""
-    monkeypatch.setattr(total, "twins", lambda _: frozenset())
     monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
-    monkeypatch.setattr(total, "beside", lambda *_: [])
     squares = {frozenset(): LEFT, frozenset({"friction"}): 20.0, frozenset({"friction", "mullins"}): 20.0 - takes}
-    search = SimpleNamespace(excess=lambda c: squares[frozenset(c.names)])
+    search = SimpleNamespace(
+        excess=lambda c: squares[frozenset(c.names)], expected_sizes=lambda e: np.array([e.size.scale])
+    )
     plain = candidate(log_evidence=-60.0)
     case = SimpleNamespace(
         null=plain,
         plain={"gent": plain},
         visible=[None] * 4,
         question=SimpleNamespace(energy=None),
-        measurement=measured(np.ones(3)),
+        twins=lambda: frozenset(),
+        foreign=lambda *_: [],
         tell=lambda _: None,
     )
     grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
