@@ -164,13 +164,13 @@ def opened(measurement: Measurement, question: Question, seed: int, solve: Solve
     effects = tuple(available(measurement, hypothesis))
     rng = np.random.default_rng([seed, 7])
     found = signatures(search, null, effects)
-    elsewhere = _seen_elsewhere(search, plain, effects, {s.effect for s in found})
+    elsewhere = seen_elsewhere(search, plain, effects, {s.effect for s in found})
     seen = whitened(null.residual, null.slopes, smooth, search.noise.cautious())
     detection = detect(measurement, seen, found, rng)
     return OpenCase(question, search, smooth, plain, null, effects, tuple(found), elsewhere, detection, rng, tell)
 
 
-def _seen_elsewhere(
+def seen_elsewhere(
     search: Weighing, plain: Mapping[str, Candidate], effects: Sequence[Effect], seen: Collection[str]
 ) -> frozenset[str]:
     """Names of the effects that are not ``seen``, and leave a trace beside one of the plain fits."""

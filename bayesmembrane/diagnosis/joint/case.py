@@ -1,0 +1,151 @@
+"""The case of several tests of one material: all energies fitted to all of them, the model tested on all together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.signatures import signatures
+from bayesmembrane.diagnosis.candidates.weighing import Weighing
+from bayesmembrane.diagnosis.detection.detect import Detection
+from bayesmembrane.diagnosis.detection.lack_of_fit import lack_of_fit
+from bayesmembrane.diagnosis.detection.scores import Signature, score_test
+from bayesmembrane.diagnosis.explanation.case import Case, OpenCase, Question, Tell, renewed, seen_elsewhere
+from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside
+from bayesmembrane.diagnosis.explanation.twins import Near, Pairs, twins, twins_in_time
+from bayesmembrane.diagnosis.joint.search import JointSearch, joint_noise
+from bayesmembrane.diagnosis.joint.units import AT, Unit, units
+from bayesmembrane.diagnosis.reference.noise import Whitened, whitened
+from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.hypothesis import Hypothesis
+
+
+@dataclass(frozen=True, eq=False)
+class JointCase(Case):
+    """The case of several tests.
+
+    search : as the case began; its noise is that of every test alone
+    alone : the case of every test
+    labels : what the tests are called
+    """
+
+    search: JointSearch
+    alone: tuple[OpenCase, ...]
+    labels: tuple[str, ...]
+
+    def detected(self, white: Whitened, found: Sequence[Signature]) -> Detection:
+        return Detection(lack_of_fit(white), score_test(white, found, self.rng), None)
+
+    def renewed(self, search: Weighing, best: Candidate) -> JointSearch:
+        assert isinstance(search, JointSearch)
+        parts = []
+        for part, case, rows in zip(search.parts, self.alone, search.rows, strict=True):
+            keep = np.zeros(search.force.size, dtype=bool)
+            keep[rows] = True
+            parts.append(renewed(part, case.smooth, best.at(keep)))
+        return replace(search, parts=tuple(parts), noise=joint_noise([p.noise for p in parts]))
+
+    def twins(self) -> Pairs:
+        """Those that no test tells apart: of the material in all of its tests, of a rig in that one."""
+        out: dict[frozenset[str], Near] = dict(twins(self.effects, self.signatures))
+        each = [twins_in_time(c.effects, c.measurement) for c in self.alone]
+        names = {u.name: u for u in self.effects if isinstance(u, Unit)}
+        for i, pairs in enumerate(each):
+            for pair, near in pairs.items():
+                own = [n for n in names if n.partition(AT)[0] in pair and names[n].within(i) is not None]
+                if len(own) == 2 and all(pair in each[t] for n in own for t in names[n].places):
+                    out[frozenset(own)] = near
+        return out
+
+    def foreign(self, search: Weighing, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
+        """What is foreign in one of the tests, weighed in that test alone."""
+        assert isinstance(search, JointSearch)
+        found: list[Foreign] = []
+        for i, (part, label) in enumerate(zip(search.parts, self.labels, strict=True)):
+            whole: dict[int, Candidate] = {}
+            own: list[list[Candidate]] = [[], []]
+            for group, several in zip(own, (bases, others), strict=True):
+                for c in several:
+                    if (here := search.restricted(c, i)) is not None:
+                        whole[id(here)] = c
+                        group.append(here)
+            found += [
+                replace(f, base=whole[id(f.base)], kind=f"{f.kind}{AT}{label}") for f in beside(part, own[0], own[1])
+            ]
+        return sorted(found, key=lambda f: -(f.gain + f.base.log_evidence))
+
+
+def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Question, tell: Tell) -> JointCase:
+    """Every energy fitted to all tests, from where each of them alone was, and the null model tested.
+
+    The effects of ``question`` are at work in every test where they can occur; those of the cases have them, too.
+    Raises `SettingsError` if no film of any energy reaches the ends of all tests.
+    """
+    thickness = [c.measurement.specimen.thickness for c in alone]
+    parts = tuple(c.search for c in alone)
+    noise = joint_noise([p.noise for p in parts])
+    search = JointSearch(parts, tuple(t / min(thickness) for t in thickness), noise)
+    given = units([{e.name: e for e in c.question.hypothesis.effects} for c in alone], labels)
+    effects = tuple(units([{e.name: e for e in c.effects} for c in alone], labels))
+    smooth = np.asarray(block_diag(*(c.smooth for c in alone)))
+    plain = _energies(search, alone, question, given, tell)
+    best = max(plain.values(), key=lambda c: c.log_evidence)
+    declared = question.hypothesis.material.name
+    if question.declared and declared not in plain:
+        raise SettingsError(f"no {declared} film reaches the data of all tests", remedy="use another material")
+    null = plain[declared] if question.declared else best
+    tell("testing the residuals of all tests")
+    rng = np.random.default_rng([alone[0].search.seed, 8])
+    found = signatures(search, null, effects)
+    elsewhere = seen_elsewhere(search, plain, effects, {s.effect for s in found})
+    white = whitened(null.residual, null.slopes, smooth, noise.cautious())
+    detection = Detection(lack_of_fit(white), score_test(white, found, rng), None)
+    return JointCase(
+        question,
+        search,
+        smooth,
+        plain,
+        null,
+        effects,
+        tuple(found),
+        elsewhere,
+        detection,
+        rng,
+        tell,
+        tuple(alone),
+        tuple(labels),
+    )
+
+
+def _energies(
+    search: JointSearch, alone: Sequence[OpenCase], question: Question, given: Sequence[Unit], tell: Tell
+) -> dict[str, Candidate]:
+    """Every energy that reaches all tests, with the given effects."""
+    found = {}
+    for name in [n for n in alone[0].plain if all(n in c.plain for c in alone)]:
+        kind = alone[0].plain[name].hypothesis.material
+        claim = Hypothesis(kind, tuple(given), question.hypothesis.noise, question.hypothesis.convexity)
+        tell(f"fitting {kind.title} to all tests")
+        candidate = search.fit(claim, [*_starts(search, claim, [c.plain[name] for c in alone])])
+        if candidate is not None:
+            found[name] = candidate
+    if not found:
+        raise SettingsError("no film of any energy reaches the data of all tests", remedy="use shorter ranges")
+    return found
+
+
+def _starts(search: JointSearch, claim: Hypothesis, alone: Sequence[Candidate]) -> list[Array]:
+    """The energy as each test alone has it, with the effects as each has its own; then draws of the prior."""
+    n, out = claim.material_size, []
+    for i, own in enumerate(alone):
+        x = np.concatenate([own.x[:n], *(u.typical for u in claim.effects)])
+        x[0] -= np.log(search.thicker[i])
+        for j, there in enumerate(alone):
+            x[search.places(claim, j)[n:]] = there.x[n:]
+        out.append(x)
+    return [*out, *search.material_starts(claim)]

@@ -1,0 +1,90 @@
+"""What may be at work in several tests: an effect of the material in all of them, or one of the rig in one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from bayesmembrane.physics.effects.base import Effect
+
+AT = "@"
+
+
+@dataclass(frozen=True)
+class Unit(Effect):
+    """An effect in one or several tests, there or absent in all of them at once.
+
+    Its coordinates are those of its parts, test by test: what is of the same material has, in another test, another
+    history, and in another range another size. A subclass of its own has the name and the coordinates (`unit`).
+
+    parts : (number of the test, the effect there)
+    """
+
+    parts: tuple[tuple[int, Effect], ...] = ()
+    stage: ClassVar[str] = ""
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        return tuple(begin for begin, _ in self.places.values())
+
+    @property
+    def places(self) -> dict[int, tuple[int, int]]:
+        """{number of a test: (first, behind the last) of its coordinates}."""
+        found, begin = {}, 0
+        for test, effect in self.parts:
+            found[test] = (begin, begin + len(effect.coordinates))
+            begin += len(effect.coordinates)
+        return found
+
+    @property
+    def starts(self) -> list[dict[str, float]]:
+        """Those of its first part, in all."""
+        first = self.parts[0][1].starts
+        several = len(self.parts) > 1
+        return [{(f"{t}.{k}" if several else k): v for t, _ in self.parts for k, v in start.items()} for start in first]
+
+    def within(self, test: int) -> Effect | None:
+        """The effect in one test; None if it is not at work there."""
+        return dict(self.parts).get(test)
+
+
+def unit(name: str, parts: Sequence[tuple[int, Effect]]) -> Unit:
+    """The ``parts`` (number of the test, effect) of one effect, under a name."""
+    first = parts[0][1]
+    several = len(parts) > 1
+    coordinates = tuple(
+        replace(p, name=f"{test}.{p.name}") if several else p for test, effect in parts for p in effect.coordinates
+    )
+    kind = type(
+        "Unit",
+        (Unit,),
+        {
+            "name": name,
+            "title": first.title,
+            "reference": first.reference,
+            "signature": first.signature,
+            "coordinates": coordinates,
+            "exact": first.exact,
+            "remembers": first.remembers,
+            "of_the_material": first.of_the_material,
+        },
+    )
+    made: Unit = kind(tuple(parts))
+    return made
+
+
+def units(effects: Sequence[Mapping[str, Effect]], labels: Sequence[str]) -> list[Unit]:
+    """The units of the ``effects`` by name of every test: of the material once, of a rig once for each test.
+
+    Those of a rig are called after their test, as in ``zero_offset@strip``.
+    """
+    names = list(dict.fromkeys(name for own in effects for name in own))
+    out = []
+    for name in names:
+        parts = [(i, own[name]) for i, own in enumerate(effects) if name in own]
+        if parts[0][1].of_the_material:
+            out.append(unit(name, parts))
+        else:
+            out += [unit(f"{name}{AT}{labels[i]}", [(i, effect)]) for i, effect in parts]
+    return out
