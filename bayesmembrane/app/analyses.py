@@ -34,6 +34,7 @@ from bayesmembrane.data.phases import phases_of
 from bayesmembrane.data.published import read_published_table
 from bayesmembrane.diagnosis.diagnose import diagnose as run_diagnose
 from bayesmembrane.diagnosis.explanation.case import Question
+from bayesmembrane.diagnosis.joint.diagnose import JointDiagnosis, diagnose_jointly
 from bayesmembrane.diagnosis.loop import Loop, LoopSettings
 from bayesmembrane.diagnosis.loop import loop as run_loop
 from bayesmembrane.diagnosis.result import Diagnosis
@@ -210,12 +211,18 @@ def population(runs: Sequence[Run], work: Work, *, pool: Sequence[str] = ()) -> 
     return kept("population", found, document(found), named, work.out)
 
 
-def _asked_jointly(verb: str, by: Callable[..., Any], claims: Sequence[Joint], settings: Mapping[str, Any]) -> Asked:
+def _asked_jointly(
+    verb: str,
+    by: Callable[..., Any],
+    claims: Sequence[Joint],
+    settings: Mapping[str, Any],
+    also: Sequence[type[Any]] = (),
+) -> Asked:
     """As `asked`, about tests: the folder is called after them."""
     parts = [part for claim in claims for part in claim.parts]
     labels = {"labels": [list(claim.labels) for claim in claims]}
     measurements, hypotheses = [p.measurement for p in parts], [p.hypothesis for p in parts]
-    what = asked(verb, by, measurements, hypotheses, {**settings, **labels})
+    what = asked(verb, by, measurements, hypotheses, {**settings, **labels}, list(also))
     model = "-".join(claim.label() for claim in claims)
     return replace(what, specimen="-".join(claims[0].labels), model=model, end=float("nan"))
 
@@ -257,6 +264,19 @@ def diagnose(measurement: Measurement, claim: Hypothesis | Question, work: Work)
         return stored
     found = run_diagnose(measurement, question, seed=work.seed, tell=lambda text: work.tell(label, text))
     return kept("diagnosis", found, document(found), what, work.out)
+
+
+def diagnose_joint(claim: Joint, work: Work, *, declared: bool = True, quick: bool = False) -> Answer[JointDiagnosis]:
+    """Whether one energy describes several tests, and what is missing in which of them if not."""
+    settings = {"seed": work.seed, "declared": declared, "quick": quick}
+    what = _asked_jointly("diagnose", diagnose_jointly, [claim], settings, library())
+    if (stored := held("joint_diagnosis", what, work.out)) is not None:
+        return stored
+    label = claim.label()
+    found = diagnose_jointly(
+        claim, declared=declared, quick=quick, seed=work.seed, tell=lambda text: work.tell(label, text)
+    )
+    return kept("joint_diagnosis", found, document(found), what, work.out)
 
 
 def loop(

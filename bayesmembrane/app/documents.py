@@ -11,6 +11,7 @@ from bayesmembrane.calibration.joint.fit import JointFit
 from bayesmembrane.calibration.joint.run import JointRun
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.comparison.result import Comparison
+from bayesmembrane.diagnosis.joint.diagnose import JointDiagnosis
 from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.errors import SettingsError
@@ -18,7 +19,17 @@ from bayesmembrane.ground.plain import plain
 from bayesmembrane.reconstruction.result import Reconstruction
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
-from bayesmembrane.words import comparison, diagnosis, joint, loop, population, reconstruction, sampling, valleys
+from bayesmembrane.words import (
+    comparison,
+    diagnosis,
+    joint,
+    joint_diagnosis,
+    loop,
+    population,
+    reconstruction,
+    sampling,
+    valleys,
+)
 
 
 def document(result: Any) -> dict[str, Any]:
@@ -40,6 +51,8 @@ def _document(result: Any) -> Mapping[str, Any]:
             return valleys.document(result)
         case Diagnosis():
             return diagnosis.document(result)
+        case JointDiagnosis():
+            return joint_diagnosis.document(result)
         case Loop():
             return loop.document(result)
         case Comparison():

@@ -25,6 +25,7 @@ from bayesmembrane.data.importers.base import read_export
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.sequence import read_one_after_another
 from bayesmembrane.diagnosis.explanation.case import Question
+from bayesmembrane.diagnosis.joint.diagnose import JointDiagnosis
 from bayesmembrane.diagnosis.loop import Loop, LoopSettings
 from bayesmembrane.diagnosis.other_tests import OtherTest, predicted
 from bayesmembrane.diagnosis.result import Diagnosis
@@ -210,13 +211,35 @@ def valleys(
     return analyses.valleys(measurement, hypothesis, _work(seed, out), ends=ends, rise=loss_rise).result
 
 
+@overload
 def diagnose(
-    measurement: Measurement, hypothesis: Hypothesis | None = None, *, seed: int = 0, out: Folder | None = None
-) -> Diagnosis:
+    measurement: Measurement, hypothesis: Hypothesis | None = ..., *, seed: int = ..., out: Folder | None = ...
+) -> Diagnosis: ...
+
+
+@overload
+def diagnose(
+    measurement: Tests, hypothesis: Claims | None = ..., *, seed: int = ..., out: Folder | None = ...
+) -> JointDiagnosis: ...
+
+
+def diagnose(
+    measurement: Measurement | Tests,
+    hypothesis: Claims | None = None,
+    *,
+    seed: int = 0,
+    out: Folder | None = None,
+) -> Diagnosis | JointDiagnosis:
     """How probable it is that nothing, an effect, another energy or something foreign is behind the curve.
 
-    ``hypothesis`` has the energy that is preferred beforehand; without one all are as probable.
+    ``hypothesis`` has the energy that is preferred beforehand; without one all are as probable. Several measurements
+    (a list, or a dict by label) of one material share the energy: what is missing then has a test where it is missing.
     """
+    if not isinstance(measurement, Measurement):
+        claim = _asked(None).hypothesis if hypothesis is None else hypothesis
+        both = joint_of(measurement, claim)
+        return analyses.diagnose_joint(both, _work(seed, out), declared=hypothesis is not None).result
+    hypothesis = None if hypothesis is None else _single(hypothesis)
     return analyses.diagnose(measurement, _asked(hypothesis), _work(seed, out)).result
 
 

@@ -30,8 +30,12 @@ def material_title(name: str) -> str:
 
 
 def effect_title(name: str) -> str:
-    """How an effect is printed; of one that nobody declares (any more) its name, with spaces for underscores."""
-    return _title("effects", name)
+    """How an effect is printed; of one that nobody declares (any more) its name, with spaces for underscores.
+
+    ``zero_offset@strip`` is one in the test called strip.
+    """
+    own, _, test = name.partition("@")
+    return f"{_title('effects', own)} in {test}" if test else _title("effects", own)
 
 
 def title(component: Any) -> str:

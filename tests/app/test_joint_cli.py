@@ -140,3 +140,22 @@ def test_runs_of_specimens_make_a_population(run: Run, short_walks: None) -> Non
     code, out, err = run("population", runs[0], "--out", "p")
     assert (code, out) == (1, "")
     assert "two specimens at least" in err
+
+
+def test_what_two_tests_miss_is_asked_of_both_and_shown(run: Run, folder: Path) -> None:
+    """The sheet reads a tenth too much: alone its modulus absorbs it."""
+    rows = [line.split(",") for line in (folder / "sheet.csv").read_text().splitlines()[1:]]
+    lines = [f"{a},{1.1 * float(b):.8f}" for a, b in rows]
+    (folder / "sheet.csv").write_text("\n".join(["stretch,nominal_stress_MPa", *lines]))
+    code, out, err = run("diagnose", "project.toml", "--quick", "--json", "--out", "answers")
+    assert code == 0, err
+    answer = json.loads(out)
+    assert answer["verdict"] != "adequate"
+    assert any(name.partition("@")[0] in ("thickness", "force_gain") for name in answer["effects"])
+    assert set(answer["tests"]) == {"strip", "sheet"}
+    assert "strip and sheet together" in answer["sentence"]
+    code, _, err = run("report", "answers", "--out", "page")
+    assert code == 0, err
+    page = (folder / "page" / "index.html").read_text()
+    assert "What several tests miss" in page
+    assert "<svg" in page or "data:image" in page

@@ -5,17 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from bayesmembrane.app.options import (
-    CurveOptions,
     HypothesisOptions,
     PreferredMaterialOption,
     QuickOption,
     RangeOption,
     StoredOutputOptions,
+    TestsOptions,
 )
 from bayesmembrane.app.terminal import answer, note, say, status, table
 
 if TYPE_CHECKING:
     from bayesmembrane.data.measurement import Measurement
+    from bayesmembrane.diagnosis.joint.diagnose import JointDiagnosis
 
 place = 9
 
@@ -23,7 +24,7 @@ CANDIDATES = 8
 
 
 def verb(
-    curve: CurveOptions,
+    curve: TestsOptions,
     material: PreferredMaterialOption,
     beside: HypothesisOptions,
     used: RangeOption,
@@ -33,7 +34,15 @@ def verb(
     """How probable it is that nothing, an effect, another energy or something foreign is behind the curve."""
     from bayesmembrane.app import analyses
     from bayesmembrane.diagnosis.explanation.case import Question
+    from bayesmembrane.words.language import listed
 
+    if curve.several:
+        together = beside.joint(material.name, curve.listed(used))
+        with status(f"Diagnosing {listed(together.labels)} together") as tell:
+            work = analyses.Work(output.seed, output.folder, tell=lambda _, text: tell(text))
+            both = analyses.diagnose_joint(together, work, declared=material.declared, quick=how.quick)
+        answer(both.document, output.as_json, lambda: show_jointly(both.document, both.result))
+        return
     claim = beside.with_material(material.name)
     question = Question(claim, material.declared, how.quick)
     measurement = used.of(curve.read())
@@ -42,6 +51,23 @@ def verb(
         work = analyses.Work(output.seed, output.folder, tell=lambda _, text: tell(text))
         found = analyses.diagnose(measurement, question, work)
     answer(found.document, output.as_json, lambda: show(found.document, measurement))
+
+
+def show_jointly(document: dict[str, Any], found: JointDiagnosis) -> None:
+    """A diagnosis of several tests on the terminal."""
+    from bayesmembrane.words.seen import seen
+
+    say(document["sentence"])
+    rows = [
+        [r["effect"], r["material"], f"{r['probability']:.3f}", f"{r['log_bayes_factor']:.1f}"]
+        for r in document["ranking"][:CANDIDATES]
+    ]
+    table("Candidates", ["effects", "energy", "probability", "ln Bayes factor"], rows)
+    errors = []
+    for t in found.tests:
+        how = seen(t.measurement)
+        errors.append([t.label, how.error(t.before.rmse_N), how.error(t.after.rmse_N), f"{t.after.reduced_chi2:.2f}"])
+    table("Residuals, root mean square", ["test", "before", "after", "reduced chi-square after"], errors)
 
 
 def say_thinning(measurement: Measurement) -> None:

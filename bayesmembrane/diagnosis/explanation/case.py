@@ -54,7 +54,7 @@ class Question:
 
 
 @dataclass(frozen=True, eq=False)
-class Case(ABC):
+class DiagnosisCase(ABC):
     """Everything that the steps of a diagnosis need, and what they have found so far.
 
     question : what is asked
@@ -121,7 +121,7 @@ class Case(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class OpenCase(Case):
+class OpenCase(DiagnosisCase):
     """The case of one measurement."""
 
     search: Search

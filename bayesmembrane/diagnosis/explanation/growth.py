@@ -12,7 +12,7 @@ from bayesmembrane.diagnosis.candidates.evidence import Linear
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.weighing import Weighing, starts_with
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.case import Case
+from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.twins import swapped
 from bayesmembrane.diagnosis.thresholds import GROWTH, TWINS
 from bayesmembrane.ground.parameters import Array
@@ -31,7 +31,7 @@ class Grown:
     followed : sets of effects that larger ones were grown from
     """
 
-    case: Case
+    case: DiagnosisCase
     search: Weighing
     found: dict[Key, Candidate] = field(default_factory=dict)
     starts: dict[str, list[Array]] = field(default_factory=dict)
@@ -83,7 +83,7 @@ def _key(candidate: Candidate) -> Key:
     return candidate.hypothesis.material.name, frozenset(candidate.names)
 
 
-def grown(case: Case) -> Grown:
+def grown(case: DiagnosisCase) -> Grown:
     """All hypotheses that could carry weight: each single effect, and sets that grow from the most probable ones.
 
     Sets that turn out to be among these only as parts of larger ones are grown from in their turn.

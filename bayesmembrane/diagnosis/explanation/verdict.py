@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.case import Case
+from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import first_order
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, Total, set_name
@@ -34,7 +34,7 @@ class Verdict:
     foreign: Foreign | None = None
 
 
-def adequate(case: Case) -> Verdict:
+def adequate(case: DiagnosisCase) -> Verdict:
     """The tests see nothing. What single effects could still be there is told to first order.
 
     What is foreign is weighed all the same: it may have been taken for noise, or be of a shape that no test asks for.
@@ -50,7 +50,7 @@ def adequate(case: Case) -> Verdict:
     return Verdict("adequate", (judged,), (judged,), p, told)
 
 
-def decided(case: Case, total: Total) -> Verdict:
+def decided(case: DiagnosisCase, total: Total) -> Verdict:
     """The verdict of a sum over hypotheses, of a model that misses something.
 
     What is foreign beside effects that carry nearly all of the misfit is told with them; where it carries more, a name
@@ -102,7 +102,7 @@ def _carried(candidate: Candidate) -> bool:
     return candidate.energy_error > VERDICT.carried or law > VERDICT.law_carried
 
 
-def _without_effects(case: Case, total: Total, members: tuple[Judged, ...]) -> Verdict:
+def _without_effects(case: DiagnosisCase, total: Total, members: tuple[Judged, ...]) -> Verdict:
     """No effect is needed: another energy, if that describes the curve; else an energy that is not known."""
     best, p = members[0], total.probabilities
     describes = case.tested(best.candidate).adequate or best.candidate.energy_error < VERDICT.carried
@@ -114,7 +114,7 @@ def _without_effects(case: Case, total: Total, members: tuple[Judged, ...]) -> V
     return Verdict("adequate", members, total.ranking, p)
 
 
-def _first_order(case: Case, found: Sequence[Foreign]) -> Probabilities:
+def _first_order(case: DiagnosisCase, found: Sequence[Foreign]) -> Probabilities:
     """Probabilities of single effects beside the energies, from their traces alone, and of what is foreign."""
     count, visible = len(case.plain), case.visible
     log_energy = {

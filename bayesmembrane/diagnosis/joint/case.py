@@ -8,25 +8,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed
 from bayesmembrane.diagnosis.candidates.signatures import signatures
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.detection.detect import Detection
 from bayesmembrane.diagnosis.detection.lack_of_fit import lack_of_fit
 from bayesmembrane.diagnosis.detection.scores import Signature, score_test
-from bayesmembrane.diagnosis.explanation.case import Case, OpenCase, Question, Tell, renewed, seen_elsewhere
+from bayesmembrane.diagnosis.explanation.case import DiagnosisCase, OpenCase, Question, Tell, renewed, seen_elsewhere
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside
 from bayesmembrane.diagnosis.explanation.twins import Near, Pairs, twins, twins_in_time
+from bayesmembrane.diagnosis.joint.effects import AT, EffectInTests, effects_in_tests
 from bayesmembrane.diagnosis.joint.search import JointSearch, joint_noise
-from bayesmembrane.diagnosis.joint.units import AT, Unit, units
 from bayesmembrane.diagnosis.reference.noise import Whitened, whitened
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 
 @dataclass(frozen=True, eq=False)
-class JointCase(Case):
+class JointCase(DiagnosisCase):
     """The case of several tests.
 
     search : as the case began; its noise is that of every test alone
@@ -54,7 +55,7 @@ class JointCase(Case):
         """Those that no test tells apart: of the material in all of its tests, of a rig in that one."""
         out: dict[frozenset[str], Near] = dict(twins(self.effects, self.signatures))
         each = [twins_in_time(c.effects, c.measurement) for c in self.alone]
-        names = {u.name: u for u in self.effects if isinstance(u, Unit)}
+        names = {u.name: u for u in self.effects if isinstance(u, EffectInTests)}
         for i, pairs in enumerate(each):
             for pair, near in pairs.items():
                 own = [n for n in names if n.partition(AT)[0] in pair and names[n].within(i) is not None]
@@ -90,8 +91,8 @@ def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Q
     parts = tuple(c.search for c in alone)
     noise = joint_noise([p.noise for p in parts])
     search = JointSearch(parts, tuple(t / min(thickness) for t in thickness), noise)
-    given = units([{e.name: e for e in c.question.hypothesis.effects} for c in alone], labels)
-    effects = tuple(units([{e.name: e for e in c.effects} for c in alone], labels))
+    given = effects_in_tests([{e.name: e for e in c.question.hypothesis.effects} for c in alone], labels)
+    effects = tuple(effects_in_tests([_possible(c) for c in alone], labels))
     smooth = np.asarray(block_diag(*(c.smooth for c in alone)))
     plain = _energies(search, alone, question, given, tell)
     best = max(plain.values(), key=lambda c: c.log_evidence)
@@ -122,8 +123,14 @@ def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Q
     )
 
 
+def _possible(case: OpenCase) -> dict[str, Effect]:
+    """Effects that could be at work in one of several tests: those, too, that its own film would absorb alone."""
+    hidden = absorbed(case.measurement, case.question.hypothesis)
+    return {e.name: e for e in (*case.effects, *hidden)}
+
+
 def _energies(
-    search: JointSearch, alone: Sequence[OpenCase], question: Question, given: Sequence[Unit], tell: Tell
+    search: JointSearch, alone: Sequence[OpenCase], question: Question, given: Sequence[EffectInTests], tell: Tell
 ) -> dict[str, Candidate]:
     """Every energy that reaches all tests, with the given effects."""
     found = {}

@@ -10,14 +10,15 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.thinning import thinned
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.detection.detect import Detection
+from bayesmembrane.diagnosis.detection.scores import confounded
 from bayesmembrane.diagnosis.explanation.case import Question, Tell, opened
 from bayesmembrane.diagnosis.explanation.foreign import Foreign
 from bayesmembrane.diagnosis.explanation.growth import grown
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, summed
 from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, decided
 from bayesmembrane.diagnosis.joint.case import JointCase, opened_jointly
+from bayesmembrane.diagnosis.joint.effects import AT
 from bayesmembrane.diagnosis.joint.search import JointSearch
-from bayesmembrane.diagnosis.joint.units import AT
 from bayesmembrane.diagnosis.left.heldout import Misfit, misfit_of
 from bayesmembrane.diagnosis.left.remaining import Remaining, remaining
 from bayesmembrane.diagnosis.reference.outliers import SetAside, without_outliers
@@ -92,6 +93,8 @@ class JointDiagnosis(Showable):
     members : those that the verdict rests on
     foreign : the most probable thing that is foreign, and the label of the test where it is; None for nothing
     tests : one by one
+    confounded : (effect, effect, degrees) that these tests cannot separate
+    before, after : misfit of all readings
     """
 
     verdict: str
@@ -107,6 +110,9 @@ class JointDiagnosis(Showable):
     members: tuple[JointMember, ...]
     foreign: tuple[Foreign, str] | None
     tests: tuple[DiagnosedTest, ...]
+    confounded: tuple[tuple[str, str, float], ...]
+    before: Misfit
+    after: Misfit
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -188,8 +194,16 @@ def _concluded(
         ranking=tuple(_member(case, search, j, given) for j in found.ranking),
         members=tuple(_member(case, search, j, given) for j in found.members),
         foreign=told,
-        tests=tuple(_test(case, search, null, best, i, *k) for i, k in enumerate(kept)),
+        tests=tuple(_test(case, search, (null, best), i, k) for i, k in enumerate(kept)),
+        confounded=confounded(case.signatures),
+        before=_misfit(search, null),
+        after=_misfit(search, best),
     )
+
+
+def _misfit(search: JointSearch, c: Candidate) -> Misfit:
+    residual = search.adapted(c)
+    return misfit_of(residual, search.noise.each, c.x.size, search.noise.white(residual))
 
 
 def _placed(f: Foreign) -> tuple[Foreign, str]:
@@ -215,24 +229,22 @@ def _member(case: JointCase, search: JointSearch, j: Judged, given: set[str]) ->
 
 
 def _full(name: str, labels: Sequence[str]) -> str:
-    """``mullins@strip.softening`` of ``mullins.0.softening``; of a unit in one test its own name."""
-    unit, _, rest = name.partition(".")
+    """``mullins@strip.softening`` of ``mullins.0.softening``; of one in a single test its own name."""
+    effect, _, rest = name.partition(".")
     number, _, parameter = rest.partition(".")
-    return f"{unit}{AT}{labels[int(number)]}.{parameter}" if parameter else name
+    return f"{effect}{AT}{labels[int(number)]}.{parameter}" if parameter else name
 
 
 def _test(
     case: JointCase,
     search: JointSearch,
-    null: Candidate,
-    best: Candidate,
+    models: tuple[Candidate, Candidate],
     number: int,
-    short: Thinned | None,
-    aside: SetAside | None,
+    kept: tuple[Thinned | None, SetAside | None],
 ) -> DiagnosedTest:
     part, rows = search.parts[number], search.rows[number]
     misfits, residuals = [], []
-    for c in (null, best):
+    for c in models:
         residual = search.adapted(c)[rows]
         k = len(search.places(c.hypothesis, number))
         misfits.append(misfit_of(residual, part.noise.each, k, part.noise.white(residual)))
@@ -246,6 +258,5 @@ def _test(
         residuals[1],
         part.noise.sd,
         part.noise.stated,
-        short,
-        aside,
+        *kept,
     )

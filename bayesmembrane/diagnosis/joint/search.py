@@ -15,7 +15,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.candidates.standard import Shape, Size, Standard
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
-from bayesmembrane.diagnosis.joint.units import Unit
+from bayesmembrane.diagnosis.joint.effects import EffectInTests
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.ground.parameters import Array, Parameter
 from bayesmembrane.physics.effects.base import Effect
@@ -69,10 +69,10 @@ def rows_of(sizes: Sequence[int]) -> list[slice]:
 
 @dataclass(frozen=True, eq=False)
 class JointSearch(Weighing):
-    """Fits hypotheses, whose effects are `Unit`s, to several tests, and weighs them.
+    """Fits hypotheses, whose effects are `EffectInTests`s, to several tests, and weighs them.
 
-    The coordinates are those of the energy of the thinnest film, which all tests share, then those of the units. Errors
-    of the energy's form have one size in all tests, and so have those of a unit's law.
+    The coordinates are those of the energy of the thinnest film, which all tests share, then those of the effects.
+    Errors of the energy's form have one size in all tests, and so have those of the law of an effect.
 
     parts : the search of every test
     thicker : (P,) thickness of the film of every test over that of the thinnest
@@ -96,7 +96,7 @@ class JointSearch(Weighing):
         """What is claimed of one test."""
         made = self._made.get(test)
         if made is None or made[0] is not hypothesis:
-            own = tuple(e for u in _units(hypothesis) if (e := u.within(test)) is not None)
+            own = tuple(e for u in _effects(hypothesis) if (e := u.within(test)) is not None)
             made = hypothesis, Hypothesis(hypothesis.material, own, hypothesis.noise, hypothesis.convexity)
             self._made[test] = made
         return made[1]
@@ -105,7 +105,7 @@ class JointSearch(Weighing):
         """Where the coordinates of one test stand."""
         n = hypothesis.material_size
         found, begin = [np.arange(n)], n
-        for u in _units(hypothesis):
+        for u in _effects(hypothesis):
             if test in u.places:
                 found.append(begin + np.arange(*u.places[test]))
             begin += len(u.coordinates)
@@ -143,7 +143,7 @@ class JointSearch(Weighing):
         each = []
         for i, (part, rows) in enumerate(zip(self.parts, self.rows, strict=True)):
             at = self._acting(effects, i)
-            inner = [cast(Effect, cast(Unit, effects[k]).within(i)) for k in at]
+            inner = [cast(Effect, cast(EffectInTests, effects[k]).within(i)) for k in at]
             each.append((at, inner, part.forms(force[rows], inner, traces[at][:, rows])))
         energy = [c[0] for _, _, c in each]
         laws: list[list[tuple[int, tuple[Parameter | None, Array]]]] = [[] for _ in effects]
@@ -169,7 +169,7 @@ class JointSearch(Weighing):
         return Standard(tuple(out[k] for k in range(hypothesis.curve_size)))
 
     def expected_sizes(self, effect: Effect) -> Array:
-        return np.concatenate([self.parts[i].expected_sizes(e) for i, e in cast(Unit, effect).parts])
+        return np.concatenate([self.parts[i].expected_sizes(e) for i, e in cast(EffectInTests, effect).parts])
 
     def material_starts(self, hypothesis: Hypothesis) -> list[Array]:
         """Those of every test in turn, as many as there are of one test."""
@@ -190,8 +190,8 @@ class JointSearch(Weighing):
         return self.parts[test].at(self.of(candidate.hypothesis, test), x)
 
     def _acting(self, effects: Sequence[Effect], test: int) -> list[int]:
-        """Numbers of the units that are at work in one test."""
-        return [k for k, u in enumerate(effects) if cast(Unit, u).within(test) is not None]
+        """Numbers of the effects that are at work in one test."""
+        return [k for k, u in enumerate(effects) if cast(EffectInTests, u).within(test) is not None]
 
     def _diagonal(self, pieces: Sequence[tuple[int, tuple[Parameter | None, Array]]]) -> Array:
         """(N, m) columns of several tests side by side, each zero at the readings of the others."""
@@ -203,5 +203,5 @@ class JointSearch(Weighing):
         return out
 
 
-def _units(hypothesis: Hypothesis) -> list[Unit]:
-    return [cast(Unit, e) for e in hypothesis.effects]
+def _effects(hypothesis: Hypothesis) -> list[EffectInTests]:
+    return [cast(EffectInTests, e) for e in hypothesis.effects]

@@ -12,11 +12,11 @@ AT = "@"
 
 
 @dataclass(frozen=True)
-class Unit(Effect):
+class EffectInTests(Effect):
     """An effect in one or several tests, there or absent in all of them at once.
 
     Its coordinates are those of its parts, test by test: what is of the same material has, in another test, another
-    history, and in another range another size. A subclass of its own has the name and the coordinates (`unit`).
+    history, and in another range another size. A subclass of its own has the name and the coordinates (`in_tests`).
 
     parts : (number of the test, the effect there)
     """
@@ -49,7 +49,7 @@ class Unit(Effect):
         return dict(self.parts).get(test)
 
 
-def unit(name: str, parts: Sequence[tuple[int, Effect]]) -> Unit:
+def in_tests(name: str, parts: Sequence[tuple[int, Effect]]) -> EffectInTests:
     """The ``parts`` (number of the test, effect) of one effect, under a name."""
     first = parts[0][1]
     several = len(parts) > 1
@@ -57,8 +57,8 @@ def unit(name: str, parts: Sequence[tuple[int, Effect]]) -> Unit:
         replace(p, name=f"{test}.{p.name}") if several else p for test, effect in parts for p in effect.coordinates
     )
     kind = type(
-        "Unit",
-        (Unit,),
+        "EffectInTests",
+        (EffectInTests,),
         {
             "name": name,
             "title": first.title,
@@ -70,12 +70,12 @@ def unit(name: str, parts: Sequence[tuple[int, Effect]]) -> Unit:
             "of_the_material": first.of_the_material,
         },
     )
-    made: Unit = kind(tuple(parts))
+    made: EffectInTests = kind(tuple(parts))
     return made
 
 
-def units(effects: Sequence[Mapping[str, Effect]], labels: Sequence[str]) -> list[Unit]:
-    """The units of the ``effects`` by name of every test: of the material once, of a rig once for each test.
+def effects_in_tests(effects: Sequence[Mapping[str, Effect]], labels: Sequence[str]) -> list[EffectInTests]:
+    """The ``effects`` by name of every test: of the material once, of a rig once for each test.
 
     Those of a rig are called after their test, as in ``zero_offset@strip``.
     """
@@ -84,7 +84,7 @@ def units(effects: Sequence[Mapping[str, Effect]], labels: Sequence[str]) -> lis
     for name in names:
         parts = [(i, own[name]) for i, own in enumerate(effects) if name in own]
         if parts[0][1].of_the_material:
-            out.append(unit(name, parts))
+            out.append(in_tests(name, parts))
         else:
-            out += [unit(f"{name}{AT}{labels[i]}", [(i, effect)]) for i, effect in parts]
+            out += [in_tests(f"{name}{AT}{labels[i]}", [(i, effect)]) for i, effect in parts]
     return out

@@ -1,0 +1,76 @@
+import numpy as np
+import pytest
+
+from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.joint.effects import effects_in_tests
+from bayesmembrane.diagnosis.joint.search import JointSearch, joint_noise
+from bayesmembrane.diagnosis.reference.inferred import own_noise
+from bayesmembrane.diagnosis.reference.smooth import smooth_reference
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
+from tests.diagnosis.joint.tests_of_one_film import two_tests
+
+
+@pytest.fixture(scope="module")
+def searches(tmp_path_factory) -> list[Search]:
+    both = two_tests(tmp_path_factory.mktemp("film"), "mullins", "gent", 30.0, 61001)
+    return [Search(m, own_noise(m, smooth_reference(m))) for m in both]
+
+
+def jointly(parts: list[Search], thicker: tuple[float, ...], names: tuple[str, ...]) -> tuple[JointSearch, Hypothesis]:
+    effects = [{n: components("effects")[n]() for n in names} for _ in parts]
+    plain = hypothesis("gent")
+    claim = Hypothesis(plain.material, tuple(effects_in_tests(effects, ("one", "two")[: len(parts)])), plain.noise)
+    return JointSearch(tuple(parts), thicker, joint_noise([p.noise for p in parts])), claim
+
+
+def test_one_test_together_equals_that_test(searches) -> None:
+    names = ("mullins", "zero_offset")
+    search, claim = jointly(searches[:1], (1.0,), names)
+    alone = hypothesis("gent", names)
+    x = searches[0].material_starts(alone)[0]
+    one, other = searches[0].at(alone, x), search.at(claim, x)
+    assert one is not None
+    assert other is not None
+    assert other.log_evidence == pytest.approx(one.log_evidence, abs=1e-8)
+    assert other.residual == pytest.approx(one.residual, abs=1e-12)
+    assert other.traces == pytest.approx(one.traces, abs=1e-12)
+
+
+def test_tests_of_their_own_effects_are_independent_but_for_the_energy(searches) -> None:
+    """With nothing to learn of the energy, ln Z of both is the sum of each: here of noise and form error alone."""
+    search, claim = jointly(searches, (1.0, 1.0), ("mullins", "zero_offset"))
+    assert [e.name for e in claim.effects] == ["mullins", "zero_offset@one", "zero_offset@two"]
+    x = search.material_starts(claim)[0]
+    r, slopes = search.batch(claim, x[None, :])
+    for i, (part, rows) in enumerate(zip(searches, search.rows, strict=True)):
+        own = part.batch(search.of(claim, i), search.coordinates(claim, i, x)[None, :])
+        assert np.array_equal(r[:, rows], own[0])
+        places = search.places(claim, i)
+        assert np.array_equal(slopes[:, rows][:, :, places], own[1])
+        others = np.setdiff1d(np.arange(x.size), places)
+        assert not np.any(slopes[:, rows][:, :, others])
+
+
+def test_a_film_twice_as_thick_has_twice_the_membrane_modulus(searches) -> None:
+    search, claim = jointly(searches, (1.0, 2.0), ())
+    x = search.material_starts(claim)[0]
+    thin, thick = (search.coordinates(claim, i, x) for i in (0, 1))
+    assert claim.films(thick)[0, 0] == pytest.approx(2 * claim.films(thin)[0, 0])
+    assert thick[1:] == pytest.approx(thin[1:])
+
+
+def test_joint_noise_is_that_of_every_test(searches) -> None:
+    noise = joint_noise([s.noise for s in searches])
+    values = np.random.default_rng(0).standard_normal(sum(len(s.measurement) for s in searches))
+    white = noise.white(values)
+    for s, rows in zip(searches, noise.rows, strict=True):
+        assert white[rows] == pytest.approx(s.noise.white(values[rows]))
+    assert noise.log_root == pytest.approx(sum(s.noise.log_root for s in searches))
+
+
+def test_an_effect_of_the_material_grows_in_all_tests_at_once(searches) -> None:
+    search, claim = jointly(searches, (1.0, 1.0), ("mullins",))
+    (unit,) = claim.effects
+    assert unit.sizes == (0, len(components("effects")["mullins"].coordinates))
+    assert search.expected_sizes(unit) == pytest.approx([unit.coordinates[i].scale for i in unit.sizes])
