@@ -132,13 +132,14 @@ def _importance(chains: Chains, mass: Mass) -> dict[str, float] | None:
     if chains.mixture is None:
         return None
     found = offers(chains)
+    log_evidence, sd = mass.divides(found.log_mean, found.log_mean_sd)
     return {
         "k_hat": found.k_hat,
         "efficiency": found.efficiency,
         "log_integral": found.log_mean,
         "log_integral_sd": found.log_mean_sd,
-        "log_evidence": found.log_mean - float(np.log(mass.value)),
-        "log_evidence_sd": float(np.hypot(found.log_mean_sd, mass.sd / mass.value)),
+        "log_evidence": log_evidence,
+        "log_evidence_sd": sd,
     }
 
 

@@ -187,13 +187,13 @@ def predict_draws(
         full_range=measurement.full_range,
         deflection=grid,
         beyond=grid > end * (1 + 1e-9),
-        curve=_band(curve),
-        repeat=_band(curve + _noise_sd(hypothesis, measurement, x, grid) * rng.standard_normal(curve.shape)),
+        curve=band(curve),
+        repeat=band(curve + _noise_sd(hypothesis, measurement, x, grid) * rng.standard_normal(curve.shape)),
         lost=np.array([np.mean(status == s, axis=0) for s in reasons]).reshape(len(reasons), grid.size),
         reasons=tuple(s.label for s in reasons),
-        residual=_band(measurement.force - here.force),
-        rest_residual=_band(unused.force - rest_force),
-        curves_at=_band(here.force + carried.at_points()),
+        residual=band(measurement.force - here.force),
+        rest_residual=band(unused.force - rest_force),
+        curves_at=band(here.force + carried.at_points()),
         film=films[chosen],
         convex={m.name: float(np.mean(m.holds(m.margin(here, hypothesis.material)))) for m in RESTRICTING},
         shape_at=shape_at,
@@ -207,7 +207,7 @@ def predict_draws(
         break_at=broken,
         break_thickness=thickness,
         break_force=np.array([b.force for b in breaks]),
-        break_predicted=_band(scaled),
+        break_predicted=band(scaled),
         break_lost=np.mean(~np.isfinite(scaled), axis=0),
         specimens=tuple(b.specimen for b in breaks),
     )
@@ -281,7 +281,7 @@ def _shape_deflections(end: float, last: float) -> Array:
     return np.array([*at, last] if last > 1.02 * end else at)
 
 
-def _band(values: Array) -> Array:
+def band(values: Array) -> Array:
     """Quantiles (Q, G) of values (B, G) that exist; nan where fewer than `FEWEST` do."""
     out = np.full((len(QUANTILES), values.shape[1]), np.nan)
     enough = np.flatnonzero(np.mean(np.isfinite(values), axis=0) >= FEWEST)

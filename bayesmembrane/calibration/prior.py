@@ -30,6 +30,10 @@ class Mass:
     value: float
     sd: float
 
+    def divides(self, log_integral: float, sd: float) -> tuple[float, float]:
+        """(ln Z, its standard error) of a ln of an integral over the untruncated prior: less ln of the mass."""
+        return log_integral - float(np.log(self.value)), float(np.hypot(sd, self.sd / self.value))
+
 
 @dataclass(frozen=True)
 class JointPrior:

@@ -158,8 +158,8 @@ def _by_weights(run: Run, mass: Mass) -> ByWeights | None:
     found = run.status.get("importance")
     if found is None:
         return None
-    sd = float(np.hypot(found["log_integral_sd"], mass.sd / mass.value))
-    return ByWeights(float(found["log_integral"] - np.log(mass.value)), sd, float(found["k_hat"]))
+    log_evidence, sd = mass.divides(float(found["log_integral"]), float(found["log_integral_sd"]))
+    return ByWeights(log_evidence, sd, float(found["k_hat"]))
 
 
 def _mass(posterior: Posterior, seed: int) -> Mass:

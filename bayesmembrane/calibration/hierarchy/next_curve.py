@@ -10,7 +10,7 @@ import numpy as np
 
 from bayesmembrane.calibration.hierarchy.population import Population, population
 from bayesmembrane.calibration.hierarchy.specimens import LN_MODULUS, of_runs
-from bayesmembrane.calibration.predictions import FEWEST, QUANTILES
+from bayesmembrane.calibration.predictions import QUANTILES, band
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.ground.parameters import Array
@@ -98,9 +98,9 @@ def next_curve(found: Population, runs: Sequence[Run], seed: int = 0) -> NextCur
         rig=rig,
         thickness=film.thickness,
         deflection=at,
-        middle=_band(middle),
-        curve=_band(curve),
-        reading=_band(reading),
+        middle=band(middle),
+        curve=band(curve),
+        reading=band(reading),
         lost=np.mean(~np.isfinite(curve), axis=0),
         tested=tuple((labels[id(r)], *_shown(r, film.thickness)) for r in alike),
         without_form=isinstance(claim.noise, Form),
@@ -129,12 +129,3 @@ def _shown(run: Run, thickness: float) -> tuple[Array, Array]:
     m = run.measurement
     rows = np.unique(np.linspace(0, len(m) - 1, min(len(m), SHOWN)).astype(int))
     return m.deflection[rows], m.force[rows] * thickness / m.specimen.thickness
-
-
-def _band(values: Array) -> Array:
-    """Quantiles (Q, G) of values (B, G) that exist; nan where fewer than `FEWEST` do."""
-    out = np.full((len(QUANTILES), values.shape[1]), np.nan)
-    enough = np.mean(np.isfinite(values), axis=0) >= FEWEST
-    if np.any(enough):
-        out[:, enough] = np.nanquantile(values[:, enough], QUANTILES, axis=0)
-    return out

@@ -8,48 +8,28 @@ from typing import ClassVar, Self
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.film_law import FilmLaw, film_law
 from bayesmembrane.physics.mechanics.request import Request, Spared, request
 from bayesmembrane.physics.mechanics.solution import Curves, Status
-from bayesmembrane.physics.rigs.base import Films, Rig, Trial
+from bayesmembrane.physics.rigs._ring import Ring
+from bayesmembrane.physics.rigs.base import Films, Trial
 
 WIDER = 1.5
 """How much wider a disc could be."""
 
 
 @dataclass(frozen=True)
-class Annulus(Rig):
+class Annulus(Ring):
     """Film between the radii R1 (edge of the disc) and R2 (edge of the clamp), 0 < R1 < R2, in m.
 
     The disc is lifted by the deflection; deflection and force are positive for a lifted disc.
     """
 
-    inner_radius: float
-    outer_radius: float
-
     name: ClassVar[str] = "annulus"
     title: ClassVar[str] = "clamped annulus with a lifted disc"
-    clamped: ClassVar[bool] = True
-
-    def check(self) -> None:
-        """Raise `DataError` unless R1 < R2."""
-        if self.inner_radius >= self.outer_radius:
-            raise DataError(
-                f"the inner radius ({1e3 * self.inner_radius:g} mm) must be smaller than the outer radius "
-                f"({1e3 * self.outer_radius:g} mm)",
-                self.name,
-                "exchange them if they are swapped, and check their units",
-            )
-
-    def size(self) -> float:
-        return self.outer_radius
-
-    def ring(self) -> tuple[float, float]:
-        return self.inner_radius, self.outer_radius
 
     @classmethod
     def example(cls) -> Self:

@@ -18,43 +18,30 @@ from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.contour_law import ContourLaw, contour_curves
 from bayesmembrane.physics.mechanics.request import request
 from bayesmembrane.physics.mechanics.solution import Curves
-from bayesmembrane.physics.rigs.base import Films, Rig, Trial
+from bayesmembrane.physics.rigs._ring import Ring
+from bayesmembrane.physics.rigs.base import Films, Trial
 
 OFF = 0.01
 """Of a radius or of the lift: so far beyond the film a reading may lie."""
 
 
 @dataclass(frozen=True)
-class Contour(Rig):
+class Contour(Ring):
     """Heights h(r) > 0 above the clamp of a film between the radii R1 and R2 whose disc is lifted by ``lift``, m.
 
     Radii stand in the place of deflections and heights in that of forces. A contour tells the shape of the energy and
     nothing of its modulus: it is a second test of the film whose forces were measured.
     """
 
-    inner_radius: float
-    outer_radius: float
     lift: float
 
     name: ClassVar[str] = "contour"
     title: ClassVar[str] = "traced contour of a clamped annulus"
     columns: ClassVar[Mapping[str, str]] = {"radius": LENGTH, "height": LENGTH}
     noise: ClassVar[Mapping[str, str]] = {"height_sd": LENGTH}
-    clamped: ClassVar[bool] = True
     closed_form: ClassVar[bool] = True  # one state of the film: nothing is drawn through points of a curve
     has_path: ClassVar[bool] = False
     axes: ClassVar[tuple[str, float, str]] = ("radius", 0.0, "height")
-
-    def check(self) -> None:
-        if self.inner_radius >= self.outer_radius:
-            fault = f"the inner radius ({1e3 * self.inner_radius:g} mm) must be smaller than the outer one"
-            raise DataError(fault, self.name, "exchange them if they are swapped, and check their units")
-
-    def size(self) -> float:
-        return self.outer_radius
-
-    def ring(self) -> tuple[float, float]:
-        return self.inner_radius, self.outer_radius
 
     @classmethod
     def example(cls) -> Self:
