@@ -85,8 +85,8 @@ def run_case(case: Case) -> Row:
     except (BayesmembraneError, np.linalg.LinAlgError) as error:
         return row | {"error": str(error)}
     sets: dict[str, float] = {}
-    for name, p in both.probabilities.effects.items():
-        sets[here(name)] = sets.get(here(name), 0.0) + p
+    for name, q in both.probabilities.effects.items():
+        sets[here(name)] = sets.get(here(name), 0.0) + q
     effects = sorted({here(n) for n in both.effects})
     row["both"] = {
         "verdict": both.verdict,
