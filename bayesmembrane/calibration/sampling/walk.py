@@ -17,7 +17,7 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.sampling.chains import Chains, joined
-from bayesmembrane.calibration.sampling.convergence import BURN_TAUS, LEAST_TAUS, Convergence, convergence
+from bayesmembrane.calibration.sampling.convergence import BURN_TAUS, LEAST_STEPS, LEAST_TAUS, Convergence, convergence
 from bayesmembrane.calibration.sampling.leaps import BLOCK, blocks, leap, offers
 from bayesmembrane.calibration.sampling.proposals.independent import Independent, independent
 from bayesmembrane.calibration.sampling.proposals.learned import learn, next_lesson
@@ -175,6 +175,8 @@ def _worth_it(chains: Chains, found: Convergence) -> bool:
 def _next_look(chains: Chains, found: Convergence, settings: Settings) -> int:
     """The steps at which everything may be there, within GROWTH of what was walked."""
     steps = chains.steps
+    if steps < LEAST_STEPS:
+        return LEAST_STEPS  # until then nothing is known
     tau = float(np.max(found.tau))
     needed = max(LEAST_TAUS * tau, (steps - found.burn) * settings.ess / float(np.min(found.ess)))
     guess = int(np.ceil(needed * 1.02)) + found.burn
@@ -194,8 +196,10 @@ def _proposals_for_z(judged: Worth) -> float:
 def _progress(chains: Chains, found: Convergence, settings: Settings) -> Progress:
     rate = chains.steps / max(chains.seconds, 1e-9)
     least, tau = float(np.min(found.ess)), float(np.max(found.tau))
-    needed = max(LEAST_TAUS * tau, (chains.steps - found.burn) * settings.ess / least) + found.burn
-    left = max(0.0, (needed - chains.steps) / rate)
+    left = float("nan")
+    if least > 0:
+        needed = max(LEAST_TAUS * tau, (chains.steps - found.burn) * settings.ess / least) + found.burn
+        left = max(0.0, (needed - chains.steps) / rate)
     r_hat = float(np.max(found.r_hat))
     return Progress(chains.steps, least, settings.ess, r_hat, tau, rate, left, found.acceptance)
 

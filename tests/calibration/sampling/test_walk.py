@@ -161,6 +161,19 @@ def test_an_interruption_at_once_is_survived_in_silence(capsys: pytest.CaptureFi
     assert lp.shape == (2, 32)
 
 
+@pytest.mark.parametrize("most", [10, 19, 2000])
+def test_looks_that_come_before_anything_is_known(most: int) -> None:
+    """Before 20 steps there is neither tau nor ESS: nothing is foretold then, and the walk goes on to where there is."""
+    told: list[Progress] = []
+    target = Normal()
+    how = Settings(ess=500, chunk=10, most_steps=most)
+    found = run_ensembles(target, how, 0, told.append, start(target))  # type: ignore[arg-type]
+    assert found.status == ("converged" if most == 2000 else "step limit")
+    assert (told[0].steps, told[0].ess) == (10, 0.0)
+    assert np.isnan(told[0].seconds_left)
+    assert all(np.isfinite(p.seconds_left) for p in told if p.steps >= 20)
+
+
 def test_progress_tells_what_is_left() -> None:
     seen: list[Progress] = []
     target = Normal()
