@@ -1,6 +1,6 @@
 """Stored files that are damaged: each ends in a sentence, and none in a traceback or in other numbers.
 
-python -m tests.studies.damage --times 500 --table docs/studies/damage.md
+python -m tests.studies.damage --times 500 --table docs/studies/damage.md [--only run campaign answers]
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from bayesmembrane.app import analyses
-from bayesmembrane.app.folders import lying
+from bayesmembrane.app.folders import RUN, lying
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.calibration.sampling.segments import Segments
 from bayesmembrane.calibration.sampling.walk import Settings
@@ -89,6 +89,7 @@ DAMAGES: tuple[Callable[[bytes, Rng], bytes], ...] = (
 )  # fmt: skip
 
 GOOD = ("told", "as it was", "passed over", "as it stands")
+PARTS = ("run", "campaign", "answers")
 
 
 def stored(place: Path) -> Path:
@@ -102,15 +103,15 @@ def stored(place: Path) -> Path:
 
 
 def read(folder: Path) -> Any:
-    """All that a report and `load` read there, as plain bytes of what matters."""
+    """All that a report and `load` read there, as plain bytes of what matters; what takes longest comes last."""
     kept: list[Any] = []
-    for each in lying([folder]):
+    here = sorted(lying([folder]), key=lambda each: each.kind == RUN)
+    walks = [Segments(each.folder).read() for each in here if each.kind == RUN]
+    kept += [walk and walk.x.tobytes() for walk in walks]
+    for each in here:
         result = each.read()
         if isinstance(result, Run):
-            assert result.path is not None
             kept += [result.settings, result.status, result.draws().tobytes(), result.curves().tobytes()]
-            walked = Segments(result.path).read()
-            kept += [walked and walked.x.tobytes()]
         else:
             kept.append(result.summary())
     found = gathered([folder])
@@ -175,12 +176,20 @@ def _became(file: File, now: Any, whole: Any, without: Any, damage: str) -> str:
     return f"other numbers ({damage})" if file.sealed else "as it stands"
 
 
-def table(found: dict[str, Counter[str]], times: int, seed: int) -> str:
-    def row(name: str, count: Counter[str]) -> str:
-        good = [count[g] for g in GOOD]
-        return "| " + " | ".join(map(str, [name, count.total(), *good, count.total() - sum(good)])) + " |"
+def row(name: str, count: Counter[str]) -> str:
+    good = [count[g] for g in GOOD]
+    return "| " + " | ".join(map(str, [name, count.total(), *good, count.total() - sum(good)])) + " |"
 
-    rows = "\n".join(row(name, count) for name, count in found.items())
+
+def merged(found: dict[str, Counter[str]], page: str) -> dict[str, str]:
+    """Lines of the table by file: as they stand on the ``page``, with those that were ``found`` in their place."""
+    lines = [line for line in page.splitlines() if line.startswith("| ")]
+    stand = {line.split(" | ")[0].removeprefix("| "): line for line in lines[1:]}
+    return stand | {name: row(name, count) for name, count in found.items()}
+
+
+def table(lines: dict[str, str], times: int, seed: int) -> str:
+    rows = "\n".join(lines.values())
     return f"""# Stored files that are damaged
 
 `make study-damage` (`python -m tests.studies.damage --times {times} --seed {seed}`): each file of a folder with a run,
@@ -205,13 +214,18 @@ def main() -> int:
     parser.add_argument("--times", type=int, default=500)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--table", type=Path)
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, help="other lines of the table stay")
     given = parser.parse_args()
+    found: dict[str, Counter[str]] = {}
     with tempfile.TemporaryDirectory() as place:
         root = Path(place)
-        files = [*campaign(root / "campaign"), *answers(root / "answers")]
-        found = damaged_more(files, given.times, given.seed)
-        found = damaged(stored(root / "run"), given.times, given.seed) | found
-    page = table(found, given.times, given.seed)
+        for name, made in (("campaign", campaign), ("answers", answers)):
+            if name in given.only:
+                found |= damaged_more(made(root / name), given.times, given.seed)
+        if "run" in given.only:  # last, for it makes all walks short
+            found = damaged(stored(root / "run"), given.times, given.seed) | found
+    before = given.table.read_text(encoding="utf-8") if given.table is not None and given.table.is_file() else ""
+    page = table(merged(found, before), given.times, given.seed)
     if given.table is not None:
         given.table.write_text(page, encoding="utf-8")
     print(page)

@@ -1,5 +1,6 @@
 """A small fixed part of `make study-damage`: every stored file, every kind of damage once."""
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -28,3 +29,12 @@ def test_damage_of_a_campaign_and_of_answers_is_told(tmp_path: Path) -> None:
         assert set(count) <= set(damage.GOOD), (name, count)
     assert found["campaign: plan.json"]["told"] > 5
     assert found["campaign: records/KEY.json"]["passed over"] > 5
+
+
+def test_what_is_not_damaged_again_stays_in_the_table() -> None:
+    before = damage.table({n: damage.row(n, Counter(told=40)) for n in ("fit.json", "run.toml")}, 40, 0)
+    rows = damage.merged({"run.toml": Counter(told=499, nothing=1)}, before)
+    assert rows == {
+        "fit.json": "| fit.json | 40 | 40 | 0 | 0 | 0 | 0 |",
+        "run.toml": "| run.toml | 500 | 499 | 0 | 0 | 0 | 1 |",
+    }
