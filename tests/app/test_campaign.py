@@ -190,7 +190,7 @@ def test_a_campaign_that_is_killed_and_resumed_has_the_draws_of_one_that_was_not
     assert draws(tmp_path / "killed") == draws(tmp_path / "calm")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.study), signal.SIGTERM])
 def test_a_signal_ends_with_130_and_the_command_that_goes_on(run: Run, tmp_path: Path, number: int) -> None:
     file = write_campaign(tmp_path, sampling="ess = 1e6\nmost_steps = 200000", films=("a",))
     client = begun(tmp_path, "run", file, "--out", "night", "--workers", 1)

@@ -37,7 +37,10 @@ def called(pieces: int, words: list[str], cwd: Path) -> tuple[int, str, list[str
 
 @pytest.mark.parametrize(
     ("verb", "more"),
-    [("valleys", ["--material", "mooney_rivlin"]), ("loop", ["--material", "neo_hookean", "--ess", "100"])],
+    [
+        pytest.param("valleys", ["--material", "mooney_rivlin"], marks=pytest.mark.study),
+        ("loop", ["--material", "neo_hookean", "--ess", "100"]),
+    ],
 )
 def test_killed_and_asked_again_is_as_if_it_had_not_been(verb: str, more: list[str], tmp_path: Path) -> None:
     curve = strip(tmp_path)

@@ -77,6 +77,7 @@ def test_a_clear_effect_is_named_and_explains_the_residual(tmp_path, kind, mater
     assert answer["ranking"][0]["log_bayes_factor"] >= answer["ranking"][-1]["log_bayes_factor"]
 
 
+@pytest.mark.study
 def test_an_effect_with_a_look_alike_stays_inside_the_answer(tmp_path) -> None:
     # Slip and a permanent set both make the curve start later; 25 degrees apart here.
     data, found = answered(tmp_path, "clamp_slip", "gent", "staircase_twice", "white", 513)
@@ -88,6 +89,7 @@ def test_an_effect_with_a_look_alike_stays_inside_the_answer(tmp_path) -> None:
     assert found.after.rmse_N < 1.1 * data.truth["noise"]["sd"]
 
 
+@pytest.mark.study
 def test_a_frame_that_stiffens_with_the_load_gets_no_other_name(tmp_path) -> None:
     """The library's frame is linear, and a shift of the zero looks alike: an energy that is a little off, too."""
     data, found = answered(tmp_path, "machine_compliance", "ogden", "two_speeds", "ar1:0.3+quantised+uneven", 120074)
@@ -126,6 +128,7 @@ def test_the_moment_of_a_sudden_change_is_told(tmp_path) -> None:
     assert float(sentence(found).split(" % at ")[-1].split(" s ")[0]) == pytest.approx(moment, abs=6)
 
 
+@pytest.mark.study
 def test_a_sudden_change_where_films_tear_is_a_tear_or_worse_and_nothing_is_sure(tmp_path) -> None:
     """It falls on the way to a new maximum: a tear there leaves the same trace."""
     _, found = answered(tmp_path, "temperature_step", "mooney_rivlin", "two_speeds", "ar1:0.5", 50086)
@@ -135,6 +138,7 @@ def test_a_sudden_change_where_films_tear_is_a_tear_or_worse_and_nothing_is_sure
     assert max(set(told) - {"none"}, key=lambda kind: told[kind]) == "sudden_change"
 
 
+@pytest.mark.study
 def test_what_the_form_of_a_named_effect_leaves_is_no_further_effect(tmp_path) -> None:
     """A stretched exponential of a signal-to-noise ratio of 60: the library's spectrum leaves more than noise."""
     data = generate("viscoelastic", "neo_hookean", "staircase", "white", 3.0, 50701)
