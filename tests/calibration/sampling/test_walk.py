@@ -163,7 +163,7 @@ def test_an_interruption_at_once_is_survived_in_silence(capsys: pytest.CaptureFi
 
 @pytest.mark.parametrize("most", [10, 19, 2000])
 def test_looks_that_come_before_anything_is_known(most: int) -> None:
-    """Before 20 steps there is neither tau nor ESS: nothing is foretold then, and the walk goes on to where there is."""
+    """Before 20 steps there is neither tau nor ESS: nothing is foretold, and the walk goes on."""
     told: list[Progress] = []
     target = Normal()
     how = Settings(ess=500, chunk=10, most_steps=most)
