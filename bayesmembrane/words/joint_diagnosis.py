@@ -105,7 +105,10 @@ def _answer(found: JointDiagnosis) -> str:
         return f"{misses}: {_common(found)}these tests cannot tell which of these it is: {'; or '.join(names)}{rest}."
     if found.members:
         return f"{misses}: {_member(found.members[0], found)} is the most probable, yet leaves too much to be named."
-    return f"{misses}, and no effect of the library, no energy and no small error of their forms does."
+    sure = found.probabilities.sure()
+    are = "is" if len(sure) == 1 else "are"
+    beside = f" beside {set_title('+'.join(sure))}, which {are} in all that is probable" if sure else ""
+    return f"{misses}, and no effect of the library, no energy and no small error of their forms does{beside}."
 
 
 def _common(found: JointDiagnosis) -> str:
@@ -130,6 +133,8 @@ def _member(member: JointMember, found: JointDiagnosis) -> str:
             m = test.measurement
             shown = size_in_words(value, size.unit, m.rig.shown(m.specimen.thickness))
             told.append(shown if label else f"{shown} in {test.label}")
+            if known[own].constant:
+                told = [shown]  # of the material, in all tests
         words.append(f"{effect_title(name)} ({spoken_parameter(f'{own}.{size.name}')} {listed(told)})")
     text = " and ".join(words) or "no effect"
     return text + (f" with {material_title(member.material)}" if member.material != found.null else "")

@@ -59,14 +59,21 @@ def twins_in_time(effects: Sequence[Effect], measurement: Measurement) -> dict[S
     return {frozenset((e.name, o)): Near(TWINS.alike_in_time) for e in effects for o in e.twins_at_one_speed}
 
 
-def one_speed(measurement: Measurement) -> bool:
-    """True if the disc moved at one speed, within `TWINS.speeds`, and never stood still; also where nobody timed it."""
-    if measurement.time is None:
-        return True
+def one_speed(*measurements: Measurement) -> bool:
+    """True if the disc moved at one speed, within `TWINS.speeds`, and never stood still; also where nobody timed it.
+
+    Of several tests with ranges of their own, the speed is how much of its range each goes through in a second.
+    """
+    timed = [m for m in measurements if m.time is not None]
+    each = [v for m in timed for v in _speeds(m)]
+    return not any(m.holds for m in timed) and (len(each) < 2 or max(each) < TWINS.speeds * min(each))
+
+
+def _speeds(measurement: Measurement) -> list[float]:
+    """1/s, that of every leg over the largest deflection."""
     leg = np.cumsum(np.abs(np.diff(measurement.leg, prepend=measurement.leg[0])) > 0)
-    speed = measurement.path.speed[measurement.on_path]
-    each = [float(np.median(speed[leg == n])) for n in np.unique(leg) if np.count_nonzero(leg == n) >= TWINS.readings]
-    return not measurement.holds and (len(each) < 2 or max(each) < TWINS.speeds * min(each))
+    speed = measurement.path.speed[measurement.on_path] / np.max(np.abs(measurement.deflection))
+    return [float(np.median(speed[leg == n])) for n in np.unique(leg) if np.count_nonzero(leg == n) >= TWINS.readings]
 
 
 def swapped(names: Set, pairs: Iterable[Set]) -> Iterator[tuple[str, str, Set]]:

@@ -16,7 +16,7 @@ from bayesmembrane.diagnosis.detection.lack_of_fit import lack_of_fit
 from bayesmembrane.diagnosis.detection.scores import Signature, score_test
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase, OpenCase, Question, Tell, renewed, seen_elsewhere
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside
-from bayesmembrane.diagnosis.explanation.twins import Near, Pairs, twins, twins_in_time
+from bayesmembrane.diagnosis.explanation.twins import Near, Pairs, one_speed, twins, twins_in_time
 from bayesmembrane.diagnosis.joint.effects import AT, EffectInTests, effects_in_tests
 from bayesmembrane.diagnosis.joint.search import JointSearch, joint_noise
 from bayesmembrane.diagnosis.reference.noise import Whitened, whitened
@@ -52,14 +52,16 @@ class JointCase(DiagnosisCase):
         return replace(search, parts=tuple(parts), noise=joint_noise([p.noise for p in parts]))
 
     def twins(self) -> Pairs:
-        """Those that no test tells apart: of the material in all of its tests, of a rig in that one."""
+        """Those that no test tells apart, and no two of another speed: of the material in all, of a rig in that one."""
         out: dict[frozenset[str], Near] = dict(twins(self.effects, self.signatures))
         each = [twins_in_time(c.effects, c.measurement) for c in self.alone]
         names = {u.name: u for u in self.effects if isinstance(u, EffectInTests)}
         for i, pairs in enumerate(each):
             for pair, near in pairs.items():
                 own = [n for n in names if n.partition(AT)[0] in pair and names[n].within(i) is not None]
-                if len(own) == 2 and all(pair in each[t] for n in own for t in names[n].places):
+                where = {t for n in own for t in names[n].places}
+                speed = one_speed(*(self.alone[t].measurement for t in where))
+                if len(own) == 2 and speed and all(pair in each[t] for t in where):
                     out[frozenset(own)] = near
         return out
 
@@ -152,7 +154,7 @@ def _starts(search: JointSearch, claim: Hypothesis, alone: Sequence[Candidate]) 
     for i, own in enumerate(alone):
         x = np.concatenate([own.x[:n], *(u.typical for u in claim.effects)])
         x[0] -= np.log(search.thicker[i])
-        for j, there in enumerate(alone):
+        for j, there in sorted(enumerate(alone), key=lambda other: other[0] == i):  # constants are those of this test
             x[search.places(claim, j)[n:]] = there.x[n:]
         out.append(x)
     return [*out, *search.material_starts(claim)]

@@ -15,8 +15,9 @@ AT = "@"
 class EffectInTests(Effect):
     """An effect in one or several tests, there or absent in all of them at once.
 
-    Its coordinates are those of its parts, test by test: what is of the same material has, in another test, another
-    history, and in another range another size. A subclass of its own has the name and the coordinates (`in_tests`).
+    Its coordinates are those of its parts, test by test, unless they are constants of the material: what is left of a
+    film by its history has, in another range, another size. A subclass of its own has the name and the coordinates
+    (`in_tests`).
 
     parts : (number of the test, the effect there)
     """
@@ -26,11 +27,13 @@ class EffectInTests(Effect):
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        return tuple(begin for begin, _ in self.places.values())
+        return tuple(dict.fromkeys(begin for begin, _ in self.places.values()))
 
     @property
     def places(self) -> dict[int, tuple[int, int]]:
         """{number of a test: (first, behind the last) of its coordinates}."""
+        if self.constant:
+            return {test: (0, len(effect.coordinates)) for test, effect in self.parts}
         found, begin = {}, 0
         for test, effect in self.parts:
             found[test] = (begin, begin + len(effect.coordinates))
@@ -41,7 +44,7 @@ class EffectInTests(Effect):
     def starts(self) -> list[dict[str, float]]:
         """Those of its first part, in all."""
         first = self.parts[0][1].starts
-        several = len(self.parts) > 1
+        several = len(self.parts) > 1 and not self.constant
         return [{(f"{t}.{k}" if several else k): v for t, _ in self.parts for k, v in start.items()} for start in first]
 
     def within(self, test: int) -> Effect | None:
@@ -52,10 +55,9 @@ class EffectInTests(Effect):
 def in_tests(name: str, parts: Sequence[tuple[int, Effect]]) -> EffectInTests:
     """The ``parts`` (number of the test, effect) of one effect, under a name."""
     first = parts[0][1]
-    several = len(parts) > 1
-    coordinates = tuple(
-        replace(p, name=f"{test}.{p.name}") if several else p for test, effect in parts for p in effect.coordinates
-    )
+    coordinates = first.coordinates
+    if len(parts) > 1 and not first.constant:
+        coordinates = tuple(replace(p, name=f"{test}.{p.name}") for test, effect in parts for p in effect.coordinates)
     kind = type(
         "EffectInTests",
         (EffectInTests,),
@@ -68,6 +70,7 @@ def in_tests(name: str, parts: Sequence[tuple[int, Effect]]) -> EffectInTests:
             "exact": first.exact,
             "remembers": first.remembers,
             "of_the_material": first.of_the_material,
+            "constant": first.constant,
         },
     )
     made: EffectInTests = kind(tuple(parts))

@@ -169,7 +169,8 @@ class JointSearch(Weighing):
         return Standard(tuple(out[k] for k in range(hypothesis.curve_size)))
 
     def expected_sizes(self, effect: Effect) -> Array:
-        return np.concatenate([self.parts[i].expected_sizes(e) for i, e in cast(EffectInTests, effect).parts])
+        several = cast(EffectInTests, effect)
+        return np.concatenate([self.parts[i].expected_sizes(e) for i, e in several.parts[: len(several.sizes)]])
 
     def material_starts(self, hypothesis: Hypothesis) -> list[Array]:
         """Those of every test in turn, as many as there are of one test."""

@@ -71,6 +71,7 @@ class Effect(ABC):
     exact : True if it has no law that could be off: an offset is an offset
     remembers : False if it changes the curve by a function of the deflection alone, alike on every leg
     of_the_material : True if all tests of one material have it, or none of them
+    constant : True if its parameters are then the same in all of them; those of others belong to what a test reached
     twins_at_one_speed : names of effects that only another speed, or a hold, tells from this one
     rank : orders effects within a stage; equal ranks go by name
     """
@@ -86,6 +87,7 @@ class Effect(ABC):
     exact: ClassVar[bool] = False
     remembers: ClassVar[bool] = True
     of_the_material: ClassVar[bool] = False
+    constant: ClassVar[bool] = False
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ()
     rank: ClassVar[int] = 0
     stage: ClassVar[str]

@@ -28,6 +28,7 @@ class Rate(Memory):
     needs_time: ClassVar[bool] = True
     rank: ClassVar[int] = 1
     of_the_material = True
+    constant = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("exponent", "-", "power of the speed", HalfNormal(0.05), (0.0, 0.5), 0.0),
     )

@@ -35,6 +35,7 @@ class Viscoelastic(Memory):
         "falls in holds and recovers at zero."
     )
     of_the_material = True
+    constant = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "strength", "-", "part of the instantaneous force that relaxes", HalfNormal(0.2), (0.0, 0.98), 0.0

@@ -68,6 +68,13 @@ def test_one_speed_is_one_speed_until_a_leg_is_faster_or_the_disc_stands() -> No
     assert not one_speed(curve(still, np.arange(still.size, dtype=float)))
 
 
+def test_of_several_tests_each_counts_by_how_much_of_its_range_it_goes_through() -> None:
+    even = np.arange(LEG.size, dtype=float)
+    assert one_speed(curve(LEG, even), curve(2 * LEG, even))
+    assert not one_speed(curve(LEG, even), curve(LEG, 0.2 * even))
+    assert one_speed(curve(LEG, even), curve(LEG, None))
+
+
 @pytest.mark.parametrize("name", sorted(components("effects")))
 def test_effects_that_do_not_remember_are_alike_on_every_leg(name: str) -> None:
     """And those that say they do, are not."""

@@ -74,3 +74,19 @@ def test_an_effect_of_the_material_grows_in_all_tests_at_once(searches) -> None:
     (unit,) = claim.effects
     assert unit.sizes == (0, len(components("effects")["mullins"].coordinates))
     assert search.expected_sizes(unit) == pytest.approx([unit.coordinates[i].scale for i in unit.sizes])
+
+
+def test_constants_of_the_material_are_the_same_in_all_tests(searches) -> None:
+    """Of a relaxation every test knows the same time: what one learns of it holds in the others."""
+    search, claim = jointly(searches, (1.0, 1.0), ("viscoelastic",))
+    (unit,) = claim.effects
+    alone = components("effects")["viscoelastic"]
+    assert [p.name for p in unit.coordinates] == [p.name for p in alone.coordinates]
+    assert unit.sizes == (0,)
+    assert search.expected_sizes(unit).shape == (1,)
+    x = search.material_starts(claim)[0] + 0.1
+    r, slopes = search.batch(claim, x[None, :])
+    for i, (part, rows) in enumerate(zip(searches, search.rows, strict=True)):
+        own = part.batch(search.of(claim, i), x[None, :])
+        assert np.array_equal(r[:, rows], own[0])
+        assert np.array_equal(slopes[:, rows], own[1])
