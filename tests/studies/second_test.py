@@ -91,7 +91,7 @@ def run_case(case: Case) -> Row:
     row["both"] = {
         "verdict": both.verdict,
         "effects": effects,
-        "p": believed(row, {"probabilities": {"effects": sets}}),
+        "p": believed(row, sets),
     }
     return row | {"seconds": time.process_time() - begin}
 
