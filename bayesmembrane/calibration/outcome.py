@@ -15,6 +15,7 @@ from bayesmembrane.calibration.posterior import FAILURES, Posterior
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.quality import NOTEWORTHY
 from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.growing import picked
 from bayesmembrane.calibration.sampling.leaps import offers
 from bayesmembrane.calibration.sampling.walk import Sampled
 from bayesmembrane.data.measurement import Measurement
@@ -77,7 +78,7 @@ def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) ->
 def _walked(chains: Chains) -> dict[str, Array]:
     """Means over the walkers of each ensemble at `WALK_STEPS` steps at most, burn-in included."""
     at = np.unique(np.linspace(0, chains.steps - 1, WALK_STEPS).round().astype(int))
-    return {"ensemble_mean": chains.x[:, at].mean(axis=2), "ensemble_step": at.astype(float)}
+    return {"ensemble_mean": picked(chains.x, at).mean(axis=2), "ensemble_step": at.astype(float)}
 
 
 def _named(hypothesis: Hypothesis, measurement: Measurement, x: Array, shape: tuple[int, ...]) -> dict[str, Array]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.chains import Chains
@@ -23,15 +24,15 @@ SPARE = 10  # earlier draws for each walker, where its end is no longer possible
 
 def check_same(posterior: Posterior, chains: Chains, folder: Path) -> None:
     """Raise `StorageError` if ln p of some stored points is no longer what was stored with them."""
-    x, stored = _flat(chains.x), chains.log_posterior.reshape(-1)
-    at = np.unique(np.linspace(0, len(x) - 1, POINTS).round().astype(int))
-    now = posterior.evaluate(x[at]).log_posterior
+    at = np.unique(np.linspace(0, chains.log_posterior.size - 1, POINTS).round().astype(int))
+    stored = _at(chains.log_posterior, at)
+    now = posterior.evaluate(_at(chains.x, at)).log_posterior
     with np.errstate(invalid="ignore"):
-        apart = ~(np.abs(now - stored[at]) <= ALIKE * np.maximum(1.0, np.abs(stored[at])))
+        apart = ~(np.abs(now - stored) <= ALIKE * np.maximum(1.0, np.abs(stored)))
     if np.any(apart):
         i = int(np.flatnonzero(apart)[0])
         raise StorageError(
-            f"ln p of a stored point was {stored[at][i]:.10g} and is now {now[i]:.10g}: the run would not go on alike",
+            f"ln p of a stored point was {stored[i]:.10g} and is now {now[i]:.10g}: the run would not go on alike",
             str(folder),
             f"choose another folder, or start a new run at its end with --fork {folder}",
         )
@@ -80,9 +81,9 @@ def ends(posterior: Posterior, old: Chains, wanted: tuple[int, int], seed: int) 
     Raises `SettingsError` if too few of them are possible.
     """
     count = wanted[0] * wanted[1]
-    last, earlier = _flat(old.x[:, -1:]), _flat(old.x[:, old.steps // 2 : -1])
-    chosen = np.random.default_rng([seed, 11]).permutation(len(earlier))[: SPARE * count]
-    x = np.concatenate([last, earlier[chosen]])
+    last, earlier = old.x[:, -1].reshape(-1, old.x.shape[-1]), old.x[:, old.steps // 2 : -1]
+    chosen = np.random.default_rng([seed, 11]).permutation(earlier[..., 0].size)[: SPARE * count]
+    x = np.concatenate([last, _at(earlier, chosen)])
     _, once = np.unique(x, axis=0, return_index=True)
     x = x[np.sort(once)]
     x = x[np.isfinite(posterior.evaluate(x).log_posterior)][:count]
@@ -94,5 +95,6 @@ def ends(posterior: Posterior, old: Chains, wanted: tuple[int, int], seed: int) 
     return np.asarray(x.reshape(*wanted, -1))
 
 
-def _flat(x: Array) -> Array:
-    return x.reshape(-1, x.shape[-1])
+def _at(values: Array, draws: NDArray[np.intp]) -> Array:
+    """Those of the ``values`` (E, steps, walkers, ...) with these numbers; of a long walk the others stay unread."""
+    return np.asarray(values[np.unravel_index(draws, values.shape[:3])])

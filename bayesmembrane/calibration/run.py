@@ -252,14 +252,19 @@ class _Work:
 
     def _continued(self, segments: Segments) -> Chains | None:
         """The walk to go on with: what lies there, or a shorter one that lies beside it, or the end of another."""
+        beside = None if self.how.name else shorter(segments.run, self.asked)
+        if beside is not None and segments.steps < Segments(beside).steps:
+            found = Segments(beside).read()
+            if found is not None:
+                check_same(self.posterior, found, beside)
+            segments.take(Segments(beside))  # one by one: who is killed here goes on with what lacks
         stored = segments.read()
         if stored is not None:
             check_same(self.posterior, stored, segments.run)
             return stored
-        beside = None if self.how.name else shorter(segments.run, self.asked)
-        begin = self._at_the_end_of_another() if beside is None else Segments(beside).read()
+        begin = self._at_the_end_of_another()
         if begin is not None:
-            check_same(self.posterior, begin, segments.run if beside is None else beside)
+            check_same(self.posterior, begin, segments.run)
             segments.write(begin)
         return begin
 

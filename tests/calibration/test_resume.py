@@ -194,6 +194,34 @@ def test_more_draws_go_on_from_fewer_and_leave_them(tmp_path: Path, monkeypatch:
     assert np.array_equal(a.x, b.x)
 
 
+def test_who_is_killed_while_it_takes_over_a_shorter_run_takes_the_rest_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing of the shorter run is walked again."""
+    with monkeypatch.context() as patch:
+        patch.setattr(walk, "SAVE_AFTER", 0.0)
+        first = sample(strip(), CLAIM, how(tmp_path, replace(FEW, most_steps=30)))
+    write, left = Segments.write, iter(range(7))
+
+    def some(segments: Segments, part: Chains) -> None:
+        if next(left, None) is None:
+            raise KilledError
+        write(segments, part)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Segments, "write", some)
+        with pytest.raises(KilledError):
+            sample(strip(), CLAIM, how(tmp_path))
+    (begun,) = (p.parent for p in tmp_path.glob("*/segments") if p.parent != first.path)
+    assert (Segments(begun).steps, Segments(first.path).steps) == (7, 30)  # type: ignore[arg-type]
+    with monkeypatch.context() as patch:
+        patch.setattr(walk, "try_points", None)
+        patch.setattr(walk, "begun", None)
+        more = sample(strip(), CLAIM, how(tmp_path))
+    assert more.path == begun
+    alike(more, sample(strip(), CLAIM, how(tmp_path / "direct")))
+
+
 def test_what_differs_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     left = iter(range(20))
     partial = sample(strip(), CLAIM, how(tmp_path, name="run"), stop=lambda: next(left, None) is None)

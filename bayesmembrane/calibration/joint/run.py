@@ -27,6 +27,7 @@ from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.resume import check_same
 from bayesmembrane.calibration.run import Run, RunSettings, predictions_of
 from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.growing import changed
 from bayesmembrane.calibration.sampling.segments import Segments
 from bayesmembrane.calibration.sampling.walk import (
     Callback,
@@ -247,7 +248,8 @@ def _seen_from(joint: Joint, number: int, sampled: Sampled) -> Sampled:
     """The walk in the coordinates of one test."""
     at, c = joint.places[number], sampled.convergence
     own = replace(c, tau=c.tau[at], ess=c.ess[at], r_hat=c.r_hat[at])
-    chains = replace(sampled.chains, x=joint.of(number, sampled.chains.x), counts=Outcomes(dict(sampled.chains.counts)))
+    x = changed(sampled.chains.x, lambda part: joint.of(number, part))
+    chains = replace(sampled.chains, x=x, counts=Outcomes(dict(sampled.chains.counts)))
     return replace(sampled, chains=chains, convergence=own)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.calibration.sampling.growing import followed
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.ground.parameters import Array
 
@@ -19,7 +20,8 @@ class Chains:
 
     Attributes
     ----------
-    x : (E, steps, walkers, k) coordinates, in order
+    x : (E, steps, walkers, k) coordinates, in order; of a long walk these and what follows lie in files (`growing`),
+        are not contiguous, and cannot be written to
     log_posterior : (E, steps, walkers)
     random_states : state of each ensemble's generator at the end, as NumPy gives it
     counts : outcomes of all evaluations until then, by label
@@ -52,11 +54,16 @@ class Chains:
 
 
 def joined(parts: Sequence[Chains]) -> Chains:
-    """One walk made of its parts, in order."""
+    """One walk made of its parts, in order; a long one lies in files and not in memory (`growing`)."""
     offered = [p.offered for p in parts if p.offered is not None]
     return replace(
         parts[-1],
-        x=np.concatenate([p.x for p in parts], axis=1),
-        log_posterior=np.concatenate([p.log_posterior for p in parts], axis=1),
-        offered=np.concatenate(offered, axis=1) if len(offered) == len(parts) else None,
+        x=_joined([p.x for p in parts]),
+        log_posterior=_joined([p.log_posterior for p in parts]),
+        offered=_joined(offered) if len(offered) == len(parts) else None,
     )
+
+
+def _joined(parts: Sequence[Array]) -> Array:
+    first, *more = parts
+    return followed(first, np.concatenate(more, axis=1)) if more else first

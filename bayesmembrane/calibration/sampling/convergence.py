@@ -11,6 +11,7 @@ import numpy as np
 from emcee.autocorr import integrated_time
 
 from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.growing import picked, stretches
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
 
@@ -63,14 +64,14 @@ def convergence(chains: Chains) -> Convergence:
     kept = chains.x[:, burn:]
     tau = autocorrelation_times(kept)
     enough = -(-kept.shape[1] * walkers // R_HAT_DRAWS)  # ranking more takes memory, and says no more
-    flat = kept[:, :: max(1, int(np.max(tau) / 4), enough)].reshape(kept.shape[0], -1, kept.shape[-1])
-    moved = np.any(kept[:, 1:] != kept[:, :-1], axis=-1)
+    some = picked(kept, np.arange(0, kept.shape[1], max(1, int(np.max(tau) / 4), enough)))
+    flat = some.reshape(len(some), -1, some.shape[-1])
     return Convergence(
         tau=np.max(tau, axis=0),
         burn=burn,
         ess=np.sum(kept.shape[1] * walkers / tau, axis=0),
         r_hat=np.array([r_hat(flat[:, :, i]) for i in range(flat.shape[-1])]),
-        acceptance=float(np.mean(moved)) if moved.size else 0.0,
+        acceptance=_moved(kept),
         lengths=float(kept.shape[1] / np.max(tau)),
     )
 
@@ -83,10 +84,23 @@ def r_hat(flat: Array) -> float:
 
 
 def autocorrelation_times(x: Array) -> Array:
-    """(E, k) integrated autocorrelation times of x (E, steps, walkers, k); at least one step."""
+    """(E, k) integrated autocorrelation times of x (E, steps, walkers, k); at least one step.
+
+    One coordinate of one ensemble is held at a time.
+    """
+    tau = np.empty((x.shape[0], x.shape[3]))
     with np.errstate(all="ignore"):
-        tau = np.array([integrated_time(e, tol=0, quiet=True) for e in x])
-    return np.where(np.isfinite(tau), np.maximum(tau, 1.0), len(x[0]))
+        for e, i in np.ndindex(tau.shape):
+            one = np.concatenate([part[0, :, :, i].copy() for part in stretches(x[e : e + 1])])
+            tau[e, i] = integrated_time(one, tol=0, quiet=True)[0]
+    return np.where(np.isfinite(tau), np.maximum(tau, 1.0), x.shape[1])
+
+
+def _moved(x: Array) -> float:
+    """Part of the walkers x (E, steps, walkers, k) that moved, of all steps after the first."""
+    parts = (np.any(part[:, 1:] != part[:, :-1], axis=-1) for part in stretches(x, overlap=1))
+    moved, all_of_them = np.sum([(np.count_nonzero(part), part.size) for part in parts], axis=0)
+    return float(moved / all_of_them)
 
 
 def effective_draws(weights: Array) -> float:

@@ -21,13 +21,14 @@ from typing import Any
 import numpy as np
 
 from bayesmembrane.calibration.posterior import Outcomes
-from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.chains import Chains, joined
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.files import remove_parts, write_whole
 from bayesmembrane.ground.parameters import Array
 
 FOLDER, LOCK, FORMAT = "segments", "lock", 1
+TOGETHER = 2**24  # bytes of segments that are joined at once
 _FAULTS = (OSError, KeyError, ValueError, TypeError, IndexError, AttributeError, EOFError, zipfile.BadZipFile)
 
 
@@ -96,19 +97,16 @@ class Segments:
             yield part
 
     def read(self) -> Chains | None:
-        """The whole walk, held once; None if there is none. Raises `StorageError` as iterating does."""
-        if not self.paths:
-            return None
-        steps, at = _head(self.paths[-1]).end, 0
+        """The whole walk, a long one in files without names (`growing`); None if there is none.
+
+        Raises `StorageError` as iterating does.
+        """
+        some: list[Chains] = []
         for part in self:
-            if not at:
-                x, lp = (np.empty((len(v), steps, *v.shape[2:])) for v in (part.x, part.log_posterior))
-                offered = np.empty_like(lp) if part.offered is not None else None
-            x[:, at : at + part.steps], lp[:, at : at + part.steps] = part.x, part.log_posterior
-            if offered is not None and part.offered is not None:
-                offered[:, at : at + part.steps] = part.offered
-            at += part.steps
-        return replace(part, x=x, log_posterior=lp, offered=None if part.offered is None else offered)
+            some.append(part)
+            if sum(p.x.nbytes for p in some[1:]) > TOGETHER:
+                some = [joined(some)]
+        return joined(some) if some else None
 
     def thinned(self, every: int, first: int = 0) -> Iterator[Array]:
         """(E, n, walkers, k) the steps ``first``, ``first`` + ``every``, ... of each segment that holds some; one
@@ -121,6 +119,20 @@ class Segments:
             begin = first - at if at < first else -(at - first) % every
             if begin < part.steps:
                 yield part.x[:, begin::every]
+            at += part.steps
+
+    @property
+    def steps(self) -> int:
+        """How many are stored."""
+        return _head(self.paths[-1]).end if self.paths else 0
+
+    def take(self, longer: Segments) -> None:
+        """Append what ``longer``, the same walk, has beyond the end of this one, as far as its segments begin there."""
+        steps, at = self.steps, 0
+        for part in longer:
+            if at == steps:
+                self.write(part)
+                steps += part.steps
             at += part.steps
 
     @property

@@ -18,6 +18,7 @@ import numpy as np
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.sampling.chains import Chains, joined
 from bayesmembrane.calibration.sampling.convergence import BURN_TAUS, LEAST_STEPS, LEAST_TAUS, Convergence, convergence
+from bayesmembrane.calibration.sampling.growing import picked
 from bayesmembrane.calibration.sampling.leaps import BLOCK, blocks, leap, offers
 from bayesmembrane.calibration.sampling.proposals.independent import Independent, independent
 from bayesmembrane.calibration.sampling.proposals.learned import learn, next_lesson
@@ -28,6 +29,7 @@ from bayesmembrane.ground.interrupts import Stop, StopAsked, deferred, never
 from bayesmembrane.ground.parameters import Array
 
 SAVE_AFTER = 10.0  # s: what a run that is killed loses at most, beside the step that it was at
+AHEAD = 2**24  # bytes of steps that wait to be put together with those before
 SAMPLERS = ("auto", "emcee")
 SURE = 0.02
 """Standard error of ln Z up to which a mixture is drawn from, if `MOST_FOR_Z` draws do for that."""
@@ -99,7 +101,7 @@ class Sampled:
         keep = max(1, min(steps, most // (ensembles * walkers)))
         at = np.linspace(0, steps - 1, keep).round().astype(int)
         w = slice(0, max(1, min(walkers, most // (ensembles * keep))))
-        return x[:, at, w].reshape(ensembles, -1, k), lp[:, at, w].reshape(ensembles, -1)
+        return picked(x, at)[:, :, w].reshape(ensembles, -1, k), picked(lp, at)[:, :, w].reshape(ensembles, -1)
 
 
 Callback = Callable[[Progress], None]
@@ -253,23 +255,31 @@ class _Pile:
     first: int
     steps: list[tuple[Array, ...]] = field(default_factory=list)
 
-    def taken(self, end: int, standing: Chains) -> Chains | None:
-        """What was walked until ``end``, as one part that stands where ``standing`` does; None if that is nothing."""
-        steps, self.steps = self.steps[: end - self.first], []
-        self.first = end
+    @property
+    def size(self) -> int:
+        """Bytes that it holds."""
+        return len(self.steps) * sum(v.nbytes for v in self.steps[0]) if self.steps else 0
+
+    def part(self, begin: int, end: int, standing: Chains) -> Chains | None:
+        """The steps from ``begin`` to ``end``, a part that stands where ``standing`` does; None if there are none."""
+        steps = self.steps[begin - self.first : end - self.first]
         if not steps:
             return None
         x, lp, *offered = (np.stack(values, axis=1) for values in zip(*steps, strict=True))
         return replace(standing, x=x, log_posterior=lp, offered=offered[0] if offered else None)
+
+    def emptied(self, end: int) -> None:
+        """Begin anew behind the step ``end``."""
+        self.first, self.steps = end, []
 
 
 @dataclass
 class _Walk:
     """A walk that is being made: all ensembles step by step, so that they are equally long wherever it ends.
 
-    chains : what was walked until the last look
+    chains : what was walked until the last look, or until `AHEAD`
     standing : (steps, state) after the last step that all ensembles made
-    ahead, unsaved : what was walked since the last look, and since something was last kept
+    ahead, unsaved : what was walked since then, and since something was last kept
     """
 
     posterior: Posterior
@@ -300,16 +310,23 @@ class _Walk:
         try:
             self._walk(end - self.chains.steps, look, asked)
         finally:
-            if (part := self.ahead.taken(*self.standing)) is not None:
-                self.chains = joined([self.chains, part])
-                self.standing = (self.chains.steps, self.chains)
+            self._gather()
         return self.chains.steps >= end and not asked.signalled
 
     def save(self) -> None:
         """Have what was walked kept."""
-        if (part := self.unsaved.taken(*self.standing)) is not None:
+        part = self.unsaved.part(self.unsaved.first, *self.standing)
+        self.unsaved.emptied(self.standing[0])
+        if part is not None:
             self.beside.keep(part)
         self.saved = time.perf_counter()
+
+    def _gather(self) -> None:
+        """Have what was walked ahead with the rest of the walk."""
+        if (part := self.ahead.part(self.chains.steps, *self.standing)) is not None:
+            self.chains = joined([self.chains, part])
+            self.standing = (self.chains.steps, self.chains)
+        self.ahead.emptied(self.chains.steps)
 
     def _walk(self, steps: int, look: int, asked: StopAsked) -> None:
         """At most ``steps`` more; what an interruption cuts is dropped."""
@@ -357,6 +374,8 @@ class _Walk:
         )
         if time.perf_counter() - self.saved >= SAVE_AFTER:
             self.save()
+        if self.ahead.size > AHEAD:
+            self._gather()
 
     def _sampler(self, steps: int, ensemble: int) -> Any:
         """The steps of an ensemble that moves by differential evolution, snooker and stretch, and by what is known."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.growing import picked
 from bayesmembrane.calibration.sampling.proposals.emulator import Emulator, emulate
 from bayesmembrane.calibration.sampling.proposals.ensemble import ensemble_moves
 from bayesmembrane.calibration.sampling.proposals.jumping import jumping
@@ -24,6 +25,7 @@ many leave too few steps in between for fifty autocorrelation times of ten steps
 on 700 readings was worth 2500 draws after 750 steps, learned again at 800, 1600 and 3200, and converged after 3872. To
 an ESS of 1000 on ten readings of the paper's film, two seeds, it took 41600 and 37300 evaluations with twice and 28300
 and 25600 with four times as many for Mooney-Rivlin, 12700 and 10500 for Gent, 7800 and 10400 for neo-Hookean."""
+SEEN = 2**19  # draws of a long walk among which those are chosen that are learned from
 WALK_SHARE, JUMP_SHARE, LEARN_FROM = 0.4, 0.3, 2000
 
 
@@ -55,7 +57,9 @@ def learn(posterior: Posterior, chains: Chains) -> Learned:
     if not chains.lessons:
         return Learned()
     end = chains.lessons[-1]
-    x, rng = chains.x[:, end // 4 : end].reshape(-1, chains.x.shape[-1]), np.random.default_rng(end)
+    every = -(-(end - end // 4) * chains.log_posterior[:, 0].size // SEEN)
+    some, rng = picked(chains.x, np.arange(end // 4, end, every)), np.random.default_rng(end)
+    x = some.reshape(-1, some.shape[-1])
     emulator: Emulator | None = None
     mixture: Mixture | None = None
     # Draws that fill no volume teach nothing: then the walkers do without.
