@@ -34,7 +34,7 @@ def perform(task: Task, campaign: Path, tell: Tell) -> Found:
 
     Raises `DataError` if the measurement is not what was planned, and whatever the analysis raises.
     """
-    whole, options = _measured(task), task.options or {}
+    whole, options = measured(task), task.options or {}
     ess = float(options.get("sampling", {}).get("ess", Work.ess))
     work = Work(task.seed, campaign / FILMS / task.film, ess, tell)
     answer, values = known(task.analysis)(task, whole, work)
@@ -46,7 +46,8 @@ def perform(task: Task, campaign: Path, tell: Tell) -> Found:
     return Found(values, answer.folder, page, interrupted)
 
 
-def _measured(task: Task) -> Measurement:
+def measured(task: Task) -> Measurement:
+    """The whole measurement of a task; raises `DataError` if it is not what was planned."""
     whole = read_measurement(task.curve, task.specimen)
     part = whole if task.end is None else whole.up_to(task.end)
     if part.data_hash != task.data:
@@ -88,7 +89,7 @@ def sampled(document: Mapping[str, Any]) -> Values:
         "parameters": {n: [p["mean"], *p["hdi_94"]] for n, p in document["posterior"].items()},
         "ess": document["ess_bulk"],
         "wanted": document["ess_wanted"],
-        "tau": max(document["tau"].values()),
+        "tau": max((tau for tau in document["tau"].values() if tau is not None), default=None),
         "r_hat": document["r_hat"],
         "acceptance": document["acceptance"],
         "evaluations": document["evaluations"],

@@ -8,12 +8,14 @@ ends in a traceback. Here the code comes first, under a name that nothing has, a
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
-from contextlib import suppress
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 
@@ -28,6 +30,30 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         return made
 
     return wrap
+
+
+@contextmanager
+def compilation() -> Iterator[Compilation]:
+    """What is compiled while the body runs, and not read from the disk."""
+    found = Compilation()
+    with event.install_listener("numba:compile", found):
+        yield found
+
+
+class Compilation(event.Listener):  # type: ignore[misc]
+    """``seconds`` of a processor that compiling took."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        self._begun: list[float] = []
+
+    def on_start(self, event: Any) -> None:
+        self._begun.append(time.process_time())
+
+    def on_end(self, event: Any) -> None:
+        began = self._begun.pop()
+        if not self._begun:  # what a function calls is compiled within it
+            self.seconds += time.process_time() - began
 
 
 class _File(IndexDataCacheFile):  # type: ignore[misc]

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from bayesmembrane.app.analyses import Work
 from bayesmembrane.app.cli import main
-from bayesmembrane.app.tasks import perform
+from bayesmembrane.app.tasks import measured, perform, sample
 from bayesmembrane.calibration.run import load_run
 from bayesmembrane.campaign.file import read_campaign
 from bayesmembrane.campaign.plan import write_plan
@@ -96,9 +97,30 @@ def test_a_dry_run_says_what_would_run_and_writes_nothing(run: Run, tmp_path: Pa
     assert found["tasks"] == {"sample": 4, "valleys": 4}
     assert (found["workers"], found["done"], found["refused"]) == (2, 0, [])
     assert 0.0 < found["core_seconds"]["valleys"] < found["core_seconds"]["sample"]
-    assert list(found["rehearsed"]) == ["neo_hookean"]
-    assert found["seconds"] > 2 * found["rehearsed"]["neo_hookean"]
+    rehearsed = [
+        f"{analysis}: neo_hookean white {mode}, all, uniaxial of about 8 readings"
+        for analysis in ("sample", "valleys")
+        for mode in ("reached", "none")
+    ]
+    assert list(found["rehearsed"])[:3] == rehearsed[:3]
+    least, most = found["whole_core_seconds_range"]
+    assert least < found["whole_core_seconds"] < most
+    assert sum(found["core_seconds"].values()) + found["starting_core_seconds"] == pytest.approx(
+        found["whole_core_seconds"]
+    )
+    assert sum(found["rehearsed"].values()) < found["whole_core_seconds"]
+    assert found["seconds"] < found["whole_core_seconds"]
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_walk_that_is_stopped_before_anything_is_known_has_no_tau(tmp_path: Path) -> None:
+    """A deadline may come right at the start of a walk, which is then stored as ever."""
+    file = write_campaign(tmp_path, films=("a",))
+    task = plan(read_campaign(file), file).tasks[0]
+    work = Work(task.seed, tmp_path / "night", 50.0, stop=lambda: True)
+    answer, values = sample(task, measured(task), work)
+    assert answer.result.interrupted
+    assert (values["tau"], values["ess"], values["converged"]) == (None, 0.0, False)
 
 
 @pytest.mark.usefixtures("short_walks")

@@ -24,23 +24,30 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.calibration.run import RunSettings, load_run, sample
+from bayesmembrane.calibration.run import Run, RunSettings, load_run, predictions_of, sample
 from bayesmembrane.calibration.sampling import walk
 from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.growing import HELD
 from bayesmembrane.calibration.sampling.proposals import learned
 from bayesmembrane.calibration.sampling.segments import Segments
 from bayesmembrane.calibration.sampling.walk import Meanwhile, Settings, begun, run_ensembles
 from bayesmembrane.campaign.drive import DEADLINE, GRACE, Session, drive
 from bayesmembrane.campaign.pool import LocalPool
+from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.page import write_report
-from tests.calibration.test_resume import CLAIM, strip
+from tests.calibration.test_resume import strip
 from tests.campaign.doing import deaf
 from tests.campaign.films import planned
 
 ROOT = Path(__file__).resolve().parents[2]
 
 WALKERS, ENSEMBLES = 512, 2
+CLAIM = hypothesis("ogden", convexity="none")
+LESSON = 8000  # steps after which the walk of ten million draws learns its proposal, from eight million of them
+ENOUGH = 120.0  # s of a processor for each membrane
 LASTS = 60.0  # s of the walk whose checkpoints are timed
 Row = tuple[str, str]
 
@@ -95,12 +102,16 @@ def checkpoints(place: Path) -> list[Row]:
 def walked(place: Path, draws: int) -> list[Row]:
     """Sample a rubber band so often."""
     steps = -(-draws // (WALKERS * ENSEMBLES))
-    began = time.perf_counter()
-    settings = Settings(ess=1e9, walkers=WALKERS, chunk=100, most_steps=steps)
-    run = sample(strip(), CLAIM, RunSettings(0, place, "long", settings=settings))
+    run = _long(place, steps)
     count = run.status["steps"] * WALKERS * ENSEMBLES
-    took = time.perf_counter() - began
-    return [("sampling them, all held for tau", f"{peak()}"), ("draws", f"{count}, in {took:.0f} s")]
+    took = f"{count} of {len(CLAIM.names)} coordinates, in {time.process_time():.0f} s of a processor"
+    return [("draws", took), ("sampling them", peak())]
+
+
+def _long(place: Path, steps: int) -> Run:
+    learned.FIRST_LESSON = LESSON
+    settings = Settings(ess=1e9, walkers=WALKERS, chunk=100, most_steps=steps, sampler="emcee")
+    return sample(strip(), CLAIM, RunSettings(0, place, "long", settings=settings))
 
 
 def thinned(place: Path, _: int) -> list[Row]:
@@ -117,10 +128,52 @@ def reported(place: Path, _: int) -> list[Row]:
 
 def continued(place: Path, draws: int) -> list[Row]:
     """Going on for one step more, all of the walk being read for that."""
-    steps = -(-draws // (WALKERS * ENSEMBLES)) + 1
-    settings = Settings(ess=1e9, walkers=WALKERS, chunk=100, most_steps=steps)
-    sample(strip(), CLAIM, RunSettings(0, place, "long", settings=settings))
+    _long(place, -(-draws // (WALKERS * ENSEMBLES)) + 1)
     return [("going on with it", peak())]
+
+
+# ---- what a kill costs -----------------------------------------------------------------------------------------------
+
+MEMBRANES: dict[str, tuple[str, tuple[str, ...], str, str]] = {
+    "Yeoh": ("yeoh", (), "white", "auto"),
+    "Ogden": ("ogden", (), "white", "auto"),
+    "Ogden, emcee": ("ogden", (), "white", "emcee"),
+    "Yeoh, pre-stretch, zero offset": ("yeoh", ("prestretch", "zero_offset"), "white", "auto"),
+    "Ogden, pre-stretch, zero offset": ("ogden", ("prestretch", "zero_offset"), "white", "emcee"),
+    "Yeoh, pre-stretch, form error": ("yeoh", ("prestretch",), "form", "auto"),
+}
+
+
+def killed(place: Path, _: int) -> list[Row]:
+    """What would be lost at most of runs on the paper's film, whole range, wherever they were killed."""
+    curve = ROOT / "data" / "elastosil_50um_op1.csv"
+    film = read_measurement(curve, curve.with_suffix(".toml"))
+    return [(name, _waits(film, place / "killed", *asked)) for name, asked in MEMBRANES.items()]
+
+
+def _waits(film: Measurement, place: Path, material: str, effects: tuple[str, ...], noise: str, sampler: str) -> str:
+    """s of a processor until the first segment, between two of them at most, and after the last one."""
+    written: list[float] = []
+    write = Segments.write
+
+    def noted(segments: Segments, part: Chains) -> None:
+        write(segments, part)
+        written.append(time.process_time())
+
+    Segments.write = noted  # type: ignore[method-assign]
+    began = time.process_time()
+    how = RunSettings(0, place, settings=Settings(sampler=sampler), predictions=False)
+    try:
+        run = sample(film, hypothesis(material, effects, noise), how, stop=lambda: time.process_time() - began > ENOUGH)
+        predictions_of(run)
+    finally:
+        Segments.write = write  # type: ignore[method-assign]
+    over = time.process_time()
+    apart = max(np.diff(written), default=0.0)
+    lessons = Segments(place / run.name).read().lessons  # type: ignore[union-attr]
+    told = ", ".join(map(str, lessons)) or "none"
+    walk = f"{run.status['steps']} | {told} | {over - began:.0f} s"
+    return f"{written[0] - began:.1f} s | {apart:.1f} s | {over - written[-1]:.1f} s | {walk}"
 
 
 # ---- the deadline ----------------------------------------------------------------------------------------------------
@@ -160,6 +213,7 @@ PARTS: dict[str, Callable[[Path, int], list[Row]]] = {
     "thinned": thinned,
     "reported": reported,
     "continued": continued,
+    "killed": killed,
     "stubborn": stubborn,
     "sampling": sampling,
 }
@@ -184,15 +238,28 @@ be compared with.
 
 ## Memory
 
-A rubber band with two coordinates, {ENSEMBLES} ensembles of {WALKERS} walkers; peak of a process of its own.
+A rubber band of Ogden's energy, {ENSEMBLES} ensembles of {WALKERS} walkers, which learn their proposal after
+{LESSON} steps; peak of a process of its own.
 
 | | |
 |---|---|
 {lines("walked", "thinned", "reported", "continued")}
 
-Whoever reads holds one segment at a time. The process that samples holds its walk, 8 bytes for each coordinate of each
-draw and ln p, and while it joins what is new the same again: ten million draws of seven coordinates are 0.6 GB, and
-twice that for a moment. The usual limit of 20 000 steps ends a walk of seven coordinates at 1.3 million draws.
+Whoever reads holds one segment at a time. The process that samples keeps a walk of more than {HELD / 2**20:.0f} MiB,
+8 bytes for each coordinate of each draw and ln p, in a file without a name where temporary files lie (`TMPDIR`), and
+holds one coordinate of one ensemble while it judges it; where there is no room for the file, it holds all. The usual
+limit of 20 000 steps ends a walk of seven coordinates at 1.3 million draws.
+
+## What a kill costs
+
+Runs on the paper's film, whole range, in s of a processor, stopped after {ENOUGH:.0f} s if not over: until the
+first segment (the search for starts and for a mixture), between two segments (steps, and lessons, in which none is
+written), and after the last one (what follows from the walk, and predictions). The largest of the three is what a kill
+can cost where the processor is not shared.
+
+| | until the first segment | between two, at most | after the last | steps | lessons after | all of it |
+|---|---|---|---|---|---|---|
+{lines("killed")}
 
 ## The deadline
 
