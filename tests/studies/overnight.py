@@ -33,7 +33,6 @@ from bayesmembrane.calibration.sampling.segments import Segments
 from bayesmembrane.calibration.sampling.walk import Meanwhile, Settings, begun, run_ensembles
 from bayesmembrane.campaign.drive import DEADLINE, GRACE, Session, drive
 from bayesmembrane.campaign.pool import LocalPool
-from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -134,25 +133,29 @@ def continued(place: Path, draws: int) -> list[Row]:
 
 # ---- what a kill costs -----------------------------------------------------------------------------------------------
 
-MEMBRANES: dict[str, tuple[str, tuple[str, ...], str, str]] = {
-    "Yeoh": ("yeoh", (), "white", "auto"),
-    "Ogden": ("ogden", (), "white", "auto"),
-    "Ogden, emcee": ("ogden", (), "white", "emcee"),
-    "Yeoh, pre-stretch, zero offset": ("yeoh", ("prestretch", "zero_offset"), "white", "auto"),
-    "Ogden, pre-stretch, zero offset": ("ogden", ("prestretch", "zero_offset"), "white", "emcee"),
-    "Yeoh, pre-stretch, form error": ("yeoh", ("prestretch",), "form", "auto"),
+BOTH = ("prestretch", "zero_offset")
+MEMBRANES: dict[str, tuple[str, str, tuple[str, ...], str, str]] = {
+    "35 mm, Yeoh": ("op1", "yeoh", (), "white", "auto"),
+    "35 mm, Ogden": ("op1", "ogden", (), "white", "auto"),
+    "35 mm, Ogden, emcee": ("op1", "ogden", (), "white", "emcee"),
+    "35 mm, Yeoh, pre-stretch, zero offset": ("op1", "yeoh", BOTH, "white", "auto"),
+    "35 mm, Ogden, pre-stretch, zero offset, emcee": ("op1", "ogden", BOTH, "white", "emcee"),
+    "35 mm, Yeoh, pre-stretch, form error": ("op1", "yeoh", ("prestretch",), "form", "auto"),
+    "91 mm, Yeoh": ("op2", "yeoh", (), "white", "auto"),
+    "91 mm, Ogden": ("op2", "ogden", (), "white", "auto"),
+    "91 mm, Ogden, pre-stretch, zero offset": ("op2", "ogden", BOTH, "white", "auto"),
 }
 
 
 def killed(place: Path, _: int) -> list[Row]:
-    """What would be lost at most of runs on the paper's film, whole range, wherever they were killed."""
-    curve = ROOT / "data" / "elastosil_50um_op1.csv"
-    film = read_measurement(curve, curve.with_suffix(".toml"))
-    return [(name, _waits(film, place / "killed", *asked)) for name, asked in MEMBRANES.items()]
+    """What would be lost at most of runs on both curves of the paper's film, wherever they were killed."""
+    return [(name, _waits(place / "killed", *asked)) for name, asked in MEMBRANES.items()]
 
 
-def _waits(film: Measurement, place: Path, material: str, effects: tuple[str, ...], noise: str, sampler: str) -> str:
+def _waits(place: Path, film: str, material: str, effects: tuple[str, ...], noise: str, sampler: str) -> str:
     """s of a processor until the first segment, between two of them at most, and after the last one."""
+    curve = ROOT / "data" / f"elastosil_50um_{film}.csv"
+    measurement = read_measurement(curve, curve.with_suffix(".toml"))
     written: list[float] = []
     write = Segments.write
 
@@ -161,10 +164,10 @@ def _waits(film: Measurement, place: Path, material: str, effects: tuple[str, ..
         written.append(time.process_time())
 
     Segments.write = noted  # type: ignore[method-assign]
+    claim, how = hypothesis(material, effects, noise), RunSettings(0, place, settings=Settings(sampler=sampler))
     began = time.process_time()
-    how = RunSettings(0, place, settings=Settings(sampler=sampler), predictions=False)
     try:
-        run = sample(film, hypothesis(material, effects, noise), how, stop=lambda: time.process_time() - began > ENOUGH)
+        run = sample(measurement, claim, how, stop=lambda: time.process_time() - began > ENOUGH)
         predictions_of(run)
     finally:
         Segments.write = write  # type: ignore[method-assign]
@@ -252,7 +255,7 @@ limit of 20 000 steps ends a walk of seven coordinates at 1.3 million draws.
 
 ## What a kill costs
 
-Runs on the paper's film, whole range, in s of a processor, stopped after {ENOUGH:.0f} s if not over: until the
+Runs on both curves of the paper's film, in s of a processor, stopped after {ENOUGH:.0f} s if not over: until the
 first segment (the search for starts and for a mixture), between two segments (steps, and lessons, in which none is
 written), and after the last one (what follows from the walk, and predictions). The largest of the three is what a kill
 can cost where the processor is not shared.
