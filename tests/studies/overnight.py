@@ -135,26 +135,27 @@ def continued(place: Path, draws: int) -> list[Row]:
 
 BOTH = ("prestretch", "zero_offset")
 MEMBRANES: dict[str, tuple[str, str, tuple[str, ...], str, str]] = {
-    "35 mm, Yeoh": ("op1", "yeoh", (), "white", "auto"),
-    "35 mm, Ogden": ("op1", "ogden", (), "white", "auto"),
-    "35 mm, Ogden, emcee": ("op1", "ogden", (), "white", "emcee"),
-    "35 mm, Yeoh, pre-stretch, zero offset": ("op1", "yeoh", BOTH, "white", "auto"),
-    "35 mm, Ogden, pre-stretch, zero offset, emcee": ("op1", "ogden", BOTH, "white", "emcee"),
-    "35 mm, Yeoh, pre-stretch, form error": ("op1", "yeoh", ("prestretch",), "form", "auto"),
-    "91 mm, Yeoh": ("op2", "yeoh", (), "white", "auto"),
-    "91 mm, Ogden": ("op2", "ogden", (), "white", "auto"),
-    "91 mm, Ogden, pre-stretch, zero offset": ("op2", "ogden", BOTH, "white", "auto"),
+    "35 mm, Yeoh": ("elastosil_50um_op1", "yeoh", (), "white", "auto"),
+    "35 mm, Ogden": ("elastosil_50um_op1", "ogden", (), "white", "auto"),
+    "35 mm, Ogden, emcee": ("elastosil_50um_op1", "ogden", (), "white", "emcee"),
+    "35 mm, Yeoh, pre-stretch, zero offset": ("elastosil_50um_op1", "yeoh", BOTH, "white", "auto"),
+    "35 mm, Ogden, pre-stretch, zero offset, emcee": ("elastosil_50um_op1", "ogden", BOTH, "white", "emcee"),
+    "35 mm, Yeoh, pre-stretch, form error": ("elastosil_50um_op1", "yeoh", ("prestretch",), "form", "auto"),
+    "91 mm, Yeoh": ("elastosil_50um_op2", "yeoh", (), "white", "auto"),
+    "91 mm, Ogden": ("elastosil_50um_op2", "ogden", (), "white", "auto"),
+    "91 mm, Ogden, pre-stretch, zero offset": ("elastosil_50um_op2", "ogden", BOTH, "white", "auto"),
+    "700 readings, Yeoh, Mullins": ("synthetic_cyclic", "yeoh", ("mullins",), "white", "auto"),
 }
 
 
 def killed(place: Path, _: int) -> list[Row]:
-    """What would be lost at most of runs on both curves of the paper's film, wherever they were killed."""
+    """What would be lost at most of runs on real membranes and a long curve, wherever they were killed."""
     return [(name, _waits(place / "killed", *asked)) for name, asked in MEMBRANES.items()]
 
 
 def _waits(place: Path, film: str, material: str, effects: tuple[str, ...], noise: str, sampler: str) -> str:
     """s of a processor until the first segment, between two of them at most, and after the last one."""
-    curve = ROOT / "data" / f"elastosil_50um_{film}.csv"
+    curve = ROOT / "data" / f"{film}.csv"
     measurement = read_measurement(curve, curve.with_suffix(".toml"))
     written: list[float] = []
     write = Segments.write
@@ -255,10 +256,10 @@ limit of 20 000 steps ends a walk of seven coordinates at 1.3 million draws.
 
 ## What a kill costs
 
-Runs on both curves of the paper's film, in s of a processor, stopped after {ENOUGH:.0f} s if not over: until the
-first segment (the search for starts and for a mixture), between two segments (steps, and lessons, in which none is
-written), and after the last one (what follows from the walk, and predictions). The largest of the three is what a kill
-can cost where the processor is not shared.
+Runs on both curves of the paper's film, and on a synthetic cyclic one, in s of a processor, stopped after
+{ENOUGH:.0f} s if not over: until the first segment (the search for starts and for a mixture), between two segments
+(steps, and lessons, in which none is written), and after the last one (what follows from the walk, and predictions).
+The largest of the three is what a kill can cost where the processor is not shared.
 
 | | until the first segment | between two, at most | after the last | steps | lessons after | all of it |
 |---|---|---|---|---|---|---|

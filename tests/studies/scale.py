@@ -163,7 +163,7 @@ def main() -> None:
         command = [sys.executable, "-m", "tests.studies.scale", "--count", str(asked.count), "--only", where]
         done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
         found.append([tuple(row) for row in json.loads(done.stdout.splitlines()[-1])])
-    machine = f"{cores()} cores shared with other work, Python {platform.python_version()}"
+    machine = f"{cores()} core{'s' if cores() > 1 else ''} shared with other work, Python {platform.python_version()}"
     text = WORDS.format(machine=machine, table=table(*found))
     print(text)
     if asked.table:
