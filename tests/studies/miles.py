@@ -103,6 +103,11 @@ def page(rows: list[Row], seed: int) -> str:
             f"- By `{r.noise}` eta is {wider[0]:.1f} and gamma {wider[1]:.1f} times as uncertain, and they lie "
             f"{moved[0]:+.1f} and {moved[1]:+.1f} standard deviations of white noise away."
         )
+    if any(r.noise.startswith("form") for r in rows):
+        lines.append(
+            "- With errors of the forms what is held is free again within them, smoothly along the curve; the residual "
+            "in the table is that without them. One curve then says little of how chains and dashpot share the stress."
+        )
     return "\n".join(lines) + "\n"
 
 
