@@ -1,10 +1,11 @@
 """What the tasks of a campaign take of a processor, from rehearsals of some of them.
 
 The first of each kind is rehearsed (`app.rehearsal`): runs first, those of each material before others of it. All
-rehearsals of runs take `PATIENCE` at most, and the last of them to its first step. Every other analysis is done whole,
-unless that takes longer than `LONGEST`. Time that is left goes to further runs, as long as the dry run takes no more
-than `PART` of the campaign. What is not rehearsed is taken for the mean of its kind, or of what is most like it; an
-analysis of which nothing is known takes as long as so many runs as `SHARES` says.
+rehearsals of runs take `PATIENCE` at most, and the last of them to its first step. Of every other analysis the first
+task is done whole, unless that takes longer than `LONGEST`, and those of other kinds while that is cheap. Time that is
+left goes to further runs, as long as the dry run takes no more than `PART` of the campaign. What is not rehearsed is
+taken for the mean of its kind, or of what is most like it; an analysis of which nothing is known takes as long as so
+many runs as `SHARES` says.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from bayesmembrane.campaign.task import Task
 from bayesmembrane.ground.errors import BayesmembraneError
 
 PATIENCE = 180.0  # s of a processor for runs
-FEWEST = 15.0  # s of it for a kind of them, as long as there are any
+FEWEST = 15.0  # s of it for a kind of them, as long as there are any; and for the kinds of each other analysis
 LONGEST = 600.0  # s of it for each other analysis
 PART = 0.2
 SHARES = {"sample": 1.0, "compare": 1.2, "valleys": 0.6, "diagnose": 3.7, "loop": 10.0}
@@ -189,11 +190,12 @@ def _rehearse(survey: Survey, tasks: Sequence[Task], stage: _Stage) -> None:
         stage.take(survey, task, max(FEWEST, 2 * (PATIENCE - survey.spent) / (len(runs) - number + 1)))
     for analysis in dict.fromkeys(task.analysis for task in firsts if task.analysis != "sample"):
         before = survey.spent
-        for task in (t for t in firsts if t.analysis == analysis and _can_begin(survey, t)):
-            if survey.spent > before and survey.spent > _allowed(survey, tasks):
+        able = [t for t in firsts if t.analysis == analysis and _can_begin(survey, t)]
+        for number, task in enumerate(able):
+            if survey.spent > before + FEWEST and survey.spent > _allowed(survey, tasks):
                 break
             stage.take(survey, task, LONGEST + before - survey.spent)
-            if survey.spent - before < FEWEST and not task.needs and task.key in survey.found:
+            if number == 0 and survey.spent - before < FEWEST and not task.needs and task.key in survey.found:
                 _again(survey, task, stage)
     for task in sorted(tasks, key=lambda t: t.key):  # in no order
         if (left := min(PATIENCE, _allowed(survey, tasks)) - survey.spent) < 0:

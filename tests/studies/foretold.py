@@ -17,7 +17,8 @@ from typing import Any
 from tests.campaign.films import write_campaign
 
 ROOT = Path(__file__).resolve().parents[2]
-FILM = f'curves = ["{ROOT / "data" / "elastosil_50um_op1.csv"}"]'
+OP1, OP2 = (ROOT / "data" / f"elastosil_50um_{name}.csv" for name in ("op1", "op2"))
+FILM, BOTH = f'curves = ["{OP1}"]', f'curves = ["{OP1}", "{OP2}"]'
 PAGES, NONE = 'wanted = ["sample"]\npages = true', 'wanted = ["sample"]\npages = false'
 
 CAMPAIGNS: dict[str, dict[str, str]] = {
@@ -40,6 +41,12 @@ CAMPAIGNS: dict[str, dict[str, str]] = {
     },
     "four strips, two materials: runs, comparisons, valleys": {
         "hypotheses": 'materials = ["neo_hookean", "mooney_rivlin"]',
+        "analyses": 'wanted = ["sample", "compare", "valleys"]\npages = false',
+        "sampling": "ess = 400",
+    },
+    "both curves of the paper's film, neo-Hookean and Gent: runs, comparisons, valleys": {
+        "measurements": BOTH,
+        "hypotheses": 'materials = ["neo_hookean", "gent"]',
         "analyses": 'wanted = ["sample", "compare", "valleys"]\npages = false',
         "sampling": "ess = 400",
     },
