@@ -40,7 +40,7 @@ LUCK = 1.5
 
 
 @dataclass(frozen=True)
-class Kind:
+class TaskKind:
     """What tasks have in common that take about as long: ``claims`` in words, ``readings`` to the next power of two."""
 
     analysis: str
@@ -56,19 +56,19 @@ class Kind:
         asked = self.claims[0] if len(self.claims) == 1 else f"{len(self.claims)} hypotheses"
         return f"{self.analysis}: {asked}, {self.reach}, {self.rig} of about {self.readings} readings"
 
-    def likeness(self, other: Kind) -> int:
+    def likeness(self, other: TaskKind) -> int:
         """How much two kinds of the same analysis have in common: 0 all of it, 3 nothing."""
         if self == other:
             return 0
         return 1 if self.claims == other.claims else 2 if self.materials == other.materials else 3
 
 
-def kind_of(task: Task) -> Kind:
+def kind_of(task: Task) -> TaskKind:
     """The kind of a task; without rig and readings if its measurement is not what was planned."""
     rig, readings = _measured(task.curve, task.specimen, task.data, task.end)
     size = 2 ** (readings - 1).bit_length() if readings else 0
     claims = tuple(f"{'+'.join([c['material'], *c['effects']])} {c['noise']} {c['convexity']}" for c in task.claims)
-    return Kind(task.analysis, tuple(str(c["material"]) for c in task.claims), claims, task.reach, rig, size)
+    return TaskKind(task.analysis, tuple(str(c["material"]) for c in task.claims), claims, task.reach, rig, size)
 
 
 @cache
@@ -90,7 +90,7 @@ class Survey:
     spent : s of a processor that the rehearsals took
     """
 
-    kinds: Mapping[str, Kind]
+    kinds: Mapping[str, TaskKind]
     found: dict[str, Rehearsal] = field(default_factory=dict)
     start: float = 0.0
     loading: float = 0.0
@@ -111,7 +111,7 @@ class Survey:
             max(alike.likely, ROUGHLY * longer), max(alike.least, longer), max(alike.most, 2 * ROUGHLY * longer)
         )
 
-    def _alike(self, kind: Kind) -> Pace | None:
+    def _alike(self, kind: TaskKind) -> Pace | None:
         """Of what is most like this kind among what was rehearsed; None if there is nothing."""
         others = [(self.kinds[k], r.pace) for k, r in self.found.items() if r.over]
         others = [(other, pace) for other, pace in others if other.analysis == kind.analysis]
@@ -206,7 +206,7 @@ def _rehearse(survey: Survey, tasks: Sequence[Task], stage: _Stage) -> None:
 
 def _firsts(survey: Survey, tasks: Sequence[Task]) -> list[Task]:
     """The first task of each kind, analyses in order; those of each of its materials before others of them."""
-    first: dict[Kind, Task] = {}
+    first: dict[TaskKind, Task] = {}
     for task in tasks:
         first.setdefault(survey.kinds[task.key], task)
     turns: Counter[tuple[str, ...]] = Counter()

@@ -29,7 +29,7 @@ def followed(values: Array, more: Array) -> Array:
         try:
             file = _file_of(values)
             if file is None or file.steps != values.shape[1]:  # of others, or gone on with by others
-                file = _File(values[:, :0])
+                file = _StepsFile(values[:, :0])
                 file.take(values)
             file.take(more)
             return file.values()
@@ -75,10 +75,10 @@ def let_go(values: Array) -> None:
 class _Map(mmap.mmap):
     """A part of a file in the memory of the process."""
 
-    file: _File
+    file: _StepsFile
 
 
-class _File:
+class _StepsFile:
     """Steps (E, ...) one behind the other, in a file that is gone with the last array that shows it."""
 
     def __init__(self, like: Array) -> None:
@@ -112,6 +112,6 @@ def _map_of(values: object) -> _Map | None:
     return values if isinstance(values, _Map) else None
 
 
-def _file_of(values: Array) -> _File | None:
+def _file_of(values: Array) -> _StepsFile | None:
     found = _map_of(values)
     return None if found is None else found.file

@@ -60,7 +60,7 @@ def test_without_room_for_a_file_it_stays_in_memory(monkeypatch: pytest.MonkeyPa
     def full(*_: Any) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(growing._File, "take", full)
+    monkeypatch.setattr(growing._StepsFile, "take", full)
     for values in (followed(a, b), followed(two, b)):
         assert not in_file(values)
     assert np.array_equal(followed(two, b), np.concatenate([a, b, b], axis=1))
