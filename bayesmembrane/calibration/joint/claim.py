@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,8 @@ from bayesmembrane.physics.materials.base import Material
 
 WALK = "walk"
 """The folder of the walk among those of the tests."""
+LONG = 20
+"""Letters; a longer label spreads over lines in a table."""
 _LABEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
 
 
@@ -207,10 +210,14 @@ def _named(measurements: Sequence[Measurement]) -> dict[str, Measurement]:
 
 
 def labelled(tests: Sequence[tuple[str, Measurement]]) -> list[str]:
-    """Labels of tests (label or "", measurement): their own, else made of their specimens' names, numbered if alike."""
+    """Labels of tests (label or "", measurement): their own, else made of their specimens' names, or of their files'
+    where these are shorter and a name is too long to be read in a table; numbered if alike.
+    """
     found: list[str] = []
     for own, m in tests:
         stem = own or called(m.specimen.name)
+        if not own and len(stem) > LONG and m.provenance.curve:
+            stem = min(stem, called(Path(m.provenance.curve).stem), key=len)
         label, number = stem, 2
         while label in found and not own:
             label, number = f"{stem}-{number}", number + 1
@@ -220,4 +227,4 @@ def labelled(tests: Sequence[tuple[str, Measurement]]) -> list[str]:
 
 def called(name: str) -> str:
     """A label made of any name: "Film 1" -> "film-1"."""
-    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:30] or "test"
+    return re.sub(r"[^a-z0-9]+", "-", name.lower())[:30].strip("-") or "test"
