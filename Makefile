@@ -27,7 +27,7 @@ help:
 	@echo "make study-kill  runs killed at random moments and while they write, and a campaign of 60 runs, some minutes; KILL='--kills 20' asks for less"
 	@echo "make study-overnight  what checkpoints cost, the memory of ten million draws, how late a deadline is, some minutes"
 	@echo "make study-damage  every stored file damaged 500 times, an hour or less; DAMAGE='--times 50' asks for less"
-	@echo "make study-foretold  what dry runs foretell beside what three campaigns take, some minutes"
+	@echo "make study-foretold  what dry runs foretell beside what six campaigns take, a quarter of an hour"
 	@echo "make study-import 10 000 damaged exports, what becomes of them, some minutes; IMPORT='--count 1000' asks for less"
 	@echo "make study-seeds 50 seeds for the statistical tests, lanes on and off, hours; goes on where it was; SEEDS='--group quick' asks for less"
 	@echo "make study-sbc  simulation-based calibration of every material, hours; goes on where it was; SBC='--only gent --limit 20' asks for less"
