@@ -200,6 +200,7 @@ def sampling(campaign: Path) -> bool:
     return any(now.get("ess") for now in read_now(campaign).values())
 
 
+@pytest.mark.study
 def test_a_campaign_that_is_killed_and_resumed_has_the_draws_of_one_that_was_not(run: Run, tmp_path: Path) -> None:
     file = write_campaign(tmp_path)
     client = begun(tmp_path, "run", file, "--out", "killed", "--workers", 2)

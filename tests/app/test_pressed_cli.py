@@ -40,6 +40,7 @@ def test_it_is_sampled_and_its_page_says_compression(run: Run, block: tuple[str,
     assert "a stretch of" not in page
 
 
+@pytest.mark.study
 @pytest.mark.usefixtures("short_walks")
 def test_it_is_compared_and_diagnosed(run: Run, block: tuple[str, ...]) -> None:
     status, out, err = run("compare", *block, "--materials", "neo_hookean,gent", "--json", "--ess", 50)

@@ -52,7 +52,8 @@ def test_sample_is_stopped_and_goes_on(number: int, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("verb", "number", "begins"), [("loop", signal.SIGTERM, "*.seg"), ("demo", signal.SIGINT, "*")]
+    ("verb", "number", "begins"),
+    [("loop", signal.SIGTERM, "*.seg"), pytest.param("demo", signal.SIGINT, "*", marks=pytest.mark.study)],
 )
 def test_verbs_of_many_runs_are_stopped_and_say_how_to_go_on(
     verb: str, number: int, begins: str, tmp_path: Path

@@ -119,6 +119,7 @@ def test_too_few_points_are_refused() -> None:
         diagnose(few, Hypothesis(Ogden))
 
 
+@pytest.mark.study
 def test_the_moment_of_a_sudden_change_is_told(tmp_path) -> None:
     data, found = answered(tmp_path, "temperature_step", "gent", "staircase_twice", "white", 50091)
     assert found.verdict == "unknown"

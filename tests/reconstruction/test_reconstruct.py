@@ -197,6 +197,7 @@ def published(
     return replace(table, rows=tuple(rows)), forces
 
 
+@pytest.mark.study
 def test_round_trip_with_two_planted_misprints(table: PublishedTable) -> None:
     counts, firsts = (12, 8), (0.8e-3, 1.9e-3)
     positions = [np.linspace(a, e, n) for a, e, n in zip(firsts, table.ends, counts, strict=True)]

@@ -19,6 +19,7 @@ def test_two_sound_tests_of_one_film_lack_nothing(tmp_path) -> None:
     assert "to within their noise" in sentence(found)
 
 
+@pytest.mark.study
 def test_a_thickness_that_each_test_alone_absorbs_is_seen_in_two(tmp_path) -> None:
     """Of which film, or which load cell, no force can tell."""
     one, two = two_tests(tmp_path, "null", "gent", 1.0, 61012, factor=1.04)

@@ -56,6 +56,7 @@ def test_slopes_in_all_coordinates_are_differences_and_none_is_the_modulus() -> 
     assert found.sensitivity[0, :, 1] == pytest.approx(numeric, rel=1e-3, abs=1e-4 * np.max(np.abs(numeric)))
 
 
+@pytest.mark.study
 def test_force_and_contour_are_weighed_by_their_own_noise_alone() -> None:
     """ln p of both is the sum of both."""
     d = np.linspace(5 * MM, 35 * MM, 8)
