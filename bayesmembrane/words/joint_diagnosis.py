@@ -133,7 +133,7 @@ def _member(member: JointMember, found: JointDiagnosis) -> str:
             m = test.measurement
             shown = size_in_words(value, size.unit, m.rig.shown(m.specimen.thickness))
             told.append(shown if label else f"{shown} in {test.label}")
-            if known[own].constant:
+            if known[own].constant and full[1] in member.parameters:
                 told = [shown]  # of the material, in all tests
         words.append(f"{effect_title(name)} ({spoken_parameter(f'{own}.{size.name}')} {listed(told)})")
     text = " and ".join(words) or "no effect"

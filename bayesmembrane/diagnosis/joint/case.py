@@ -93,8 +93,9 @@ def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Q
     parts = tuple(c.search for c in alone)
     noise = joint_noise([p.noise for p in parts])
     search = JointSearch(parts, tuple(t / min(thickness) for t in thickness), noise)
-    given = effects_in_tests([{e.name: e for e in c.question.hypothesis.effects} for c in alone], labels)
-    effects = tuple(effects_in_tests([_possible(c) for c in alone], labels))
+    one_clock = len({c.measurement.time is None for c in alone}) == 1
+    given = effects_in_tests([{e.name: e for e in c.question.hypothesis.effects} for c in alone], labels, one_clock)
+    effects = tuple(effects_in_tests([_possible(c) for c in alone], labels, one_clock))
     smooth = np.asarray(block_diag(*(c.smooth for c in alone)))
     plain = _energies(search, alone, question, given, tell)
     best = max(plain.values(), key=lambda c: c.log_evidence)

@@ -52,11 +52,14 @@ class EffectInTests(Effect):
         return dict(self.parts).get(test)
 
 
-def in_tests(name: str, parts: Sequence[tuple[int, Effect]]) -> EffectInTests:
-    """The ``parts`` (number of the test, effect) of one effect, under a name."""
+def in_tests(name: str, parts: Sequence[tuple[int, Effect]], one_clock: bool = True) -> EffectInTests:
+    """The ``parts`` (number of the test, effect) of one effect, under a name.
+
+    A constant of the material has one value in tests that go by ``one_clock``: without times a second is a millimetre.
+    """
     first = parts[0][1]
-    coordinates = first.coordinates
-    if len(parts) > 1 and not first.constant:
+    coordinates, constant = first.coordinates, first.constant and one_clock
+    if len(parts) > 1 and not constant:
         coordinates = tuple(replace(p, name=f"{test}.{p.name}") for test, effect in parts for p in effect.coordinates)
     kind = type(
         "EffectInTests",
@@ -70,24 +73,27 @@ def in_tests(name: str, parts: Sequence[tuple[int, Effect]]) -> EffectInTests:
             "exact": first.exact,
             "remembers": first.remembers,
             "of_the_material": first.of_the_material,
-            "constant": first.constant,
+            "constant": constant,
         },
     )
     made: EffectInTests = kind(tuple(parts))
     return made
 
 
-def effects_in_tests(effects: Sequence[Mapping[str, Effect]], labels: Sequence[str]) -> list[EffectInTests]:
+def effects_in_tests(
+    effects: Sequence[Mapping[str, Effect]], labels: Sequence[str], one_clock: bool = True
+) -> list[EffectInTests]:
     """The ``effects`` by name of every test: of the material once, of a rig once for each test.
 
-    Those of a rig are called after their test, as in ``zero_offset@strip``.
+    Those of a rig are called after their test, as in ``zero_offset@strip``. ``one_clock`` is false where some tests
+    were timed and others not.
     """
     names = list(dict.fromkeys(name for own in effects for name in own))
     out = []
     for name in names:
         parts = [(i, own[name]) for i, own in enumerate(effects) if name in own]
         if parts[0][1].of_the_material:
-            out.append(in_tests(name, parts))
+            out.append(in_tests(name, parts, one_clock))
         else:
             out += [in_tests(f"{name}{AT}{labels[i]}", [(i, effect)]) for i, effect in parts]
     return out

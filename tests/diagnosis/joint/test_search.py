@@ -90,3 +90,11 @@ def test_constants_of_the_material_are_the_same_in_all_tests(searches) -> None:
         own = part.batch(search.of(claim, i), x[None, :])
         assert np.array_equal(r[:, rows], own[0])
         assert np.array_equal(slopes[:, rows], own[1])
+
+
+def test_tests_that_go_by_different_clocks_share_no_constant() -> None:
+    """Without times a second is a millimetre of travel."""
+    effects = [{"viscoelastic": components("effects")["viscoelastic"]()} for _ in range(2)]
+    (unit,) = effects_in_tests(effects, ("one", "two"), one_clock=False)
+    assert unit.coordinates[0].name == "0.strength"
+    assert len(unit.sizes) == 2
