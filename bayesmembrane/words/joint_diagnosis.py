@@ -141,13 +141,14 @@ def _member(member: JointMember, found: JointDiagnosis) -> str:
 
 
 def _errors(found: JointDiagnosis) -> str:
-    """How the residuals of every test fall."""
-    return f"Residuals, root mean square: {listed([_error(t) for t in found.tests])}."
+    """How the residuals of every test fall; of an answer without a model how large they are."""
+    known = found.verdict != "unknown"
+    return f"Residuals, root mean square: {listed([_error(t, known) for t in found.tests])}."
 
 
-def _error(test: DiagnosedTest) -> str:
-    how = seen(test.measurement)
-    return f"{test.label} {how.error(test.before.rmse_N)} before and {how.error(test.after.rmse_N)} after"
+def _error(test: DiagnosedTest, known: bool) -> str:
+    before, after = (seen(test.measurement).error(m.rmse_N) for m in (test.before, test.after))
+    return f"{test.label} {before} before and {after} after" if known else f"{test.label} {before}"
 
 
 def _foreign(found: JointDiagnosis) -> str:

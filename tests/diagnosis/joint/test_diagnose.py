@@ -59,6 +59,7 @@ def test_a_fault_of_one_test_is_found_in_that_test(tmp_path) -> None:
         left = sentence(replace(found, verdict="unknown", members=()))
         assert "beside offset of the deflection zero" in left
         assert "in all that is probable" in left
+        assert " after" not in left
 
 
 @pytest.mark.study
