@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+AGAIN = 0.01  # s, until an interrupt that got lost is raised once more
 
 Stop = Callable[[], bool]
 """Asked again and again: whether to stop now."""
@@ -57,8 +59,36 @@ def raised() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    with _handled(signal.default_int_handler):
+    with insistent(), _handled(signal.default_int_handler):
         yield
+
+
+@contextmanager
+def insistent() -> Iterator[None]:
+    """While the body runs, an interrupt that nobody could catch is not told, but raised again a moment later.
+
+    A signal may arrive while Python calls a finaliser or the callback of a weak reference. What is raised there is told
+    on standard error, as "Exception ignored in", and lost (`sys.unraisablehook`).
+    """
+    before = sys.unraisablehook
+
+    def raise_again(lost: sys.UnraisableHookArgs) -> None:
+        if issubclass(lost.exc_type, KeyboardInterrupt):
+            threading.Timer(AGAIN, _signal_main_thread).start()
+        else:
+            before(lost)
+
+    sys.unraisablehook = raise_again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+
+
+def _signal_main_thread() -> None:
+    """SIGTERM, unless that would end the process without a word: whoever handled it has gone by now."""
+    if callable(signal.getsignal(signal.SIGTERM)) and (main := threading.main_thread().ident):
+        signal.pthread_kill(main, signal.SIGTERM)
 
 
 @contextmanager

@@ -13,6 +13,8 @@ from queue import Empty
 from threading import Thread
 from typing import Any, Protocol, TypeVar
 
+from bayesmembrane.ground.interrupts import insistent
+
 Tell = Callable[[str, Any], None]
 """(label of a job, how far it is)."""
 
@@ -84,7 +86,8 @@ def _in_worker(work: Callable[..., Result], given: tuple[Any, ...], queue: Any) 
         raise KeyboardInterrupt
     _Worker.busy = True
     try:
-        return work(*given, lambda label, message: queue.put((label, message)))
+        with insistent():
+            return work(*given, lambda label, message: queue.put((label, message)))
     except KeyboardInterrupt:
         _Worker.ended = True
         raise

@@ -1,0 +1,53 @@
+"""Interrupts that arrive where Python lets no exception through."""
+
+import signal
+import sys
+import time
+from collections.abc import Callable
+
+import pytest
+
+from bayesmembrane.ground.interrupts import deferred, raised
+
+LONGEST = 30.0  # s, for what takes a hundredth
+
+
+class Fragile:
+    """Something whose finaliser does what it was told."""
+
+    def __init__(self, last: Callable[[], object]) -> None:
+        self.last = last
+
+    def __del__(self) -> None:
+        self.last()
+
+
+def interrupted_in_a_finaliser() -> None:
+    thing = Fragile(lambda: signal.raise_signal(signal.SIGINT))
+    del thing
+    time.sleep(LONGEST)
+
+
+def test_interrupt_in_a_finaliser_ends_the_body_and_is_not_told(capfd: pytest.CaptureFixture[str]) -> None:
+    with raised(), pytest.raises(KeyboardInterrupt):
+        interrupted_in_a_finaliser()
+    assert capfd.readouterr().err == ""
+
+
+def test_second_interrupt_in_a_finaliser_ends_a_deferred_body(capfd: pytest.CaptureFixture[str]) -> None:
+    with raised(), pytest.raises(KeyboardInterrupt), deferred() as asked:
+        signal.raise_signal(signal.SIGTERM)
+        assert asked()
+        interrupted_in_a_finaliser()
+    assert capfd.readouterr().err == ""
+
+
+def test_other_lost_exceptions_are_told_as_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = list[type[BaseException]]()
+    monkeypatch.setattr(sys, "unraisablehook", lambda lost: told.append(lost.exc_type))
+    hook = sys.unraisablehook
+    with raised():
+        thing = Fragile(lambda: 1 / 0)
+        del thing
+    assert told == [ZeroDivisionError]
+    assert sys.unraisablehook is hook
