@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -40,21 +40,26 @@ class Gap:
     inner_radius: float
     outer_radius: float
 
-    @cached_property
+    @property
     def tautness(self) -> float:
         """What pre-stretch weighs against deflection in the film, relative to the strip.
 
         Film: F = 2 pi T delta / ln(R2/R1) under the tension T alone and c G d delta^3 without any; strip: T delta / L
         and 2 G d delta^3 / L^3, both times its width.
         """
-        small = np.array([1e-2 * self.inner_radius])
-        curve = solve(request(NeoHookean, [0.5], small, self.inner_radius, self.outer_radius))
-        cubic = float(curve.force[0, 0] / small[0] ** 3)
-        return float(2 * np.pi / np.log(self.outer_radius / self.inner_radius) * 2 / (cubic * self.length**2))
+        return _tautness(self)
 
     @property
     def length(self) -> float:
         return self.outer_radius - self.inner_radius
+
+
+@lru_cache(maxsize=64)
+def _tautness(gap: Gap) -> float:
+    small = np.array([1e-2 * gap.inner_radius])
+    curve = solve(request(NeoHookean, [0.5], small, gap.inner_radius, gap.outer_radius))
+    cubic = float(curve.force[0, 0] / small[0] ** 3)
+    return float(2 * np.pi / np.log(gap.outer_radius / gap.inner_radius) * 2 / (cubic * gap.length**2))
 
 
 @dataclass(frozen=True)
@@ -102,21 +107,30 @@ class FilmLaw:
     def stack(laws: Sequence[FilmLaw]) -> FilmLaw:
         """The films of all laws, one after the other; tangents are left out."""
         most = max(law.pieces.shape[1] for law in laws)
-        pieces = [np.pad(law.pieces, ((0, 0), (0, most - law.pieces.shape[1]), (0, 0))) for law in laws]
+        pieces = [_widened(law.pieces, most) for law in laws]
         rest = {n: np.concatenate([getattr(w, n) for w in laws]) for n in ("prestretch", "step", "last", "status")}
         return FilmLaw(laws[0].gap, pieces=np.concatenate(pieces), **rest)
 
     def replaced(self, rows: NDArray[np.int64], other: FilmLaw) -> FilmLaw:
         """This law with the films at ``rows`` from another one, whose knots are at least as many."""
-        room = other.pieces.shape[1] - self.pieces.shape[1]
-        wide: dict[str, Any] = {"pieces": np.pad(self.pieces, ((0, 0), (0, room), (0, 0)))}
+        count = other.pieces.shape[1]
+        wide: dict[str, Any] = {"pieces": _widened(self.pieces, count).copy()}
         if self.tangents is not None:
-            wide["tangents"] = np.pad(self.tangents, ((0, 0), (0, room), (0, 0), (0, 0)))
+            wide["tangents"] = _widened(self.tangents, count).copy()
         for name in ("prestretch", "step", "last", "status"):
             wide[name] = getattr(self, name).copy()
         for name, values in wide.items():
             values[rows] = getattr(other, name)
         return replace(self, **wide)
+
+
+def _widened(pieces: Array, count: int) -> Array:
+    """Pieces (B, J, ...) as (B, ``count``, ...), with zeros; they themselves if they are as many."""
+    if pieces.shape[1] == count:
+        return pieces
+    wide = np.zeros((len(pieces), count, *pieces.shape[2:]))
+    wide[:, : pieces.shape[1]] = pieces
+    return wide
 
 
 def film_law(asked: Request, end: Array, solver: Solve = solve) -> tuple[FilmLaw, Curves]:
