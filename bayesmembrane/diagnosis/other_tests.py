@@ -119,7 +119,7 @@ def _draws(search: Search, c: Candidate, other: Measurement, count: int, rng: np
 def _at(search: Search, c: Candidate, other: Measurement) -> Continued | None:
     n = len(search.measurement)
     both = joint_factors(search.measurement, other.path)
-    part = replace(search, known_factors=FormFactors(both.state[:n], both.progress[:n], search.factors.local))
+    part = replace(search, known_factors=FormFactors(both.state[:n], both.progress[:n], search.factors.spots))
     fit = part.at(c.hypothesis, c.x)
     if fit is None:
         return None

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -93,12 +94,28 @@ class FormFactors:
 
     state : (N, r) of an energy's error
     progress : (N, q) of a law's error
-    local : (N, m) a column for every reading at which a test starts, turns or goes slack; without any, None
+    spots : (m,) numbers of the readings at which a test starts, turns or goes slack, -1 for one that
+        is not among these; None where that is not asked
     """
 
     state: Array
     progress: Array
-    local: Array | None = None
+    spots: NDArray[np.int64] | None = None
+
+    @cached_property
+    def local(self) -> Array | None:
+        """(N, m) a column for every one of the ``spots``; None without any."""
+        if self.spots is None:
+            return None
+        columns, there = np.zeros((len(self.state), self.spots.size)), np.flatnonzero(self.spots >= 0)
+        columns[self.spots[there], there] = 1.0
+        return columns
+
+    def of(self, some: NDArray[np.bool_]) -> FormFactors:
+        """The same for ``some`` (N,) readings, with as many columns."""
+        place = np.where(some, np.cumsum(some) - 1, -1)
+        spots = None if self.spots is None else place[self.spots]
+        return FormFactors(self.state[some], self.progress[some], spots)
 
 
 def form_factors(measurement: Measurement) -> FormFactors:
@@ -106,11 +123,11 @@ def form_factors(measurement: Measurement) -> FormFactors:
     return FormFactors(
         smooth_factor(states(measurement), STATE_LENGTHS),
         smooth_factor(progress(measurement)[:, None], PROGRESS_LENGTHS),
-        np.eye(len(measurement))[:, unsteady(measurement)],
+        unsteady(measurement),
     )
 
 
-def unsteady(measurement: Measurement) -> Array:
+def unsteady(measurement: Measurement) -> NDArray[np.int64]:
     """Numbers of the readings at which the test starts, turns, or goes slack."""
     leg, n = measurement.leg, len(measurement)
     moves = np.flatnonzero(leg != 0)

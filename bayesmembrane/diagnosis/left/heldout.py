@@ -14,7 +14,6 @@ from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.left.continued import continued
 from bayesmembrane.diagnosis.thresholds import HELD_OUT
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.form_error import FormFactors
 from bayesmembrane.physics.forward import Forward
 
 Rivals = Sequence[tuple[Candidate, float]]
@@ -109,10 +108,8 @@ def validate(search: Search, before: Candidate, after: Candidate, rivals: Rivals
 
 def _on_the_others(search: Search, mask: NDArray[np.bool_]) -> Search:
     seen = search.measurement.select(~mask)
-    whole = search.factors
-    local = None if whole.local is None else whole.local[~mask]
-    factors = FormFactors(whole.state[~mask], whole.progress[~mask], local)
-    return replace(search, measurement=seen, noise=search.noise.part(seen, ~mask), known_factors=factors)
+    noise, factors = search.noise.part(seen, ~mask), search.factors.of(~mask)
+    return replace(search, measurement=seen, noise=noise, known_factors=factors)
 
 
 def _predicted(part: Search, fit: Candidate, search: Search, mask: NDArray[np.bool_]) -> tuple[Misfit, float]:
