@@ -4,10 +4,12 @@ import signal
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import settings
+from xdist.scheduler import LoadFileScheduling
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.registry import material
@@ -35,13 +37,27 @@ LONGEST = (
     "app/test_cli.py",
     "comparison/test_evidence.py",
     "report/sections/test_lead.py",
-    "report/sections/test_loop.py",
     "test_door.py",
 )
 
 
+# What is made once for all of them would be made once for each worker.
+TOGETHER = ("tests/report/",)
+
+
+class Whole(LoadFileScheduling):
+    """Files stay whole, and so do the folders `TOGETHER`."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return next((folder for folder in TOGETHER if nodeid.startswith(folder)), super()._split_scope(nodeid))
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadFileScheduling:
+    return Whole(config, log)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """`LONGEST` first, else as they were; files stay whole."""
+    """`LONGEST` first, else as they were."""
     place = {Path(__file__).parent / name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path, len(place)))
 

@@ -133,6 +133,7 @@ def test_an_unwritable_folder_is_one_sentence(run: Run, tmp_path: Path) -> None:
     assert blocked.read_text() == "mine"
 
 
+@pytest.mark.study
 def test_fit_finds_effects_in_a_curve_of_the_other_solver(run: Run, tmp_path: Path) -> None:
     """The curve is shot, and the shift and the frame are put in by hand, point by point."""
     film, shift, compliance = [8.0, -0.2, 0.03], 6e-4, 4e-4

@@ -35,10 +35,11 @@ def called(pieces: int, words: list[str], cwd: Path) -> tuple[int, str, list[str
     return done.returncode, done.stdout, made
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("verb", "more"),
     [
-        pytest.param("valleys", ["--material", "mooney_rivlin"], marks=pytest.mark.study),
+        ("valleys", ["--material", "mooney_rivlin"]),
         ("loop", ["--material", "neo_hookean", "--ess", "100"]),
     ],
 )

@@ -50,6 +50,7 @@ def test_a_yeoh_film_has_starts_for_nested_sampling_by_the_default_seed() -> Non
     assert np.all(np.isfinite(posterior.evaluate(starts.reshape(-1, posterior.size)).log_posterior))
 
 
+@pytest.mark.study
 @pytest.mark.usefixtures("short_walks")
 def test_a_stretched_yeoh_film_is_sampled(run: Run) -> None:
     status, out, err = run("sample", *OP1, "--material", "yeoh", "--effects", "prestretch", "--ess", 50, "--json")

@@ -29,7 +29,7 @@ def begun(words: list[str], program: str = "bayesmembrane", cwd: Path = ROOT) ->
     )
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.study)])
 def test_sample_is_stopped_and_goes_on(number: int, tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = ["sample", *strip(tmp_path), "--material", "neo_hookean", "--out", str(out), "--json"]

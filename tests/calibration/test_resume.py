@@ -96,7 +96,7 @@ def alike(one: Run, other: Run) -> None:
             assert np.array_equal(values.values, other.data[group][name].values, equal_nan=True), (group, name)
 
 
-@pytest.mark.parametrize("killed_at", [80, 120, 170])
+@pytest.mark.parametrize("killed_at", [80, *(pytest.param(step, marks=pytest.mark.study) for step in (120, 170))])
 def test_killed_and_continued_is_never_killed(
     whole: Run, killed_at: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -112,7 +112,7 @@ def test_killed_and_continued_is_never_killed(
     alike(load_run(done.path), load_run(whole.path))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("steps", [1, 21, 22, 51])
+@pytest.mark.parametrize("steps", [1, 22, *(pytest.param(step, marks=pytest.mark.study) for step in (21, 51))])
 def test_stopped_and_continued_is_never_stopped(whole: Run, steps: int, tmp_path: Path) -> None:
     left = iter(range(steps))
     partial = sample(strip(), CLAIM, how(tmp_path), stop=lambda: next(left, None) is None)
@@ -144,7 +144,7 @@ def test_a_signal_ends_the_walk_after_its_step_and_everything_is_stored(
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.study), signal.SIGTERM])
 def test_a_signal_as_soon_as_the_starts_are_kept_leaves_a_stored_run(
     whole: Run, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -136,6 +136,7 @@ def test_a_hypothesis_that_cannot_be_fitted_does_not_spoil_the_others(monkeypatc
     json.dumps(document(found), allow_nan=False)
 
 
+@pytest.mark.study
 def test_two_processes_say_what_one_says(compared):
     found, out, _, claims, whole = compared
     again = compare(whole.up_to(0.049), claims, Judging(402, 300, False, out, 2), whole=whole)

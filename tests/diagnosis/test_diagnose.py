@@ -39,7 +39,11 @@ def answered(
 
 @pytest.mark.parametrize(
     ("material", "protocol", "noise", "seed"),
-    [("gent", "staircase", "white", 501), ("yeoh", "two_speeds", "ar1:0.5", 502), ("ogden", "single", "white", 503)],
+    [
+        ("gent", "staircase", "white", 501),
+        ("yeoh", "two_speeds", "ar1:0.5", 502),
+        pytest.param("ogden", "single", "white", 503, marks=pytest.mark.study),
+    ],
 )
 def test_nothing_is_missing_where_nothing_is(tmp_path, material, protocol, noise, seed) -> None:
     data, found = answered(tmp_path, "null", material, protocol, noise, seed, ALL)

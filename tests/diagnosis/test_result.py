@@ -10,6 +10,7 @@ from bayesmembrane.calibration.run import RunSettings, sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.left.discrepancy import discrepancy
 from bayesmembrane.diagnosis.loop import Loop, Round, Stage
 from bayesmembrane.diagnosis.result import Diagnosis
@@ -33,7 +34,7 @@ def measurement() -> Measurement:
 
 @pytest.fixture(scope="module")
 def found(measurement: Measurement) -> Diagnosis:
-    return diagnose(measurement, hypothesis("neo_hookean"))
+    return diagnose(measurement, Question(hypothesis("neo_hookean"), True, True))
 
 
 def values(result: Any, folder: Path) -> tuple[Any, dict[str, np.ndarray]]:

@@ -1,4 +1,4 @@
-"""The paper's five materials compared on its first range, its second, and both together.
+"""The paper's five materials compared on its first range, its second, and both together; on the first under each noise.
 
     python -m tests.studies.comparison [--seed 0] [--chains chains]
 
@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from bayesmembrane.app.demo import shipped_ranges
-from bayesmembrane.comparison.compare import compare_ranges
+from bayesmembrane.comparison.compare import claimed, compare_ranges
 from bayesmembrane.comparison.jobs import Judging
 from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.published import read_published_table
@@ -23,8 +24,15 @@ from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.blocks import Table
 from bayesmembrane.report.sections.evidence import sentences
-from bayesmembrane.report.sections.evidence.tables import evidence_table, modes_table, ranking_table, widths_table
+from bayesmembrane.report.sections.evidence.tables import (
+    evidence_table,
+    modes_table,
+    noises_table,
+    ranking_table,
+    widths_table,
+)
 from bayesmembrane.words.beside_paper import paper_losses
+from bayesmembrane.words.noises import of_noise
 
 TARGET = Path(__file__).resolve().parents[2] / "docs" / "studies" / "comparison.md"
 
@@ -35,9 +43,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--chains", type=Path, default=Path("chains"))
     asked = parser.parse_args()
+    judging, ranges = Judging(asked.seed, out=asked.chains), shipped_ranges()
     claims = [hypothesis(name) for name in ordinary_materials()]
-    found = compare_ranges(shipped_ranges(), claims, Judging(asked.seed, out=asked.chains), progress=tell)
-    TARGET.write_text(page(found, losses(), asked.seed), encoding="utf-8")
+    found = compare_ranges(ranges, claims, judging, progress=tell)
+    doubted = claimed(",".join(ordinary_materials()), "", "auto", "reached")
+    noises = compare_ranges({"OP1": ranges["OP1"]}, doubted, replace(judging, modes=False), progress=tell)
+    TARGET.write_text(page(found, losses(), asked.seed) + whatever_the_noise(noises), encoding="utf-8")
 
 
 def losses() -> dict[str, dict[str, float]]:
@@ -66,6 +77,14 @@ def page(found: Mapping[str, Comparison], paper: Mapping[str, Mapping[str, float
         *(f"{t.caption}\n\n{markdown(t)}" for t in tables if t is not None),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def whatever_the_noise(found: Mapping[str, Comparison]) -> str:
+    """The part of the page on noise models."""
+    table = noises_table(found)
+    assert table is not None
+    words = "\n".join(f"- {name}: {of_noise(c)}" for name, c in found.items())
+    return "\n\n".join(["\n## Whatever the noise", words, table.caption, markdown(table)]) + "\n"
 
 
 def markdown(table: Table) -> str:

@@ -33,7 +33,7 @@ def simulated(rng: np.random.Generator, j: int, q: int) -> tuple[Specimens, np.n
     return specimens(values, sds), mean, scatter, mean + scatter * rng.standard_normal(q)
 
 
-@pytest.mark.parametrize(("j", "q", "sets"), [(5, 1, 150), (4, 2, 80)])
+@pytest.mark.parametrize(("j", "q", "sets"), [pytest.param(5, 1, 150, marks=pytest.mark.study), (4, 2, 80)])
 def test_intervals_hold_the_truth_as_often_as_they_say(j: int, q: int, sets: int) -> None:
     rng = np.random.default_rng(31)
     inside = []

@@ -94,6 +94,7 @@ def test_what_the_emulator_gets_wrong_the_posterior_puts_right() -> None:
     assert across.std() == pytest.approx(0.3, rel=0.06)
 
 
+@pytest.mark.study
 def test_ess_predicts_the_scatter_of_means() -> None:
     """The variance of the mean over independent runs is that of the posterior over ESS."""
     errors = []

@@ -14,7 +14,7 @@ from tests.diagnosis.joint.tests_of_one_film import two_tests
 
 def test_two_sound_tests_of_one_film_lack_nothing(tmp_path) -> None:
     one, two = two_tests(tmp_path, "null", "mooney_rivlin", 1.0, 61011)
-    found = diagnose_jointly(joint({"one": one, "two": two}, hypothesis("gent")), declared=False)
+    found = diagnose_jointly(joint({"one": one, "two": two}, hypothesis("gent")), declared=False, quick=True)
     assert (found.verdict, found.effects) == ("adequate", ())
     assert "to within their noise" in sentence(found)
 

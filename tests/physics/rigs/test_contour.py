@@ -80,6 +80,7 @@ def lifted(d: np.ndarray, force: np.ndarray) -> Measurement:
     return Measurement(d, force, Annulus(INNER, OUTER), Specimen("film", 5e-5), force_sd=sd)
 
 
+@pytest.mark.study
 def test_a_contour_alone_says_how_the_energy_is_shaped() -> None:
     found = fit(traced("mooney_rivlin", [6.0, 1.5]), hypothesis("mooney_rivlin"))
     c1, c2 = (found.parameters[f"mooney_rivlin.{n}"].value for n in ("c1", "c2"))
