@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.run import RunSettings, sample
 from bayesmembrane.comparison.leave_out import score as pc
-from bayesmembrane.comparison.leave_out.pool import LED_BY, Pool
+from bayesmembrane.comparison.leave_out.pool import ENOUGH, LED_BY, Pool
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
@@ -111,6 +111,31 @@ def test_films_of_absurd_force_lead_nobody(monkeypatch):
     terms = data.log_likelihood["force"].values.reshape(len(draws), -1).astype(float)
     pool = Pool(posterior(), draws, data.sample_stats["lp"].values.ravel(), terms, np.random.default_rng(0))
     assert len(pool._drawn_towards(i)) >= LED_BY * posterior().size
+
+
+def test_terms_without_digits_lead_nobody(monkeypatch):
+    """A form error a million times the noise leaves none: such a term said that the others like a draw by e^(10^12)."""
+    pointwise, data, draws, i = Posterior.pointwise, run().data, run().draws(), 4
+
+    def lost(p, x, force):
+        terms = pointwise(p, x, force)
+        terms[:3, i] = -1e12
+        return terms
+
+    monkeypatch.setattr(Posterior, "pointwise", lost)
+    terms = data.log_likelihood["force"].values.reshape(len(draws), -1).astype(float)
+    pool = Pool(posterior(), draws, data.sample_stats["lp"].values.ravel(), terms, np.random.default_rng(0))
+    assert len(pool._drawn_towards(i)) >= LED_BY * posterior().size
+
+
+def test_draws_that_are_all_the_same_end_the_search(monkeypatch):
+    data, draws = run().data, run().draws()
+    monkeypatch.setattr(Pool, "_drawn_towards", lambda pool, i: pool.x[:1])
+    terms = data.log_likelihood["force"].values.reshape(len(draws), -1).astype(float)
+    pool = Pool(posterior(), draws, data.sample_stats["lp"].values.ravel(), terms, np.random.default_rng(0))
+    _, error, worth = pool.without(4)
+    assert worth < ENOUGH
+    assert error > 0.1  # what is not known is told
 
 
 def test_exact_refits_agree_with_the_grid(monkeypatch):

@@ -18,6 +18,9 @@ EACH, PER_DIMENSION = 400, 300  # draws of such a density
 UNSEEN = 10.0  # over the effective draws is the least error
 HALVINGS = 30  # of the interval of powers
 LED_BY = 10  # effective draws for each dimension that such a density is fitted to
+ABSURD = 300.0
+"""How much more than of any draw of the posterior the other points may make of one, in ln p: an outlier of 24 standard
+deviations explains that. Beyond it a form error a million times the noise has left no digits."""
 HOPELESS = -1e10  # ln p: beyond it the difference that says what the other points make of a draw has no digits left
 
 
@@ -35,6 +38,7 @@ class Pool:
         self.x, self.log_p, self.terms = draws, log_posterior, terms
         self.counts, self.others = [len(draws)], list[Mixture]()
         self.log_others, self.log_z = np.empty((0, len(draws))), 0.0
+        self.most = np.max(log_posterior[:, None] - terms, axis=0)
         some = rng.permutation(len(draws))
         self._add(fit_mixture(draws[some[:LEARN_FROM]], rng), len(draws))
 
@@ -48,7 +52,11 @@ class Pool:
         for _ in range(FOLLOWED):
             if self._of(i)[2] >= ENOUGH:
                 break
-            self._add(around(self._drawn_towards(i), self.rng), EACH + PER_DIMENSION * self.posterior.size)
+            try:
+                towards = around(self._drawn_towards(i), self.rng)
+            except np.linalg.LinAlgError:  # they fill no volume: the error says how little is known
+                break
+            self._add(towards, EACH + PER_DIMENSION * self.posterior.size)
         return self._of(i)
 
     def _of(self, i: int) -> tuple[float, float, float]:
@@ -77,6 +85,8 @@ class Pool:
         terms = np.zeros((len(x), self.terms.shape[1]))
         if np.any(good):
             terms[good] = self.posterior.pointwise(x[good], e.force[good])
+            known = np.all(e.log_posterior[:, None] - terms < self.most + ABSURD, axis=1)
+            good, terms = good & known, np.where(known[:, None], terms, 0.0)
         new = [o.log_density(x) for o in self.others]
         self.x, self.terms = np.concatenate([self.x, x]), np.concatenate([self.terms, terms])
         self.log_p = np.concatenate([self.log_p, np.where(good, e.log_posterior, -np.inf)])

@@ -16,6 +16,7 @@ DEGREES = (4.0, 10.0, 50.0)
 ROUNDS, ENOUGH = 60, 1e-4  # of expectation maximisation: a round that gains less ln density a draw is the last
 ROUGH = 1e-3  # the same of a fit that is only to be judged, by gains ten times as large
 RIDGE, PULL = 1e-6, 1e-3  # of the draws' variance; the latter for a component that holds one draw only
+SAME = 1e-14  # of a coordinate: what differs by less is the same but for round-off
 PER_COMPONENT = 6  # draws for each free number
 GAIN = 0.01  # of held-out ln density a draw, for which twice the components are worth it
 
@@ -125,8 +126,10 @@ def _summed(parts: Array) -> tuple[Array, Array]:
 
 
 def _whitening(x: Array) -> tuple[Array, Array]:
-    """(mean (k,), root R (k, k)) with R R^T the covariance of x (n, k)."""
-    scale = np.maximum(np.std(x, axis=0), 1e-300)
+    """(mean (k,), root R (k, k)) with R R^T the covariance of x (n, k); raises `LinAlgError` where all are the same."""
+    scale = np.std(x, axis=0)
+    if not np.all(scale > SAME * np.max(np.abs(x), axis=0)):
+        raise np.linalg.LinAlgError("the draws do not differ")
     values, vectors = np.linalg.eigh(np.atleast_2d(np.cov((x / scale).T)))
     root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 1e-14))
     return np.mean(x, axis=0), root
