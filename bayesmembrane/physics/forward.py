@@ -252,13 +252,12 @@ class Forward:
 
     def jacobian(self, x: Array) -> Array:
         """d films / d coordinates, (B, n, k), by central differences of fourth order: exact to 1e-12 or so."""
-        k = self.hypothesis.curve_size
+        m, k = self.hypothesis.material_size, self.hypothesis.curve_size
         out = np.zeros((len(x), len(self.hypothesis.material.field_names()), k))
-        for j in range(self.hypothesis.material_size):
-            h = np.zeros(x.shape[1])
-            h[j] = STEP
-            f = self.hypothesis.films
-            out[:, :, j] = (8 * (f(x + h) - f(x - h)) - (f(x + 2 * h) - f(x - 2 * h))) / (12 * h[j])
+        # All in one call: what a call costs is not its numbers.
+        moved = np.arange(-2, 3)[:, None, None, None] * STEP * np.eye(m, x.shape[1])[:, None] + x
+        f = self.hypothesis.films(moved.reshape(-1, x.shape[1])).reshape(5, m, len(x), -1)
+        out[:, :, :m] = np.moveaxis((8 * (f[3] - f[1]) - (f[4] - f[0])) / (12 * STEP), 0, 2)
         return out
 
 

@@ -30,6 +30,7 @@ TOLERANCE = 1e-6
 # A third of the step gains 729 where quintics are exact to sixth order; a part of that is counted on.
 GAIN = 100.0
 WORST = 1e-4
+LIMIT, LOST = int(Status.ITERATION_LIMIT), int(Status.INDEFINITE)
 SMALL = 1e-3  # of the largest force: smaller ones are known to that part of the tolerance
 
 
@@ -191,21 +192,13 @@ def law(
     gap: Gap, prestretch: Array, deflection: Array, force: Array, slope: Array, status: NDArray[np.int8]
 ) -> FilmLaw:
     """The law through forces and slopes (B, J) at `knots`; what follows the first knot without a force is left out."""
-    bad = (status != Status.OK) | ~(force > 0)
-    last = np.where(np.any(bad, axis=1), np.argmax(bad, axis=1), force.shape[1])
-    beyond = np.take_along_axis(status, np.minimum(last, force.shape[1] - 1)[:, None], axis=1)[:, 0]
-    beyond = np.where((last < force.shape[1]) & (beyond == Status.OK), Status.INDEFINITE, beyond)
-    beyond = np.where(last == force.shape[1], Status.ITERATION_LIMIT, beyond)
-    u = np.arcsinh(deflection / (WIDTH * gap.length))
-    strip, rise = _strip(gap, prestretch[:, None], deflection)
-    with np.errstate(all="ignore"):
-        g = np.log(force / strip)
-        turn = np.sqrt(deflection**2 + (WIDTH * gap.length) ** 2)
-        dg = (slope / force - rise / strip) * turn
-    keep = np.arange(force.shape[1]) < last[:, None]
-    step = 2 * u[:, 0]
-    pieces = _quintics(np.where(keep, g, 0.0), np.where(keep, dg * step[:, None], 0.0), last)
-    return FilmLaw(gap, np.ascontiguousarray(prestretch), step, pieces, last, beyond.astype(np.int8))
+    rows, count = force.shape
+    step, pieces = np.empty(rows), np.zeros((rows, count, 6))
+    last, beyond = np.empty(rows, np.int64), np.empty(rows, np.int8)
+    bent = np.empty((3, count))
+    of = (np.ascontiguousarray(v) for v in (prestretch, deflection, force, slope, status))
+    _assemble(gap.length, gap.tautness, *of, _one_sided(), bent, step, pieces, last, beyond)
+    return FilmLaw(gap, np.ascontiguousarray(prestretch), step, pieces, last, beyond)
 
 
 def tangent(found: FilmLaw, force: Array, change: Array) -> Array:
@@ -266,19 +259,6 @@ def _one_sided() -> tuple[Array, Array]:
     return w[:3], w[3:]
 
 
-def _quintics(g: Array, dg: Array, last: NDArray[np.int64]) -> Array:
-    """(B, J, 6) from values and slopes (per step) at the knots, even about u = 0."""
-    left, dleft = np.concatenate([g[:, :1], g[:, :-1]], 1), np.concatenate([-dg[:, :1], dg[:, :-1]], 1)
-    right, dright = np.concatenate([g[:, 1:], g[:, -1:]], 1), np.concatenate([dg[:, 1:], dg[:, -1:]], 1)
-    ddg = 2 * (left - 2 * g + right) - 0.5 * (dright - dleft)
-    row, end = np.arange(len(g)), np.maximum(last - 1, 0)
-    w, v = _one_sided()
-    three = np.maximum(end[:, None] - np.arange(3), 0)
-    edge = np.take_along_axis(g, three, 1) @ w + np.take_along_axis(dg, three, 1) @ v
-    ddg[row, end] = np.where(last >= 3, edge, 0.0)
-    return _between(g, dg, ddg)
-
-
 def _between(g: Array, dg: Array, ddg: Array) -> Array:
     """(B, J, 6) quintics from knot j - 1 to knot j (the first from the mirror image of knot 0), in t in [0, 1]."""
     a, da, dda = (np.concatenate([s * v[:, :1], v[:, :-1]], 1) for s, v in ((1, g), (-1, dg), (1, ddg)))
@@ -288,14 +268,57 @@ def _between(g: Array, dg: Array, ddg: Array) -> Array:
     )
 
 
-def _strip(gap: Gap, l0: Array, x: Array) -> tuple[Array, Array]:
-    """(F_s, dF_s/d delta) up to a constant: P1(l, l0) sin(th) / l0 with l = l0 sqrt(1 + delta^2 / L^2).
+@compiled(error_model="numpy")
+def _assemble(length, tautness, prestretch, deflection, force, slope, status, edge, bent, step, pieces, last, beyond):  # type: ignore[no-untyped-def]
+    """g = ln(F / F_s) at the knots (B, J) and its first two derivatives per step, and from them the quintics.
 
-    F_s = delta (1 - l0^-6 L^4 / (L^2 + delta^2)^2) with 1 - l0^-6 weighted by the tautness of the gap.
+    F_s = delta (1 - l0^-6 L^4 / (L^2 + delta^2)^2) with 1 - l0^-6 weighted by the tautness of the gap. The second
+    derivative follows from neighbours to fourth order, at the last knot from the three up to there.
     """
-    reach, ratio = 1.0 + (x / gap.length) ** 2, 1.0 - gap.tautness * (1.0 - l0**-6.0)
-    kappa = ((reach - 1.0) * (reach + 1.0) + 1.0 - ratio) / reach**2
-    return kappa * x, kappa + 4.0 * ratio / reach**3 * (x / gap.length) ** 2
+    rows, count = force.shape
+    wide = WIDTH * length
+    for b in range(rows):
+        step[b] = 2.0 * np.arcsinh(deflection[b, 0] / wide)
+        ratio = 1.0 - tautness * (1.0 - prestretch[b] ** -6.0)
+        end = count
+        for j in range(count):
+            if status[b, j] != 0 or not force[b, j] > 0.0:
+                end = j
+                break
+        last[b] = end
+        if end == count:
+            beyond[b] = LIMIT
+        else:
+            beyond[b] = status[b, end] if status[b, end] != 0 else LOST
+        g, dg, ddg = bent[0], bent[1], bent[2]
+        for j in range(count):
+            g[j] = dg[j] = 0.0
+            if j < end:
+                x = deflection[b, j]
+                reach = 1.0 + (x / length) ** 2
+                kappa = ((reach - 1.0) * (reach + 1.0) + 1.0 - ratio) / (reach * reach)
+                rise = kappa + 4.0 * ratio / (reach * reach * reach) * (x / length) ** 2
+                g[j] = np.log(force[b, j] / (kappa * x))
+                turn = np.sqrt(x * x + wide * wide) * step[b]
+                dg[j] = (slope[b, j] / force[b, j] - rise / (kappa * x)) * turn
+        for j in range(count):
+            left, dleft = (g[j - 1], dg[j - 1]) if j > 0 else (g[0], -dg[0])
+            right, dright = (g[j + 1], dg[j + 1]) if j < count - 1 else (g[j], dg[j])
+            ddg[j] = 2.0 * (left - 2.0 * g[j] + right) - 0.5 * (dright - dleft)
+        k = max(end - 1, 0)
+        ddg[k] = 0.0
+        if end >= 3:
+            for i in range(3):
+                ddg[k] += edge[0][i] * g[k - i] + edge[1][i] * dg[k - i]
+        for j in range(count):
+            # From knot j - 1, the first from the mirror image of knot 0, in t in [0, 1].
+            a, da, dda = (g[j - 1], dg[j - 1], ddg[j - 1]) if j > 0 else (g[0], -dg[0], ddg[0])
+            p, q, r = g[j] - a - da - 0.5 * dda, dg[j] - da - dda, ddg[j] - dda
+            c = pieces[b, j]
+            c[0], c[1], c[2] = a, da, 0.5 * dda
+            c[3] = 10.0 * p - 4.0 * q + 0.5 * r
+            c[4] = -15.0 * p + 7.0 * q - r
+            c[5] = 6.0 * p - 3.0 * q + 0.5 * r
 
 
 @compiled(error_model="numpy")
