@@ -23,7 +23,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
 
-MOST_DRAWS, LONG, DRAWS_IF_LONG = 4000, 100, 1000
+MOST_DRAWS, LONG, DRAWS_IF_LONG, FORCES_IF_LONG, LEAST_DRAWS = 4000, 100, 1000, 4_000_000, 200
 PRIOR_DRAWS = 500
 WALK_STEPS = 500
 
@@ -35,7 +35,7 @@ def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) ->
     the data tell it. ``curve`` is the force without that noise, form error included.
     """
     hypothesis, measurement = posterior.hypothesis, posterior.measurement
-    x, lp = sampled.draws(MOST_DRAWS if len(measurement) <= LONG else DRAWS_IF_LONG)
+    x, lp = sampled.draws(_count(len(measurement)))
     flat = x.reshape(-1, x.shape[-1])
     evaluation = posterior.evaluate(flat)
     rng = np.random.default_rng([seed, 1])
@@ -73,6 +73,13 @@ def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) ->
         "best": _best(hypothesis, measurement, flat[best]),
     }
     return data, status
+
+
+def _count(readings: int) -> int:
+    """Draws whose curves are kept, fewer of longer curves."""
+    if readings <= LONG:
+        return MOST_DRAWS
+    return max(LEAST_DRAWS, min(DRAWS_IF_LONG, FORCES_IF_LONG // readings))
 
 
 def _walked(chains: Chains) -> dict[str, Array]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +17,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.form_error import traces
-from bayesmembrane.physics.forward import Forward, Solve
+from bayesmembrane.physics.forward import AT_ONCE, Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.solution import Status
@@ -44,20 +45,33 @@ FAILURES = (Outcome.UNRESOLVED, Outcome.ITERATION_LIMIT)
 
 
 @dataclass(frozen=True)
-class Evaluation:
-    """What the posterior says of B draws.
+class Weighed:
+    """What B draws weigh.
 
     log_prior, log_likelihood : (B,), -inf where they are zero; the prior is untruncated times the convexity indicator,
         so that the normalised one is larger by -ln(mass)
-    force : (B, N) N; nan where there is none, or where a film that the prior rules out was not followed
     outcome : (B,) `Outcome` codes
-    traces : (B, E, N) N, what each effect changes of the force, where the noise asks for it; else None
     """
 
     log_prior: Array
     log_likelihood: Array
-    force: Array
     outcome: NDArray[np.int8]
+
+    @property
+    def log_posterior(self) -> Array:
+        """(B,) the sum, without the evidence."""
+        return self.log_prior + self.log_likelihood
+
+
+@dataclass(frozen=True)
+class Evaluation(Weighed):
+    """What B draws weigh, and their curves.
+
+    force : (B, N) N; nan where there is none, or where a film that the prior rules out was not followed
+    traces : (B, E, N) N, what each effect changes of the force, where the noise asks for it; else None
+    """
+
+    force: Array
     traces: Array | None = None
 
     @property
@@ -67,10 +81,29 @@ class Evaluation:
             return self.force
         return np.concatenate([self.force, self.traces.reshape(len(self.force), -1)], axis=1)
 
+
+class Evaluates(Protocol):
+    """A posterior of one test, or of several."""
+
     @property
-    def log_posterior(self) -> Array:
-        """(B,) the sum, without the evidence."""
-        return self.log_prior + self.log_likelihood
+    def readings(self) -> int:
+        """Of all tests."""
+
+    def evaluate(self, x: Array, /) -> Evaluation:
+        """Prior, likelihood, force and outcome of x (B, k), from one batched solution."""
+
+
+def weighed(posterior: Evaluates, x: Array) -> Weighed:
+    """What draws x (B, k) weigh, however many there are: their curves are kept for a part of them at a time."""
+    rows = max(1, AT_ONCE // posterior.readings)
+    if len(x) <= rows:
+        return posterior.evaluate(x)
+    parts = [posterior.evaluate(x[i : i + rows]) for i in range(0, len(x), rows)]
+    return Weighed(
+        np.concatenate([p.log_prior for p in parts]),
+        np.concatenate([p.log_likelihood for p in parts]),
+        np.concatenate([p.outcome for p in parts]),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +139,11 @@ class Posterior:
         """k, the number of coordinates."""
         return len(self.hypothesis.parameters)
 
+    @property
+    def readings(self) -> int:
+        """N"""
+        return len(self.measurement)
+
     def evaluate(self, x: ArrayLike) -> Evaluation:
         """Prior, likelihood, force and outcome of x (B, k), from one batched solution."""
         x = np.atleast_2d(np.asarray(x, dtype=float))
@@ -124,7 +162,7 @@ class Posterior:
                 every = np.full((len(x), *shown.shape[1:]), np.nan)
                 every[ok] = shown
         log_prior = np.where(inside, self.prior.log_density(x), -np.inf)
-        return Evaluation(log_prior, log_likelihood, prediction.force, _outcome(prediction.status, inside), every)
+        return Evaluation(log_prior, log_likelihood, _outcome(prediction.status, inside), prediction.force, every)
 
     def log_prior(self, x: ArrayLike) -> Array:
         """ln p0(x) where the convexity prior holds, -inf elsewhere; (B,)."""

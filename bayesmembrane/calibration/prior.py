@@ -14,7 +14,7 @@ from scipy.stats import qmc
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.physics.convexity import MODES, ConvexityMode
-from bayesmembrane.physics.forward import Forward, Prediction, Solve
+from bayesmembrane.physics.forward import AT_ONCE, Forward, Prediction, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 
@@ -109,11 +109,16 @@ class JointPrior:
         """
         each = 1 << int(np.ceil(np.log2(max(1, draws / SCRAMBLES))))
         x = np.concatenate([s.draw(each) for s in self.scrambled(seed)])
-        prediction = Forward(self.hypothesis, measurement, measurement.deflection, solve)(x)
-        inside = {n: self.inside(prediction, m) for n, m in MODES.items()}
+        forward = Forward(self.hypothesis, measurement, measurement.deflection, solve)
+        rows = max(1, AT_ONCE // len(measurement))
+        inside = {n: np.empty(len(x), bool) for n in MODES}
+        for part in [slice(i, i + rows) for i in range(0, len(x), rows)]:
+            prediction = forward(x[part])  # with margins at every reading: of a long curve not for all films at once
+            for n, mode in MODES.items():
+                inside[n][part] = self.inside(prediction, mode)
         masses = {n: _mass(np.sum(i.reshape(SCRAMBLES, each), axis=1), each) for n, i in inside.items()}
         order = np.random.default_rng([seed, 2]).permutation(len(x))
-        return masses, x[order][self.inside(prediction)[order]]
+        return masses, x[order][inside[self.hypothesis.convexity.name][order]]
 
     def masses(
         self, measurement: Measurement, seed: int = 0, draws: int = DRAWS, solve: Solve = api.solve

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.posterior import Posterior, weighed
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.segments import Segments
 from bayesmembrane.calibration.store import ASKED, read_asked
@@ -26,7 +26,7 @@ def check_same(posterior: Posterior, chains: Chains, folder: Path) -> None:
     """Raise `StorageError` if ln p of some stored points is no longer what was stored with them."""
     at = np.unique(np.linspace(0, chains.log_posterior.size - 1, POINTS).round().astype(int))
     stored = _at(chains.log_posterior, at)
-    now = posterior.evaluate(_at(chains.x, at)).log_posterior
+    now = weighed(posterior, _at(chains.x, at)).log_posterior
     with np.errstate(invalid="ignore"):
         apart = ~(np.abs(now - stored) <= ALIKE * np.maximum(1.0, np.abs(stored)))
     if np.any(apart):
@@ -86,7 +86,7 @@ def ends(posterior: Posterior, old: Chains, wanted: tuple[int, int], seed: int) 
     x = np.concatenate([last, _at(earlier, chosen)])
     _, once = np.unique(x, axis=0, return_index=True)
     x = x[np.sort(once)]
-    x = x[np.isfinite(posterior.evaluate(x).log_posterior)][:count]
+    x = x[np.isfinite(weighed(posterior, x).log_posterior)][:count]
     if len(x) < count:
         raise SettingsError(
             f"only {len(x)} of the draws at the end of the old run are possible now, and {count} are needed",

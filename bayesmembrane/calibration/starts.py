@@ -8,8 +8,9 @@ import numpy as np
 
 from bayesmembrane.calibration.descent import Patience, descend
 from bayesmembrane.calibration.objective import Objective, separated
-from bayesmembrane.calibration.posterior import Outcomes, Posterior
+from bayesmembrane.calibration.posterior import Outcomes, Posterior, weighed
 from bayesmembrane.calibration.sampling.convergence import effective_draws
+from bayesmembrane.data.thinning import shortened
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array
@@ -22,6 +23,7 @@ ROUGH = Patience(behind=10.0, slow_below=1e-2)
 WIDER = 1.5  # of the Laplace approximation
 DEGREES = 4.0  # of freedom of the t-distribution around a valley
 SPARE = 1.5  # effective number of candidates for each walker
+SCREENED_BY = 500  # readings, which is enough to see where to begin
 FINEST = 1e-11  # of the largest force: no noise that is inferred is below, as its bounds say
 
 
@@ -90,23 +92,25 @@ def try_points(posterior: Posterior, rng: np.random.Generator, wanted: int, coun
 
 
 def _evaluate(posterior: Posterior, x: Array, counts: Outcomes) -> Array:
-    e = posterior.evaluate(x)
+    e = weighed(posterior, x)
     counts.note(x, e.outcome)
     return e.log_posterior
 
 
 def _candidates(posterior: Posterior, rng: np.random.Generator) -> Array:
     """Broad and close candidates (M, k), with noise coordinates that suit their residuals."""
-    objective = Objective(posterior.hypothesis, posterior.measurement, "euclidean", posterior.solve)
+    few = shortened(posterior.measurement, SCREENED_BY)
+    objective = Objective(posterior.hypothesis, few, "euclidean", posterior.solve)
     pool, size = objective.pool(rng)
-    close = _around_valleys(objective, pool, size[0] / np.sqrt(len(posterior.measurement)), rng)
+    each = len(posterior.measurement) / len(few)
+    close = _around_valleys(objective, pool, size[0] / np.sqrt(len(few)), each, rng)
     curves = np.concatenate([pool[:: max(1, len(pool) // BROAD)], close])
     x = posterior.prior.draw(rng, len(curves))
     k = posterior.hypothesis.curve_size
     x[:, :k] = curves
     if x.shape[1] > k:
-        force = posterior.forward(curves, reached=False).force
-        rms = np.sqrt(np.mean((force - posterior.measurement.force) ** 2, axis=1))
+        force = objective.forward(curves, reached=False).force
+        rms = np.sqrt(np.mean((force - few.force) ** 2, axis=1))
         fits = np.log(rms / posterior.hypothesis.noise.natural(np.zeros((1, x.shape[1] - k)), 1.0)[0, 0])
         fits -= np.log(np.max(np.abs(posterior.measurement.force)))
         some = np.isfinite(fits) & (rng.random(len(x)) < 0.7)
@@ -114,24 +118,24 @@ def _candidates(posterior: Posterior, rng: np.random.Generator) -> Array:
     return x
 
 
-def _around_valleys(objective: Objective, pool: Array, rms: float, rng: np.random.Generator) -> Array:
+def _around_valleys(objective: Objective, pool: Array, rms: float, each: float, rng: np.random.Generator) -> Array:
     """Draws (CLOSE, k) from a wide t-distribution around the optima of likelihood times prior.
 
     A normal with the prior's median and spread stands for the prior; the noise is the residual of the best start,
-    then of the best optimum, until that falls no more.
+    then of the best optimum, until that falls no more. Every reading stands for ``each``.
     """
     k, low, high = pool.shape[1], objective.low, objective.high
     pull = np.diag(1 / objective.spread)
     own = objective.measurement.force_sd
     floor = FINEST * np.max(np.abs(objective.measurement.force)) if own is None else float(np.sqrt(np.mean(own**2)))
-    sigma = max(rms, floor)
+    sigma, worth = max(rms, floor), np.sqrt(each)
 
     def residuals(x: Array) -> tuple[Array, Array]:
         r, j = objective.batch(x)
         wide = np.broadcast_to(pull, (len(x), k, k))
         return (
-            np.concatenate([r / sigma, (x - objective.centre) / objective.spread], axis=1),
-            np.concatenate([j / sigma, wide], axis=1),
+            np.concatenate([r * (worth / sigma), (x - objective.centre) / objective.spread], axis=1),
+            np.concatenate([j * (worth / sigma), wide], axis=1),
         )
 
     x = np.array(separated(pool, objective.spread, VALLEYS))

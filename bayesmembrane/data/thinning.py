@@ -15,6 +15,10 @@ MOST = 1500
 """Readings that a diagnosis takes, at most: its time and memory grow with them."""
 
 
+READ = 20_000
+"""Readings of a file that are used, at most: more say little more, and a walk asks for all of them 100 000 times."""
+
+
 def thinned(measurement: Measurement, most: int = MOST) -> Measurement:
     """At most ``most`` readings, evenly along the test, with both ends, its turning points and the ends of its holds.
 

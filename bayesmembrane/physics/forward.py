@@ -30,7 +30,7 @@ GAPS = 10
 
 LONG = 100
 """Curves of more points than this are interpolated, to 1e-6."""
-AT_ONCE = 2_000_000
+AT_ONCE = 500_000
 """Readings that are computed in one batch."""
 
 STEP = 1e-3  # of the differences in coordinates: h^4 and round-off are both 1e-13 there

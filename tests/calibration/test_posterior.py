@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from bayesmembrane.calibration import posterior
 from bayesmembrane.calibration.posterior import Outcome, Outcomes, Posterior
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
@@ -74,3 +75,16 @@ def test_more_parameters_than_points_are_refused(film) -> None:  # type: ignore[
 def test_noise_that_is_switched_off_must_be_stated(film) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(SettingsError, match="no noise at all"):
         Posterior(hypothesis("yeoh", extra_noise=False), film("neo_hookean", (7.5,)))
+
+
+def test_many_draws_are_weighed_in_parts(film, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    """Whatever fits into memory: the answer is the same, also where whole parts have no curve."""
+    m = film("neo_hookean", (7.0,), points=9, noise=1e-3)
+    p = Posterior(hypothesis("gent", ("friction",), "form"), m)
+    x = np.concatenate([p.prior.draw(np.random.default_rng(4), 20), np.full((4, p.size), 30.0)])
+    whole = p.evaluate(x)
+    monkeypatch.setattr(posterior, "AT_ONCE", 4 * len(m))
+    parts = posterior.weighed(p, x)
+    for name in ("log_prior", "log_likelihood", "outcome"):
+        np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), rtol=1e-9, err_msg=name)
+    assert type(parts) is not type(whole)  # no curves are kept

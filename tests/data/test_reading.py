@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.reading import read_measurement
+from bayesmembrane.data.thinning import READ
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.physics.rigs.annulus import Annulus
 
@@ -360,3 +361,21 @@ def test_any_sorted_curve_is_read(files: Files, x: list[float], force: float) ->
     m = files.read("deflection_mm,force_N\n" + rows)
     assert np.allclose(m.deflection, np.sort(x) * 1e-3, rtol=1e-15)
     assert np.all(m.is_first_loading)
+
+
+def test_of_a_very_long_file_some_readings_are_used_and_it_says_so(tmp_path: Path) -> None:
+    """A turning point among 30 000 readings stays, and the noise of each reading is what it was."""
+    n = 30_001
+    stretch = 1.0 + 1e-4 * np.concatenate([np.arange(15_001), np.arange(14_999, -1, -1)])
+    rows = "".join(f"{s:.6f},{0.3 * (s - s**-2):.9f}\n" for s in stretch)
+    (tmp_path / "long.csv").write_text("stretch,nominal_stress_MPa\n" + rows)
+    (tmp_path / "long.toml").write_text(
+        '[specimen]\nthickness_um = 500\n[rig]\nkind = "uniaxial"\n[measurement]\nnominal_stress_sd_MPa = 0.001\n'
+    )
+    found = read_measurement(tmp_path / "long.csv", tmp_path / "long.toml")
+    assert len(found) <= READ < n
+    assert found.provenance.notes[-1].startswith(f"{len(found)} of {n} readings are used")
+    assert found.deflection.max() == pytest.approx(found.full_range)
+    assert len(found.path.deflection) == len(found)
+    assert found.force_sd is not None
+    assert np.ptp(found.force_sd) == 0

@@ -59,6 +59,11 @@ class JointPosterior:
         """K, the number of coordinates."""
         return len(self.joint.parameters)
 
+    @property
+    def readings(self) -> int:
+        """Of all tests."""
+        return sum(len(p.measurement) for p in self.parts)
+
     def evaluate(self, x: ArrayLike) -> Evaluation:
         """Prior, likelihood, curves and outcome of x (B, K); the curves of all tests stand side by side in ``force``.
 
@@ -80,7 +85,7 @@ class JointPosterior:
             inside[rows] = np.isfinite(found.log_prior)
         log_prior = np.where(inside, self.prior.log_density(x), -np.inf)
         log_likelihood = np.where(inside, log_likelihood, -np.inf)
-        return Evaluation(log_prior, log_likelihood, np.concatenate(curves, axis=1), outcome)
+        return Evaluation(log_prior, log_likelihood, outcome, np.concatenate(curves, axis=1))
 
     def log_prior(self, x: ArrayLike) -> Array:
         """ln p0(x) where the convexity prior holds in every test, -inf elsewhere; (B,)."""

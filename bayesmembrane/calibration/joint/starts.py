@@ -6,7 +6,7 @@ import numpy as np
 
 from bayesmembrane.calibration.joint.objective import JointObjective, with_fewer_readings
 from bayesmembrane.calibration.joint.posterior import JointPosterior
-from bayesmembrane.calibration.posterior import Outcomes
+from bayesmembrane.calibration.posterior import Outcomes, weighed
 from bayesmembrane.calibration.starts import evolved, tempered
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
@@ -46,7 +46,7 @@ def joint_starts(
 
 
 def _evaluated(posterior: JointPosterior, x: Array, counts: Outcomes) -> Array:
-    found = posterior.evaluate(x)
+    found = weighed(posterior, x)
     counts.note(x, found.outcome)
     return found.log_posterior
 

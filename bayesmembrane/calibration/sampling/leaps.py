@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.calibration.posterior import Outcomes, Posterior
+from bayesmembrane.calibration.posterior import Outcomes, Posterior, weighed
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.proposals.generator import generator_of
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
@@ -43,7 +43,7 @@ def leap(posterior: Posterior, mixture: Mixture, standing: Chains, steps: int, c
     ensembles, walkers, k = x.shape
     drawn = [_drawn(mixture, state, steps * walkers) for state in standing.random_states]
     y = np.stack([d[0] for d in drawn])
-    e = posterior.evaluate(y.reshape(-1, k))
+    e = weighed(posterior, y.reshape(-1, k))
     counts.note(y.reshape(-1, k), e.outcome)
     shape = (ensembles, steps, walkers)
     log_y = e.log_posterior.reshape(shape)

@@ -15,7 +15,7 @@ from typing import Any
 import emcee
 import numpy as np
 
-from bayesmembrane.calibration.posterior import Outcomes, Posterior
+from bayesmembrane.calibration.posterior import Outcomes, Posterior, weighed
 from bayesmembrane.calibration.sampling.chains import Chains, joined
 from bayesmembrane.calibration.sampling.convergence import BURN_TAUS, LEAST_STEPS, LEAST_TAUS, Convergence, convergence
 from bayesmembrane.calibration.sampling.growing import picked
@@ -242,7 +242,7 @@ def begun(posterior: Posterior, x: Array, seed: int) -> Chains:
     """Ensembles that stand at x (E, W, k), with generators of their own."""
     seeds = np.random.SeedSequence(seed).spawn(len(x) + 1)
     states = tuple(np.random.RandomState(np.random.MT19937(s)).get_state() for s in seeds[:-1])
-    lp = np.stack([posterior.evaluate(e).log_posterior for e in x])
+    lp = np.stack([weighed(posterior, e).log_posterior for e in x])
     return Chains(x[:, None], lp[:, None], states, Outcomes(), 0.0)
 
 
@@ -381,7 +381,7 @@ class _Walk:
         """The steps of an ensemble that moves by differential evolution, snooker and stretch, and by what is known."""
 
         def log_probability(x: Array) -> Array:
-            e = self.posterior.evaluate(x)
+            e = weighed(self.posterior, x)
             self.counts.note(x, e.outcome)
             return e.log_posterior
 

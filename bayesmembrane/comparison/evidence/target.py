@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.posterior import Posterior, weighed
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 
@@ -69,7 +69,7 @@ class PosteriorTarget:
 
     def evaluate(self, x: Array) -> Any:
         """Both at once, from one solution of the film."""
-        return self.posterior.evaluate(x)
+        return weighed(self.posterior, x)
 
 
 @dataclass(frozen=True)

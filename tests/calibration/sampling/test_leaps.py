@@ -24,12 +24,12 @@ from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 class Cut:
     """x1 is N(0, 1) above -1, and x2 given it is N(sin x1, 0.5^2)."""
 
-    size = 2
+    size = readings = 2
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
         out = x[:, 0] < -1.0
         lp = np.where(out, -np.inf, self.given(x, x))
-        return Evaluation(np.zeros(len(x)), lp, x, np.where(out, Outcome.NOT_CONVEX, Outcome.OK))
+        return Evaluation(np.zeros(len(x)), lp, np.where(out, Outcome.NOT_CONVEX, Outcome.OK), x)
 
     def given(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
         value = norm.logpdf(force[:, 0]) + norm.logpdf(force[:, 1], np.sin(force[:, 0]), 0.5)

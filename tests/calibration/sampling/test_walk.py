@@ -22,7 +22,7 @@ COVARIANCE = ROOT @ ROOT.T
 class Normal:
     """A posterior that is known: N(MEAN, COVARIANCE), a long thin cigar."""
 
-    size = 3
+    size = readings = 3
 
     def __init__(self, stop_after: int | None = None) -> None:
         self.calls, self.stop_after = 0, stop_after
@@ -32,7 +32,7 @@ class Normal:
         if self.calls == self.stop_after:
             raise KeyboardInterrupt
         z = np.linalg.solve(ROOT, (x - MEAN).T).T
-        return Evaluation(np.zeros(len(x)), self.given(z, x), z, np.full(len(x), Outcome.OK, np.int8))
+        return Evaluation(np.zeros(len(x)), self.given(z, x), np.full(len(x), Outcome.OK, np.int8), z)
 
     def given(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
         return -0.5 * np.sum(force**2, axis=1)
@@ -41,13 +41,13 @@ class Normal:
 class Banana(Normal):
     """y = x2 + 2 sin(x1) is N(0, 0.3^2) and x1 is N(0, 1): no polynomial of the emulator's degrees is exact."""
 
-    size = 2
+    size = readings = 2
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
         y = np.stack([x[:, 0], (x[:, 1] + 2 * np.sin(x[:, 0])) / 0.3], axis=1)
         ruled_out = x[:, 0] < -1.0
         value = np.where(ruled_out, -np.inf, self.given(y, x))
-        return Evaluation(np.zeros(len(x)), value, y, np.where(ruled_out, Outcome.NOT_CONVEX, Outcome.OK))
+        return Evaluation(np.zeros(len(x)), value, np.where(ruled_out, Outcome.NOT_CONVEX, Outcome.OK), y)
 
 
 def start(posterior: Normal, seed: int = 0, walkers: int = 32, spread: float = 2.0) -> Chains:

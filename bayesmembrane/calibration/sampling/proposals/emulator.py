@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from bayesmembrane.calibration.posterior import Evaluation, Posterior
+from bayesmembrane.calibration.posterior import Evaluates, Posterior
 from bayesmembrane.ground.parameters import Array
 
-LEARN_FROM, LEAST_DRAWS, HELD_OUT = 4000, 60, 0.25
+LEARN_FROM, LEARN_FORCES, LEAST_DRAWS, HELD_OUT = 4000, 6_000_000, 60, 0.25
 DEGREES = (1, 2, 3, 4)
 PER_TERM = 4  # draws for each coefficient of a polynomial
 RIDGE = 1e-8
@@ -34,11 +34,8 @@ class Given(Protocol):
         """(B,) ln prior + ln likelihood of x (B, k) if theirs were ``curves`` (B, N), as an `Evaluation` has them."""
 
 
-class Emulated(Given, Protocol):
+class Emulated(Given, Evaluates, Protocol):
     """What a posterior must offer to be emulated."""
-
-    def evaluate(self, x: Array) -> Evaluation:
-        """Prior, likelihood, force and outcome of x (B, k)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +134,7 @@ def emulate(posterior: Emulated, x: Array, rng: np.random.Generator, seen: Allow
     possible draws to learn from.
     """
     x = np.unique(x, axis=0)
-    x = x[rng.permutation(len(x))[:LEARN_FROM]]
+    x = x[rng.permutation(len(x))[: min(LEARN_FROM, max(LEARN_FORCES // posterior.readings, 4 * LEAST_DRAWS))]]
     found = posterior.evaluate(x)
     curves = found.curves
     ok = np.isfinite(found.log_posterior) & np.all(np.isfinite(curves), axis=1)

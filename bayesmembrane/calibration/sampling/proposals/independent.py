@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesmembrane.calibration.posterior import Outcomes, Posterior
+from bayesmembrane.calibration.posterior import Outcomes, Posterior, weighed
 from bayesmembrane.calibration.sampling.proposals.emulator import Allowed, Emulator, emulate
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture, widened
 from bayesmembrane.calibration.sampling.weights import Worth, worth
@@ -58,7 +58,7 @@ def independent(posterior: Posterior, tried: Tried, rng: np.random.Generator, co
         except np.linalg.LinAlgError:
             break  # what was tried fills no volume
         x = mixture.draw(rng, EACH)
-        e = posterior.evaluate(x)
+        e = weighed(posterior, x)
         counts.note(x, e.outcome)
         lp = e.log_posterior
         tried = tried.joined(x, lp)

@@ -13,9 +13,11 @@ from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 class Cubic:
     """Curves F = (x1, x1 x2 + x2^3 / 10), measured as zero with unit noise, under a wide normal prior."""
 
+    readings = 2
+
     def evaluate(self, x: np.ndarray) -> Evaluation:
         force = np.stack([x[:, 0], x[:, 0] * x[:, 1] + x[:, 1] ** 3 / 10], axis=1)
-        return Evaluation(np.zeros(len(x)), self.given(force, x), force, np.full(len(x), Outcome.OK, np.int8))
+        return Evaluation(np.zeros(len(x)), self.given(force, x), np.full(len(x), Outcome.OK, np.int8), force)
 
     def given(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
         return -0.5 * np.sum(force**2, axis=1) - 0.125 * np.sum(x**2, axis=1)

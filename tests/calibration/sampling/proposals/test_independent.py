@@ -14,12 +14,12 @@ class Known:
     """A density by its coordinates, which stand for a curve, cut where ``cut`` says so."""
 
     def __init__(self, size: int, kind: str) -> None:
-        self.size, self.kind = size, kind
+        self.size, self.readings, self.kind = size, size, kind
 
     def evaluate(self, x: np.ndarray) -> Evaluation:
         out = x[:, 0] > 0.5 if self.kind == "cut" else np.zeros(len(x), dtype=bool)
         lp = np.where(out, -np.inf, self.given(x, x))
-        return Evaluation(np.zeros(len(x)), lp, x, np.where(out, Outcome.NOT_CONVEX, Outcome.OK))
+        return Evaluation(np.zeros(len(x)), lp, np.where(out, Outcome.NOT_CONVEX, Outcome.OK), x)
 
     def given(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
         if self.kind == "two":  # modes at -6 and 6, one twice as likely
