@@ -32,6 +32,7 @@ from bayesmembrane.comparison.result import Comparison
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.phases import phases_of
 from bayesmembrane.data.published import read_published_table
+from bayesmembrane.data.thinning import MOST, of_few
 from bayesmembrane.diagnosis.diagnose import diagnose as run_diagnose
 from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.diagnosis.joint.diagnose import JointDiagnosis, diagnose_jointly
@@ -230,7 +231,11 @@ def _asked_jointly(
 def valleys(
     measurement: Measurement, claim: Hypothesis, work: Work, *, ends: Sequence[float] = (), rise: float = RISE
 ) -> Answer[Valleys | Beside]:
-    """The valleys of the loss over ranges that end at ``ends`` (m), with effects also those without."""
+    """The valleys of the loss over ranges that end at ``ends`` (m), with effects also those without.
+
+    Of more than `thinning.MOST` readings so many are used: a valley is mapped by thousands of films.
+    """
+    measurement = of_few(measurement, MOST)
     how = valleys_beside if claim.effects else run_valleys
     settings = {"seed": work.seed, "ends": list(ends), "rise": rise}
     what = asked("valleys", how, [measurement], [claim], settings)

@@ -16,7 +16,7 @@ from bayesmembrane.data.measurement import Measurement, Provenance, Specimen, ch
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.data.settings import TomlSection, load_toml
 from bayesmembrane.data.tables import TextTable, parse_table, read_matrix, read_text
-from bayesmembrane.data.thinning import READ, shortened
+from bayesmembrane.data.thinning import READ, of_few
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
@@ -73,18 +73,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     measured = Measurement(
         deflection, force, rig, specimen, found.get("time"), sd, covariance, provenance, across=across
     )
-    return _few(measured if motion is None else replace(measured, motion=motion, places=np.arange(force.size)))
-
-
-def _few(measured: Measurement) -> Measurement:
-    """At most `READ` readings, and a note where that is not all of them."""
-    few = shortened(measured, READ)
-    if few is measured:
-        return measured
-    kept = (
-        f"{len(few)} of {len(measured)} readings are used, evenly along the test, with turning points and ends of holds"
-    )
-    return replace(few, provenance=replace(few.provenance, notes=(*few.provenance.notes, kept)))
+    return of_few(measured if motion is None else replace(measured, motion=motion, places=np.arange(force.size)), READ)
 
 
 def _rig(section: TomlSection) -> Fixture:

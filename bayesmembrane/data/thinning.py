@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.motion import HELD, Motion
 
+EVENLY = "evenly along the test, with turning points and ends of holds"
 MOST = 1500
-"""Readings that a diagnosis takes, at most: its time and memory grow with them."""
-
+"""Readings that a diagnosis and valleys take, at most: their time and memory grow with them."""
 
 READ = 20_000
 """Readings of a file that are used, at most: more say little more, and a walk asks for all of them 100 000 times."""
@@ -45,6 +45,15 @@ def shortened(measurement: Measurement, most: int) -> Measurement:
     said = (None if v is None else v.astype(float) for v in (leg, cycle))
     path = Motion(few.deflection, few.time, few.full_range, few.across, *said)
     return replace(few, motion=path, places=np.arange(len(few)))
+
+
+def of_few(measurement: Measurement, most: int) -> Measurement:
+    """`shortened`, with a note in its provenance where that is not all of it."""
+    few = shortened(measurement, most)
+    if few is measurement:
+        return measurement
+    note = f"{len(few)} of {len(measurement)} readings are used, {EVENLY}"
+    return replace(few, provenance=replace(few.provenance, notes=(*few.provenance.notes, note)))
 
 
 def kept_rows(leg: NDArray[np.int8], holds: Sequence[NDArray[np.intp]], most: int) -> NDArray[np.intp]:

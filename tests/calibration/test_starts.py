@@ -28,7 +28,7 @@ def test_films_without_slopes_on_the_way_do_not_end_the_search(seed: int) -> Non
     assert np.all(np.isfinite(posterior.evaluate(x.reshape(-1, posterior.size)).log_posterior))
 
 
-def around(level: float) -> Array:
+def around(level: float, each: float = 1.0) -> Array:
     """(k,) how far draws around the valleys of a strip lie apart, read with noise of this part of its force."""
     d, rng = np.linspace(1e-3, 0.03, 30), np.random.default_rng(4)
     blank = Measurement(d, np.ones(30), Uniaxial(0.05, 0.01), Specimen("strip", 5e-4))
@@ -37,7 +37,7 @@ def around(level: float) -> Array:
     read = replace(blank, force=force + level * np.max(force) * rng.standard_normal(30))
     objective = Objective(claim, read, "euclidean", api.solve)
     pool, size = objective.pool(rng)
-    draws = starts._around_valleys(objective, pool, size[0] / np.sqrt(30), rng)
+    draws = starts._around_valleys(objective, pool, size[0] / np.sqrt(30), each, rng)
     return np.subtract(*np.quantile(draws, [0.75, 0.25], axis=0))
 
 
@@ -46,6 +46,10 @@ def test_a_curve_that_is_read_more_finely_begins_as_much_closer() -> None:
     closer = around(1e-9) / around(1e-4)
     assert np.all(closer < 1e-4)
     assert np.all(closer > 1e-6)
+
+
+def test_readings_that_stand_for_many_begin_closer_by_the_root_of_their_number() -> None:
+    np.testing.assert_allclose(around(1e-4, 100.0) / around(1e-4), 0.1, rtol=0.05)
 
 
 def test_the_spread_of_slopes_is_the_root_of_their_inverse() -> None:
