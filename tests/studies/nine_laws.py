@@ -193,6 +193,16 @@ def page(rows: list[dict[str, Any]]) -> str:
             f"- Over {len(told)} curves the first one has {best:.2f} of the probability on average and is the truth in "
             f"{hit:.2f} of them; the truth has {mean:.2f}."
         )
+    exact = next((_lead(r) for r in rows if r["truth"] == "yeoh" and not r["noise"]), None)
+    if exact is not None:
+        widths = {q.name: q.prior.distribution().std() for q in hypothesis("yeoh").parameters}
+        parts.append(
+            f"- Why not more: a misfit counts by 1 / noise^2, so that Yeoh's lead of {exact:.0f} in ln Z at "
+            f"{100 * FLOOR:g} % is one of {exact * (FLOOR / 0.05) ** 2:.2f} at 5 %. Where two energies fit alike, "
+            f"their priors decide, and those of Yeoh (standard deviations {widths['yeoh.c2_c1']:.1g} and "
+            f"{widths['yeoh.c3_c1']:.1g} of C2/C1 and C3/C1) are made for films that stretch to 2 or 3: a rubber with "
+            "-0.011 and 0.00033 is unlikely before anything is measured."
+        )
     missing = [
         f"{n} at {100 * e:g} %"
         for e in NOISES
