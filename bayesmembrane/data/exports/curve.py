@@ -105,6 +105,8 @@ def _is_strip(export: Export, film: Film) -> bool:
         if missing:
             why = f"the file does not say it; a strip needs --rig uniaxial {' '.join(missing)}"
             export.guess("rig", "none yet, the curve is deflection and force", why, "--rig")
+            if any(size for option, size in sizes.items() if option != "--thickness-um"):  # every film has that
+                export.contradict(f"some sizes of a strip are known and others are not: say {' '.join(missing)}")
             return False
     why = "the file has strain or stress" if roles & {STRAIN, STRETCH, STRESS} else "the file has length and width"
     export.guess("rig", "uniaxial", why, "--rig")

@@ -33,6 +33,9 @@ class Telling(Protocol):
     def contradict(self, sentence: str) -> None: ...
 
 
+THICKEST, WIDEST = 0.05, 1.0
+"""m; what is beyond has lost its unit or its decimal mark."""
+
 OPTIONS = {"thickness": "--thickness-um", "width": "--width-mm", "gauge_length": "--gauge-length-mm"}
 
 
@@ -51,7 +54,18 @@ def film_of(facts: Sequence[Fact], hints: Hints, name: str, telling: Telling, gr
             telling.guess(key.replace("_", " "), f"{1e3 * fact.value:g} mm", f'the file says "{fact.words}"', option)
     value = {k: said.get(k) or (f.value if f is not None else None) for k, f in stated.items()}
     _from_area(value, stated["area"], telling)
+    telling.contradict(_unlike_a_film(value["thickness"], value["width"]))
     return Film(hints.name or name, value["thickness"], value["width"], value["gauge_length"], value["speed"])
+
+
+def _unlike_a_film(thickness: float | None, width: float | None) -> str:
+    """What is said of sizes that no film has; "" of others."""
+    if thickness and width and thickness >= width:
+        return f"the specimen would be {1e3 * thickness:.6g} mm thick and only {1e3 * width:.6g} mm wide"
+    for what, size, most in (("thick", thickness, THICKEST), ("wide", width, WIDEST)):
+        if size and size > most:
+            return f"a film that is {1e3 * size:.6g} mm {what} is larger than any machine's specimen"
+    return ""
 
 
 def _one(name: str, facts: Sequence[Fact], telling: Telling) -> Fact | None:

@@ -187,3 +187,21 @@ def test_every_guess_is_said() -> None:
         "--strain",
         "--stress",
     }
+
+
+@pytest.mark.parametrize(
+    ("thickness", "width", "said"),
+    [("0.5", "10", ""), ("18.2", "10", "18.2 mm thick and only 10 mm wide"), ("0.5", "10000", "larger than any")],
+)
+def test_sizes_that_no_film_has_are_told(thickness: str, width: str, said: str) -> None:
+    text = f"Thickness\t{thickness}\tmm\nWidth\t{width}\tmm\nGauge length\t50\tmm\nExtension (mm)\tForce (N)\n"
+    told = " ".join(imported((text + "".join(f"{i}\t{0.1 * i:.2f}\n" for i in range(9))).encode()).contradictions)
+    assert said in told
+    assert bool(told) == bool(said)
+
+
+def test_a_strip_without_one_of_its_sizes_is_told() -> None:
+    text = "Width\t10\tmm\nGauge length\t50\tmm\nExtension (mm)\tForce (N)\n"
+    found = imported((text + "".join(f"{i}\t{0.1 * i:.2f}\n" for i in range(9))).encode())
+    assert not found.rig
+    assert list(found.contradictions) == ["some sizes of a strip are known and others are not: say --thickness-um"]
