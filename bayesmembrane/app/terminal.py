@@ -76,6 +76,14 @@ def note(text: str) -> None:
     _console(True).print(text, markup=False)
 
 
+def say_few(readings: int, done: str) -> None:
+    """On stderr, before the work: that not all ``readings`` will be used for what is ``done``."""
+    from bayesmembrane.data.thinning import EVENLY, MOST
+
+    if readings > MOST:
+        note(f"{done} by {MOST} of the {readings} readings, {EVENLY}.")
+
+
 def answer(document: dict[str, Any], as_json: bool, show: Callable[[], None]) -> None:
     """Print the JSON document, with nan and infinity as null, or the text for people."""
     from bayesmembrane.ground.plain import plain

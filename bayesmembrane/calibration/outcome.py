@@ -23,7 +23,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
 
-MOST_DRAWS, LONG, DRAWS_IF_LONG, FORCES_IF_LONG, LEAST_DRAWS = 4000, 100, 1000, 4_000_000, 200
+MOST_DRAWS, LONG, DRAWS_IF_LONG, FORCES_IF_LONG, LEAST_DRAWS = 4000, 100, 1000, 4_000_000, 400
 PRIOR_DRAWS = 500
 WALK_STEPS = 500
 

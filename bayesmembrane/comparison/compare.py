@@ -13,6 +13,7 @@ from bayesmembrane.comparison.jobs import AS_USUAL, Job, Judging, judge
 from bayesmembrane.comparison.noises import AUTO, NOISES
 from bayesmembrane.comparison.result import Comparison, Row, ranked
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.thinning import MOST, of_few
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.jobs import Submit, Tell, cores, silent, workers
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
@@ -45,9 +46,10 @@ def claimed(materials: str, effects: str, noise: str, convexity: str) -> tuple[H
 def ranges_of(whole: Measurement, ends: Sequence[float]) -> dict[str, Range]:
     """The measurement up to each of ``ends`` (m), all of it without any; by names such as "up to 35.1 mm".
 
-    Raises `SettingsError` for an end that leaves fewer than two points.
+    Of more than `thinning.MOST` readings so many are used: two estimators ask for each a hundred thousand times. Raises
+    `SettingsError` for an end that leaves fewer than two points.
     """
-    found = {}
+    found, whole = {}, of_few(whole, MOST)
     for end in ends or [float(np.max(whole.deflection))]:
         part = whole.up_to(end)
         rest = whole if len(part) < len(whole) else None

@@ -13,7 +13,7 @@ from bayesmembrane.data.motion import HELD, Motion
 
 EVENLY = "evenly along the test, with turning points and ends of holds"
 MOST = 1500
-"""Readings that a diagnosis and valleys take, at most: their time and memory grow with them."""
+"""Readings that a diagnosis, valleys and a comparison take, at most: their time and memory grow with them."""
 
 READ = 20_000
 """Readings of a file that are used, at most: more say little more, and a walk asks for all of them 100 000 times."""

@@ -19,12 +19,14 @@ from bayesmembrane.comparison.parts import kept
 from bayesmembrane.comparison.prior_widths import Unknown, Widened
 from bayesmembrane.comparison.result import Row, probabilities, ranked
 from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.thinning import MOST
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.ground.stored import read, store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.words.comparison import document, no_ranking, preferred
 from tests.ground.values import stored_equals_given
 from tests.short_walks import shorten
@@ -261,6 +263,17 @@ def test_ranges_are_parts_of_the_whole():
     assert found["up to 30 mm"].whole is whole
     assert found["up to 60 mm"].whole is None
     assert len(found["up to 30 mm"].measurement) == 5
+
+
+def test_of_a_long_file_energies_are_weighed_by_some_readings_in_every_range() -> None:
+    d = np.linspace(1e-5, 0.06, 4001)
+    whole = Measurement(d, 5 * d, Uniaxial(0.05, 0.01), Specimen("strip", 5e-4))
+    (one,) = ranges_of(whole, []).values()
+    assert len(one.measurement) <= MOST
+    assert "of 4001 readings are used" in one.measurement.provenance.notes[-1]
+    (half,) = ranges_of(whole, [0.03]).values()
+    assert half.whole is not None
+    assert len(half.whole) <= MOST
 
 
 def test_auto_judges_each_hypothesis_under_every_noise() -> None:

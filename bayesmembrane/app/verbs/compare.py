@@ -13,7 +13,7 @@ from bayesmembrane.app.options import (
     StoredOutputOptions,
     TestsOptions,
 )
-from bayesmembrane.app.terminal import answer, lines, resumable, say, table
+from bayesmembrane.app.terminal import answer, lines, resumable, say, say_few, table
 from bayesmembrane.ground.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -56,7 +56,9 @@ def verb(
     if used.ranges_mm and used.max_deflection_mm is not None:
         raise SettingsError("the range is given twice", "--ranges-mm, --max-deflection-mm", "give one of them")
     only = [] if used.max_deflection_mm is None else [1e-3 * used.max_deflection_mm]
-    ranges = ranges_of(curve.read(), used.ends or only)
+    measurement = curve.read()
+    say_few(len(measurement), "Energies are weighed")
+    ranges = ranges_of(measurement, used.ends or only)
     with resumable(output.folder), lines() as tell:
         work = analyses.Work(output.seed, output.folder, sampling.ess, tell)
         found = analyses.compare(ranges, claims, work)

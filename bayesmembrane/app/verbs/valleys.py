@@ -16,7 +16,7 @@ from bayesmembrane.app.options import (
     OutputOptions,
     RangesOption,
 )
-from bayesmembrane.app.terminal import answer, note, say, status, table
+from bayesmembrane.app.terminal import answer, say, say_few, status, table
 
 if TYPE_CHECKING:
     from bayesmembrane.valleys.beside import Beside as BesideValleys
@@ -51,13 +51,11 @@ def verb(
     With --effects also the valley without them, and how far the two lie apart.
     """
     from bayesmembrane.app import analyses
-    from bayesmembrane.data.thinning import EVENLY, MOST
     from bayesmembrane.report.sections.valleys import write_valleys
 
     claim = beside.with_material(material.material)
     measurement = curve.read()
-    if len(measurement) > MOST:
-        note(f"Valleys are followed by {MOST} of the {len(measurement)} readings, {EVENLY}.")
+    say_few(len(measurement), "Valleys are followed")
     with status(f"Following the valleys of {claim.label()}"):
         work = analyses.Work(output.seed, output.folder or CHAINS)
         found = analyses.valleys(measurement, claim, work, ends=ranges.ends, rise=loss_rise)
