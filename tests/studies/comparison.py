@@ -81,10 +81,10 @@ def page(found: Mapping[str, Comparison], paper: Mapping[str, Mapping[str, float
 
 def whatever_the_noise(found: Mapping[str, Comparison]) -> str:
     """The part of the page on noise models."""
-    table = noises_table(found)
-    assert table is not None
-    words = "\n".join(f"- {name}: {of_noise(c)}" for name, c in found.items())
-    return "\n\n".join(["\n## Whatever the noise", words, table.caption, markdown(table)]) + "\n"
+    tables = [t for t in (noises_table(found), evidence_table(found)) if t is not None]
+    words = [f"- {name}: {of_noise(c)} {c.reason}".rstrip() for name, c in found.items()]
+    parts = ["\n## Whatever the noise", "\n".join(words), *(f"{t.caption}\n\n{markdown(t)}" for t in tables)]
+    return "\n\n".join(parts) + "\n"
 
 
 def markdown(table: Table) -> str:
