@@ -36,7 +36,6 @@ SURE = 0.02
 MOST_FOR_Z = 10_000
 SLOW = 1000  # steps for `LEAST_TAUS`, from which on emcee's ensembles are as fast as a mixture that holds them up
 DOUBTED = 5000  # draws of a mixture after which it is looked at for the first time
-NEARLY, LATE = 0.5, 1.5
 GROWTH = 1.25  # a look costs little, but nothing is learned from looking at every step
 
 
@@ -146,7 +145,7 @@ def run_ensembles(
         if fresh:  # from here on whoever sees that something is kept may stop the walk
             beside.keep(chains)
         while walk.on_to(target, asked):
-            found, walk.judged = convergence(walk.chains), walk.chains.steps
+            found = convergence(walk.chains)
             if progress is not None:
                 progress(_progress(walk.chains, found, settings))
             if found.enough(settings.ess) and _good(walk.chains):
@@ -155,8 +154,7 @@ def run_ensembles(
             if walk.chains.steps >= settings.most_steps:
                 status = "step limit"
                 break
-            due = walk.chains.steps >= next_lesson(walk.chains) and not _nearly_there(walk.chains, found, settings)
-            if due or not _worth_it(walk.chains, found):
+            if walk.chains.steps >= next_lesson(walk.chains) or not _worth_it(walk.chains, found):
                 walk.learn()
             target = min(settings.most_steps, _next_look(walk.chains, found, settings))
         if asked.signalled:  # a signal that came at the very end still ends what follows
@@ -174,15 +172,6 @@ def _worth_it(chains: Chains, found: Convergence) -> bool:
     """Whether it is still worth while to have a mixture propose, if one does."""
     slow = LEAST_TAUS * float(np.max(found.tau)) > SLOW
     return chains.mixture is None or (not slow and _good(chains))
-
-
-def _nearly_there(chains: Chains, found: Convergence, settings: Settings) -> bool:
-    """Whether at least half is walked of what has to be: a lesson, after which nothing of it counts, comes too late.
-
-    What is not there after `LATE` times the steps of the lesson learns after all.
-    """
-    part = min(found.lengths / LEAST_TAUS, float(np.min(found.ess)) / settings.ess)
-    return part >= NEARLY and chains.steps < LATE * next_lesson(chains)
 
 
 def _next_look(chains: Chains, found: Convergence, settings: Settings) -> int:
@@ -304,7 +293,6 @@ class _Walk:
         self.standing = (self.chains.steps, self.chains)
         self.ahead, self.unsaved = _Pile(self.chains.steps), _Pile(self.chains.steps)
         self.known = learn(self.posterior, self.chains)
-        self.judged = -1  # at how many steps it was last judged
 
     def learn(self) -> None:
         """Have emcee's ensembles propose from now on what can be known by now."""
@@ -318,9 +306,7 @@ class _Walk:
     def on_to(self, look: int, asked: StopAsked) -> bool:
         """Walk to the next lesson, or to the ``look`` if that comes first; False if asked to stop before."""
         # A walk that goes on may stand at its lesson, or beyond the look of one that wanted less: it is judged first.
-        steps, lesson = self.chains.steps, next_lesson(self.chains)
-        put_off = lesson < steps or (lesson == steps == self.judged)
-        end = max(steps, look if put_off else min(look, lesson))
+        end = max(self.chains.steps, min(look, next_lesson(self.chains)))
         try:
             self._walk(end - self.chains.steps, look, asked)
         finally:

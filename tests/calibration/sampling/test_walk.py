@@ -9,11 +9,9 @@ import pytest
 from scipy.stats import truncnorm
 
 from bayesmembrane.calibration.posterior import Evaluation, Outcome
-from bayesmembrane.calibration.sampling import walk
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.convergence import convergence
-from bayesmembrane.calibration.sampling.proposals.emulator import Emulator
-from bayesmembrane.calibration.sampling.walk import Meanwhile, Progress, Sampled, Settings, run_ensembles
+from bayesmembrane.calibration.sampling.walk import Progress, Settings, run_ensembles
 from bayesmembrane.ground.errors import SettingsError
 
 MEAN = np.array([1.0, -2.0, 3.0])
@@ -206,27 +204,3 @@ def test_settings_make_sense() -> None:
     for wrong in ({"ess": 0}, {"ensembles": 1}, {"chunk": 5}, {"most_steps": 10}):
         with pytest.raises(SettingsError):
             replace(Settings(), **wrong)  # type: ignore[arg-type]
-
-
-def test_a_walk_that_is_nearly_there_puts_off_its_lesson(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And is the same wherever it is stopped, at that lesson, too; one that is far from it learns."""
-    monkeypatch.setattr(walk, "next_lesson", lambda c: 160 if c.lessons else 100)
-    monkeypatch.setattr(Emulator.walk, "__defaults__", (10,))
-    settings = Settings(ess=3000, chunk=40)
-
-    def walked(chains: Chains, steps: float = np.inf) -> Sampled:
-        asked = iter(range(1, 1000))
-        beside = Meanwhile(stop=lambda: next(asked) > steps)
-        return run_ensembles(Normal(), settings, 0, chains=chains, beside=beside)  # type: ignore[arg-type]
-
-    whole = walked(start(Normal()))
-    assert whole.status == "converged"
-    assert whole.chains.lessons == (100,)
-    assert whole.chains.steps > 160
-    for steps in (130, 160):
-        part = walked(start(Normal()), steps)
-        assert part.status == "interrupted"
-        assert part.chains.steps == pytest.approx(steps, abs=5)
-        np.testing.assert_array_equal(walked(part.chains).chains.x, whole.chains.x)
-    far = run_ensembles(Normal(), replace(settings, ess=1e6, most_steps=170), 0, chains=start(Normal()))  # type: ignore[arg-type]
-    assert far.chains.lessons[:2] == (100, 160)
