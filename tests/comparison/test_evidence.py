@@ -176,6 +176,15 @@ def test_agreement_needs_nearness_and_precision():
     assert pair(-np.inf, 0.1, -10.0, 0.1).disagreement is Disagreement.NOT_FINITE
 
 
+def test_a_difference_that_changes_no_odds_blocks_nothing_and_is_in_the_error() -> None:
+    """Among fifteen hypotheses one pair lay 2.1 joint errors of 0.02 apart, and nothing was ranked."""
+    near = pair(11.33, 0.02, 11.28, 0.005)
+    assert near.agreed
+    assert near.best[1] == pytest.approx(0.025)
+    assert pair(11.30, 0.02, 11.28, 0.005).best[1] == pytest.approx(0.005)
+    assert not pair(11.40, 0.02, 11.28, 0.005).agreed
+
+
 def test_the_error_of_the_mass_counts_for_precision_but_not_as_an_excuse():
     mass = Mass(0.5, 0.1)
     assert not pair(-10.0, 0.05, -10.3, 0.05, mass).agreed

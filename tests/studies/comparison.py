@@ -32,6 +32,7 @@ from bayesmembrane.report.sections.evidence.tables import (
     widths_table,
 )
 from bayesmembrane.words.beside_paper import paper_losses
+from bayesmembrane.words.comparison import no_ranking
 from bayesmembrane.words.noises import of_noise
 
 TARGET = Path(__file__).resolve().parents[2] / "docs" / "studies" / "comparison.md"
@@ -82,7 +83,7 @@ def page(found: Mapping[str, Comparison], paper: Mapping[str, Mapping[str, float
 def whatever_the_noise(found: Mapping[str, Comparison]) -> str:
     """The part of the page on noise models."""
     tables = [t for t in (noises_table(found), evidence_table(found)) if t is not None]
-    words = [f"- {name}: {of_noise(c)} {c.reason}".rstrip() for name, c in found.items()]
+    words = [f"- {name}: {of_noise(c)} {no_ranking(c)}".rstrip() for name, c in found.items()]
     parts = ["\n## Whatever the noise", "\n".join(words), *(f"{t.caption}\n\n{markdown(t)}" for t in tables)]
     return "\n\n".join(parts) + "\n"
 

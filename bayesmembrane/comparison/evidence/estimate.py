@@ -16,6 +16,9 @@ from bayesmembrane.ground.parameters import Array
 
 NESTED, BRIDGE = "nested", "bridge"
 SIGMAS, WIDEST = 2.0, 0.3
+IMMATERIAL = 0.1
+"""Two estimates that differ by less agree, whatever errors they state: it changes odds by a tenth at most, and among
+fifteen hypotheses chance alone puts one pair two standard errors apart in half of all comparisons."""
 
 
 class Disagreement(Enum):
@@ -36,8 +39,8 @@ class Evidence:
     log_evidence, log_evidence_sd : by estimator, ``nested`` and ``bridge``; divided by the prior's mass, whose error is
         in the standard errors
     difference, joint_sd : of the two, and its standard error; the mass, which both share, has no part in it
-    disagreement : None if they differ by at most two joint standard errors, that of both, with the mass, is at most
-        0.3, and no mode is known that the draws have missed; or why they do not agree
+    disagreement : None if they differ by at most two joint standard errors, or 0.1, that of both, with the mass, is at
+        most 0.3, and no mode is known that the draws have missed; or why they do not agree
     evaluations, seconds : by estimator
     coverage : what the searches for modes of both have covered together
     missed : by how much ln Z is larger at least, by modes that the draws have missed; 0 if none is known
@@ -72,12 +75,14 @@ class Evidence:
     def best(self) -> tuple[float, float]:
         """(ln Z, its standard error): the mean with weights 1 / sd^2, its error no less than the smaller one.
 
-        The errors share that of the mass, so that two estimates are not worth twice one.
+        The errors share that of the mass, so that two estimates are not worth twice one; of two that differ by more
+        than their errors allow it is half of the difference at least.
         """
         z = np.array([self.log_evidence[e] for e in self.log_evidence])
         sd = np.maximum([self.log_evidence_sd[e] for e in self.log_evidence], 1e-6)
         w = sd**-2 / np.sum(sd**-2)
-        return float(w @ z), float(np.min(sd))
+        apart = self.difference / 2 if self.difference > SIGMAS * self.joint_sd else 0.0
+        return float(w @ z), max(float(np.min(sd)), apart)
 
 
 def evidence(
@@ -133,4 +138,4 @@ def _disagreement(difference: float, joint: float, total: float) -> Disagreement
         return Disagreement.NOT_FINITE
     if total > WIDEST:
         return Disagreement.WIDE
-    return Disagreement.APART if difference > SIGMAS * joint else None
+    return Disagreement.APART if difference > max(SIGMAS * joint, IMMATERIAL) else None
