@@ -46,7 +46,7 @@ def verb(
         if used.ranges_mm:
             raise SettingsError("several tests have no ranges in common", "--ranges-mm", "leave it out")
         names = [name.strip() for name in materials.materials.split(",") if name.strip()]
-        tests = curve.listed(used)
+        tests = [_of_few(test) for test in curve.listed(used)]
         together = [_together(name, beside, tests) for name in names]
         with resumable(output.folder), lines() as tell:
             both = analyses.compare_joint(together, analyses.Work(output.seed, output.folder, sampling.ess, tell))
@@ -63,6 +63,16 @@ def verb(
         work = analyses.Work(output.seed, output.folder, sampling.ess, tell)
         found = analyses.compare(ranges, claims, work)
     answer(found.document, output.as_json, lambda: show(found.result))
+
+
+def _of_few(test: Listed) -> Listed:
+    """The test with as many readings as a comparison uses, and a note where those are not all."""
+    from dataclasses import replace
+
+    from bayesmembrane.data.thinning import MOST, of_few
+
+    say_few(len(test.measurement), "Energies are weighed")
+    return replace(test, measurement=of_few(test.measurement, MOST))
 
 
 def _together(name: str, beside: HypothesisOptionsWeighed, tests: Sequence[Listed]) -> Joint:
