@@ -45,7 +45,7 @@ FAILURES = (Outcome.UNRESOLVED, Outcome.ITERATION_LIMIT)
 
 
 @dataclass(frozen=True)
-class Weighed:
+class Densities:
     """What B draws weigh.
 
     log_prior, log_likelihood : (B,), -inf where they are zero; the prior is untruncated times the convexity indicator,
@@ -64,7 +64,7 @@ class Weighed:
 
 
 @dataclass(frozen=True)
-class Evaluation(Weighed):
+class Evaluation(Densities):
     """What B draws weigh, and their curves.
 
     force : (B, N) N; nan where there is none, or where a film that the prior rules out was not followed
@@ -93,13 +93,13 @@ class Evaluates(Protocol):
         """Prior, likelihood, force and outcome of x (B, k), from one batched solution."""
 
 
-def weighed(posterior: Evaluates, x: Array) -> Weighed:
+def weighed(posterior: Evaluates, x: Array) -> Densities:
     """What draws x (B, k) weigh, however many there are: their curves are kept for a part of them at a time."""
     rows = max(1, AT_ONCE // posterior.readings)
     if len(x) <= rows:
         return posterior.evaluate(x)
     parts = [posterior.evaluate(x[i : i + rows]) for i in range(0, len(x), rows)]
-    return Weighed(
+    return Densities(
         np.concatenate([p.log_prior for p in parts]),
         np.concatenate([p.log_likelihood for p in parts]),
         np.concatenate([p.outcome for p in parts]),
