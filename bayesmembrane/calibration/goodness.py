@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
@@ -52,7 +52,7 @@ def goodness(measurement: Measurement, force: Array, parameters: int, square: fl
         own = float(np.sqrt(np.mean(sd**2)))
         if dof > 0:
             total = _own_square(measurement, sd, r) if square is None else square
-            reduced, p_value = total / dof, float(chi2.sf(total, dof))
+            reduced, p_value = total / dof, float(chdtrc(dof, total))
     size = float(np.linalg.norm(r))
     return Goodness(size / float(np.sqrt(len(r))), float(np.max(np.abs(r))), size, reduced, p_value, own)
 

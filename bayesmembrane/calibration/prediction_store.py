@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray
 
 from bayesmembrane.calibration.predictions import Predictions, Wanted
 from bayesmembrane.ground.files import write_whole
@@ -37,6 +36,8 @@ def write_predictions(found: Predictions, folder: Path, draws_of: str, wanted: W
     values = {f.name: getattr(found, f.name) for f in fields(found)}
     single = {name: value for name, value in values.items() if name not in _DIMS}
     made = {"draws_of": draws_of, "wanted": _plain(wanted)}
+    import xarray  # on demand: half a second
+
     dataset = xarray.Dataset(
         {name: (dims.split(), np.asarray(values[name])) for name, dims in _DIMS.items()},
         attrs={"values": json.dumps(single), "made": json.dumps(made)},
@@ -53,6 +54,8 @@ def read_predictions(folder: Path, draws_of: str, wanted: Wanted | None = None) 
     path = folder / FILE
     if not path.is_file():
         return None
+    import xarray
+
     checked(path, "the file of predictions", AGAIN)
     try:
         dataset = xarray.load_dataset(path, engine="h5netcdf")

@@ -6,17 +6,21 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import qmc
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
+from bayesmembrane.ground.sobol import scrambled_sobol
 from bayesmembrane.physics.convexity import MODES, ConvexityMode
 from bayesmembrane.physics.forward import AT_ONCE, Forward, Prediction, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
+
+if TYPE_CHECKING:
+    from scipy.stats import qmc
 
 DRAWS, MOST_DRAWS = 2048, 16384
 SCRAMBLES = 8  # of the points, independent of each other: their spread is the error
@@ -83,7 +87,7 @@ class JointPrior:
         h = self.hypothesis
         own = zlib.crc32(f"{h.label()} {h.noise.name} {h.convexity}".encode())
         rngs = np.random.default_rng([seed, own]).spawn(SCRAMBLES)
-        return [Scrambled(self, qmc.Sobol(len(h.parameters), rng=rng)) for rng in rngs]
+        return [Scrambled(self, scrambled_sobol(len(h.parameters), rng)) for rng in rngs]
 
     def mass(self, inside: Callable[[Array], NDArray[np.bool_]], seed: int = 0) -> Mass:
         """The mass of the x (B, k) that are ``inside``: by so many points that ln of it is known to `LOG_SD`.

@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
-import xarray
-
 _COMPRESSIBLE = "biufc"
 
 
@@ -18,6 +16,8 @@ def packed(groups: Mapping[str, Any]) -> bytes:
         f"/{name.strip('/')}": {n: {"zlib": True} for n, v in held.variables.items() if v.dtype.kind in _COMPRESSIBLE}
         for name, held in groups.items()
     }
+    import xarray  # on demand: half a second
+
     tree: Any = xarray.DataTree.from_dict(dict(groups))
     with _without_cluster():
         return bytes(tree.to_netcdf(None, engine="h5netcdf", encoding=encoding))

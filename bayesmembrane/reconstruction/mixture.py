@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import expit, logit, logsumexp, softmax
-from scipy.stats import norm, qmc
+from scipy.special import expit, logit, logsumexp, ndtri, softmax
 
 from bayesmembrane.data.published import PublishedTable
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import material
+from bayesmembrane.ground.sobol import scrambled_sobol
 from bayesmembrane.reconstruction.families.base import CurveFamily
 from bayesmembrane.reconstruction.families.displaced import Displaced
 from bayesmembrane.reconstruction.families.energy import EnergyCurve, NoFilmError, standard
@@ -188,8 +188,8 @@ def probabilities(log_evidence: Sequence[float]) -> Array:
     `least_probabilities`.
     """
     least = least_probabilities(log_evidence)
-    points = qmc.Sobol(len(log_evidence), scramble=True, rng=0).random_base2(TRIALS)
-    trials = np.asarray(log_evidence) + EVIDENCE_SD * norm.ppf(np.clip(points, 1e-9, 1 - 1e-9))
+    points = scrambled_sobol(len(log_evidence), 0).random_base2(TRIALS)
+    trials = np.asarray(log_evidence) + EVIDENCE_SD * ndtri(np.clip(points, 1e-9, 1 - 1e-9))
     weighed = np.asarray(np.mean(softmax(trials, axis=1), axis=0), dtype=float)
     return least + (1 - np.sum(least)) * weighed
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 from scipy.interpolate import CubicSpline
 
 from bayesmembrane.data.published import PrintedSet, PublishedTable
@@ -138,6 +137,8 @@ def _probability_wrong(excess: Array, sd: Array, freedom: Array, scale: Array) -
 
     A wrong loss is off by d with density 1 / (2 d ln 10^DECADES), |d| from the solver's error up.
     """
+    from scipy import stats  # on demand: it takes a second
+
     right = stats.t.logpdf(excess / sd, freedom) - np.log(sd)
     wrong = -np.log(2 * np.maximum(np.abs(excess), scale) * DECADES * np.log(10.0))
     single = np.logaddexp.reduce(np.sum(right) - right + wrong) - np.log(right.size)

@@ -32,20 +32,23 @@ def verb(
     output: StoredOutputOptions,
 ) -> None:
     """How probable it is that nothing, an effect, another energy or something foreign is behind the curve."""
-    from bayesmembrane.app import analyses
-    from bayesmembrane.diagnosis.explanation.case import Question
     from bayesmembrane.words.language import listed
 
     if curve.several:
         together = beside.joint(material.name, curve.listed(used))
+        from bayesmembrane.app import analyses  # last: what can be refused is refused at once
+
         with status(f"Diagnosing {listed(together.labels)} together") as tell:
             work = analyses.Work(output.seed, output.folder, tell=lambda _, text: tell(text))
             both = analyses.diagnose_joint(together, work, declared=material.declared, quick=how.quick)
         answer(both.document, output.as_json, lambda: show_jointly(both.document, both.result))
         return
     claim = beside.with_material(material.name)
-    question = Question(claim, material.declared, how.quick)
     measurement = used.of(curve.read())
+    from bayesmembrane.app import analyses  # last: what can be refused is refused at once
+    from bayesmembrane.diagnosis.explanation.case import Question
+
+    question = Question(claim, material.declared, how.quick)
     say_thinning(measurement)
     with status(f"Diagnosing {claim.label() if material.declared else 'the curve'}") as tell:
         work = analyses.Work(output.seed, output.folder, tell=lambda _, text: tell(text))

@@ -31,16 +31,18 @@ def verb(
     loss: Annotated[str, typer.Option(help="euclidean (N) or weighted (by the measurement's noise).")] = "euclidean",
 ) -> None:
     """The least-squares parameters with their standard deviations."""
-    from bayesmembrane.app import analyses
-
     if curve.several:
         together = beside.joint(material.material, curve.listed(used))
+        from bayesmembrane.app import analyses  # last: what can be refused is refused at once
+
         with status(f"Fitting {together.label()} on {len(together.parts)} tests"):
             both = analyses.fit_joint(together, analyses.Work(output.seed, output.folder))
         answer(both.document, output.as_json, lambda: show_jointly(both.result))
         return
     claim = beside.with_material(material.material)
     measurement = used.of(curve.read())
+    from bayesmembrane.app import analyses  # last: what can be refused is refused at once
+
     with status(f"Fitting {claim.label()}"):
         found = analyses.fit(measurement, claim, analyses.Work(output.seed, output.folder), loss=loss)
     title = f"{claim.material.title} on {curve.shown}"

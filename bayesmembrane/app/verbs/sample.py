@@ -33,13 +33,13 @@ def verb(
     output: StoredOutputOptions,
 ) -> None:
     """The posterior, stored as a run; the same command continues one that was stopped, or goes on to a higher --ess."""
-    from bayesmembrane.app import analyses
-    from bayesmembrane.calibration.sampling.walk import Settings
-
     if curve.several:
         jointly(curve.listed(used), material, beside, sampling, output)
         return
     claim, whole = beside.with_material(material.material), curve.read()
+    from bayesmembrane.app import analyses  # last: what can be refused is refused at once
+    from bayesmembrane.calibration.sampling.walk import Settings
+
     with resumable(output.folder), bars() as tell:
         tell(claim.label(), "finding starts")
         walk = Settings(ess=sampling.ess, sampler=sampling.sampler)
@@ -60,13 +60,13 @@ def jointly(
     output: StoredOutputOptions,
 ) -> None:
     """The posterior of several tests."""
-    from bayesmembrane.app import analyses
-
     if sampling.fork is not None:
         raise SettingsError("a joint run begins on its own", "--fork", "leave it out")
     if sampling.sampler != "auto":
         raise SettingsError("emcee's ensembles walk over several tests anyway", "--sampler", "leave it out")
     claim = beside.joint(material.material, tests)
+    from bayesmembrane.app import analyses  # last: what can be refused is refused at once
+
     with resumable(output.folder), bars() as tell:
         tell(claim.label(), "finding starts")
         found = analyses.sample_joint(claim, analyses.Work(output.seed, output.folder, sampling.ess, tell))

@@ -50,11 +50,11 @@ def verb(
 
     With --effects also the valley without them, and how far the two lie apart.
     """
-    from bayesmembrane.app import analyses
-    from bayesmembrane.report.sections.valleys import write_valleys
-
     claim = beside.with_material(material.material)
     measurement = curve.read()
+    from bayesmembrane.app import analyses  # last: what can be refused is refused at once
+    from bayesmembrane.report.sections.valleys import write_valleys
+
     say_few(len(measurement), "Valleys are followed")
     with status(f"Following the valleys of {claim.label()}"):
         work = analyses.Work(output.seed, output.folder or CHAINS)

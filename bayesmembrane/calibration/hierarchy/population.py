@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import stats
 
 from bayesmembrane.calibration.hierarchy.specimens import LN_MODULUS, Specimens
 from bayesmembrane.calibration.outcome import marginal
@@ -173,6 +172,8 @@ def _normal(mean: Array, covariance: Array, rng: np.random.Generator) -> Array:
 
 def _weights(s: Specimens, log_tau: Array, scale: Array, proposal: tuple[Array, Array] | None) -> Array:
     """(B,) p(tau | z) over the density from which ``log_tau`` (B, q) was drawn, the largest one."""
+    from scipy import stats  # on demand: it takes a second
+
     prior = _log_prior(log_tau, scale)
     log_p = _gathered(s, np.exp(log_tau))[2]
     if proposal is None:
@@ -186,6 +187,8 @@ def _weights(s: Specimens, log_tau: Array, scale: Array, proposal: tuple[Array, 
 
 def _log_prior(log_tau: Array, scale: Array) -> Array:
     """(B,) ln density of ln tau where tau_i is half-normal."""
+    from scipy import stats
+
     density = stats.halfnorm(scale=scale).logpdf(np.exp(log_tau)) + log_tau
     return np.asarray(np.sum(density, axis=1))
 
@@ -200,6 +203,8 @@ def _fitted(log_tau: Array, weights: Array) -> tuple[Array, Array]:
 
 
 def _proposed(proposal: tuple[Array, Array], scale: Array, rng: np.random.Generator) -> Array:
+    from scipy import stats
+
     near = np.reshape(stats.multivariate_t(*proposal, df=DEGREES, seed=rng).rvs(TRIED), (TRIED, -1))
     far = np.log(np.abs(rng.standard_normal((TRIED, scale.size))) * scale)
     return np.where(rng.random((TRIED, 1)) < FROM_PRIOR, far, near)

@@ -9,12 +9,12 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import qmc
 
 from bayesmembrane.calibration.joint.claim import Joint
 from bayesmembrane.calibration.posterior import Evaluation, Outcome, Posterior
 from bayesmembrane.calibration.prior import SCRAMBLES, JointPrior, Scrambled
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.sobol import scrambled_sobol
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -27,7 +27,7 @@ class SharedPrior(JointPrior):
         joint = cast(Joint, self.hypothesis)
         own = zlib.crc32(f"{joint.label()} {' '.join(joint.labels)} {joint.convexity}".encode())
         rngs = np.random.default_rng([seed, own]).spawn(SCRAMBLES)
-        return [Scrambled(self, qmc.Sobol(len(joint.parameters), rng=rng)) for rng in rngs]
+        return [Scrambled(self, scrambled_sobol(len(joint.parameters), rng)) for rng in rngs]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from emcee.autocorr import integrated_time
 
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.growing import picked, stretches
@@ -88,6 +87,8 @@ def autocorrelation_times(x: Array) -> Array:
 
     One coordinate of one ensemble is held at a time.
     """
+    from emcee.autocorr import integrated_time  # on demand: it imports scipy.stats, which takes a second
+
     tau = np.empty((x.shape[0], x.shape[3]))
     with np.errstate(all="ignore"):
         for e, i in np.ndindex(tau.shape):

@@ -12,7 +12,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import emcee
 import numpy as np
 
 from bayesmembrane.calibration.posterior import Outcomes, Posterior, weighed
@@ -379,6 +378,7 @@ class _Walk:
 
     def _sampler(self, steps: int, ensemble: int) -> Any:
         """The steps of an ensemble that moves by differential evolution, snooker and stretch, and by what is known."""
+        import emcee  # on demand: it imports scipy.stats, which takes a second
 
         def log_probability(x: Array) -> Array:
             e = weighed(self.posterior, x)

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import logsumexp, ndtr, ndtri
-from scipy.stats import qmc
 
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.comparison.evidence.target import Coverage, Problem, smallest
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.sobol import scrambled_sobol
 
 NEIGHBOURS = 17  # than all of which a start is higher
 FEW, LOOKED_AT = 4, 8192  # dimensions up to which all points are looked at, and how many beyond
@@ -91,7 +91,7 @@ def search(problem: Problem, rng: np.random.Generator) -> Modes:
     """
     points = problem.points
     effort = Effort.of(points)
-    v = ndtri(qmc.Sobol(problem.size, rng=rng).random(points) + 2.0**-31)
+    v = ndtri(scrambled_sobol(problem.size, rng).random(points) + 2.0**-31)
     value = density(problem, v)
     starts = _standing_out(v[np.isfinite(value)], value[np.isfinite(value)], effort.ascents)
     volume = smallest(points)

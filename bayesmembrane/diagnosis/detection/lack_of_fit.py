@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, f
+from scipy.special import chdtrc, fdtrc
 
 from bayesmembrane.diagnosis.reference.noise import Whitened
 from bayesmembrane.diagnosis.thresholds import NOISE, TINY
@@ -48,8 +48,8 @@ def lack_of_fit(model: Whitened) -> LackOfFit:
     if noise.stated:
         whole = noise.root is not None or n - p < NOISE.doubt_from_dof
         value, dof = (rss, max(n - k, 1)) if whole else (max(rss - rss_saturated, 0.0), extra)
-        return LackOfFit(value / dof, float(chi2.sf(value, dof)), rss, n - k, dof)
+        return LackOfFit(value / dof, float(chdtrc(dof, value)), rss, n - k, dof)
     scale = max(rss_saturated / max(n - p, 1), TINY)
     ratio = max(rss - rss_saturated, 0.0) / extra / scale
     rest_dof = max(n - p, 1)
-    return LackOfFit(float(ratio), float(f.sf(ratio, extra, rest_dof)), rss, n - k, extra, float(rest_dof))
+    return LackOfFit(float(ratio), float(fdtrc(extra, rest_dof, ratio)), rss, n - k, extra, float(rest_dof))

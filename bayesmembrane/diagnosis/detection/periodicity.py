@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import lombscargle
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.reference.noise import Whitened, orthonormal
@@ -59,6 +58,8 @@ def _strongest(place: Array, model: Whitened, against: str, ends: tuple[float, f
     waves = np.arange(max(DETECTION.least_waves, ends[0]), ends[1])
     if span == 0 or waves.size < 2 or freedom < 4:
         return Periodicity(against, np.inf, 0.0, 1.0)
+    from scipy.signal import lombscargle  # on demand: most of a second, and most residuals are not tested
+
     power = np.asarray(lombscargle(place - place.min(), rest, 2 * np.pi * waves / span))
     highest = np.argsort(power)[-DETECTION.exact_peaks :]
     share, count = max((_share(2 * np.pi * waves[i] / span * place, rest, q), waves[i]) for i in highest)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.reference.noise import OwnNoise, decorrelated, divided, forgotten, orthonormal
@@ -44,7 +44,7 @@ def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
     inferred = replace(min(found, key=lambda f: f[0])[1], profile=profile)
     if stated is None:
         return inferred
-    larger = chi2.sf((inferred.sd / sd) ** 2 * inferred.dof, inferred.dof) < NOISE.doubt_below
+    larger = chdtrc(inferred.dof, (inferred.sd / sd) ** 2 * inferred.dof) < NOISE.doubt_below
     if inferred.dof < NOISE.doubt_from_dof or not (inferred.remembers or larger):
         return OwnNoise(sd, 0.0, 0.0, gaps, None, np.inf, profile=profile)
     return replace(inferred, excess=inferred.sd / sd)
@@ -55,7 +55,7 @@ def _forgetful(measurement: Measurement, readings: _Restricted, stated: float, p
     found = replace(_noise_at(readings, 0.0, 0.0, "readings"), profile=profile)
     if measurement.force_sd is None:
         return found
-    larger = chi2.sf((found.sd / stated) ** 2 * found.dof, found.dof) < NOISE.doubt_below
+    larger = chdtrc(found.dof, (found.sd / stated) ** 2 * found.dof) < NOISE.doubt_below
     if larger and found.dof >= NOISE.doubt_from_dof:
         return replace(found, excess=found.sd / stated)
     return OwnNoise(stated, 0.0, 0.0, readings.gaps, None, np.inf, profile=profile)

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.base import Material
@@ -190,7 +190,7 @@ class EnergyCurve(CurveFamily):
 
 def natural(material: type[Material], z: Array) -> Array:
     """Membrane parameters of coordinates given as standard normal numbers z (k,): Phi(z) is the prior's quantile."""
-    x = [p.prior.quantile(norm.cdf(v)) for p, v in zip(material.coordinates, z.tolist(), strict=True)]
+    x = [p.prior.quantile(ndtr(v)) for p, v in zip(material.coordinates, z.tolist(), strict=True)]
     return material.from_coordinates(np.array(x, dtype=float))
 
 
@@ -198,15 +198,15 @@ def standard(material: type[Material], parameters: Array) -> Array:
     """The inverse of `natural`: z (k,)."""
     x = material.to_coordinates(parameters)
     return np.array(
-        [norm.ppf(p.prior.distribution().cdf(v)) for p, v in zip(material.coordinates, x.tolist(), strict=True)]
+        [ndtri(p.prior.distribution().cdf(v)) for p, v in zip(material.coordinates, x.tolist(), strict=True)]
     )
 
 
 def half_normal(z: Array) -> tuple[Array, Array]:
     """h >= 0 with P(H <= h) = Phi(z) for a half-normal H of scale 1, and dh/dz; shapes of ``z``."""
-    upper = norm.sf(z)
-    h = norm.isf(0.5 * upper)
-    return h, np.exp(norm.logpdf(z) - norm.logpdf(h)) / 2
+    upper = ndtr(-z)
+    h = -ndtri(0.5 * upper)
+    return h, np.exp((h * h - z * z) / 2) / 2
 
 
 @lru_cache

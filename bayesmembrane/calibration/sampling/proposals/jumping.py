@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import emcee
-
 from bayesmembrane.calibration.sampling.proposals.generator import generator_of
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.ground.parameters import Array
@@ -16,6 +14,7 @@ def jumping(mixture: Mixture) -> Any:
 
     W. K. Hastings, Biometrika 57 (1970) 97.
     """
+    import emcee  # on demand: it imports scipy.stats, which takes a second
 
     def propose(x: Array, random: Any) -> tuple[Array, Array]:
         y = mixture.draw(generator_of(random), len(x))
