@@ -146,7 +146,7 @@ class Objective:
     @cached_property
     def spread(self) -> Array:
         """Prior standard deviations (k,): the scale on which starts lie apart."""
-        return np.array([float(p.prior.distribution().std()) for p in self.parameters])
+        return np.array([p.prior.mean_sd[1] for p in self.parameters])
 
     def polish(self, x: Array, evaluations: int = MOST, tolerance: float = 1e-8) -> tuple[Array, float, str]:
         """(x, |r|, status) after a trust-region search from x (k,); |r| is inf where x has no curve or no slopes.

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import erf, ndtr, ndtri
 
 Array = NDArray[np.float64]
 
@@ -17,8 +18,8 @@ Array = NDArray[np.float64]
 class Prior(ABC):
     """A proper, normalised density of one real coordinate.
 
-    Everything a prior is asked for comes from one frozen SciPy distribution: log density for the posterior,
-    quantile for nested sampling, draws for prior predictive checks.
+    Its distribution is one of SciPy's. What is asked for all the time is written out, by the same formulas and from the
+    same random numbers: `scipy.stats` takes a second to import, 3 ms to make a distribution and 50 us a call.
     """
 
     @abstractmethod
@@ -27,28 +28,37 @@ class Prior(ABC):
 
     @abstractmethod
     def log_density(self, x: ArrayLike) -> Array:
-        """ln p(x), shape of ``x``; -inf outside the support. Written out: SciPy's takes 50 us a call."""
+        """ln p(x), shape of ``x``; -inf outside the support."""
 
+    @abstractmethod
     def quantile(self, u: ArrayLike) -> Array:
         """The x with P(X <= x) = u, for u in [0, 1]; shape of ``u``."""
-        return np.asarray(frozen(self).ppf(u), dtype=float)
+
+    @abstractmethod
+    def cdf(self, x: ArrayLike) -> Array:
+        """P(X <= x), shape of ``x``."""
 
     def draw(self, rng: np.random.Generator, size: int | tuple[int, ...]) -> Array:
         """Independent draws, shape ``size``."""
-        return np.asarray(frozen(self).rvs(size=size, random_state=rng), dtype=float)
+        return self.quantile(rng.uniform(size=size))
+
+    @property
+    @abstractmethod
+    def mean_sd(self) -> tuple[float, float]:
+        """Mean and standard deviation."""
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """The ends of where the density is positive."""
+        low, high = self.quantile([0.0, 1.0])
+        return float(low), float(high)
 
 
 def _stats() -> Any:
-    """``scipy.stats``, on demand: importing it takes half a second, and a force needs no prior's quantiles."""
+    """``scipy.stats``, on demand."""
     from scipy import stats
 
     return stats
-
-
-@lru_cache(maxsize=1024)
-def frozen(prior: Prior) -> Any:
-    """The distribution of a prior, made once: SciPy takes 3 ms to make one."""
-    return prior.distribution()
 
 
 @dataclass(frozen=True)
@@ -64,6 +74,19 @@ class Normal(Prior):
     def log_density(self, x: ArrayLike) -> Array:
         z = (np.asarray(x, dtype=float) - self.mean) / self.sd
         return np.asarray(-0.5 * z * z - np.log(self.sd * np.sqrt(2 * np.pi)))
+
+    def quantile(self, u: ArrayLike) -> Array:
+        return np.asarray(self.mean + self.sd * ndtri(np.asarray(u, dtype=float)))
+
+    def cdf(self, x: ArrayLike) -> Array:
+        return np.asarray(ndtr((np.asarray(x, dtype=float) - self.mean) / self.sd))
+
+    def draw(self, rng: np.random.Generator, size: int | tuple[int, ...]) -> Array:
+        return self.mean + self.sd * rng.standard_normal(size)
+
+    @property
+    def mean_sd(self) -> tuple[float, float]:
+        return self.mean, self.sd
 
     def __str__(self) -> str:
         return f"normal, mean {self.mean:g}, sd {self.sd:g}"
@@ -84,6 +107,16 @@ class Uniform(Prior):
         inside = (x >= self.low) & (x <= self.high)
         return np.where(inside, -np.log(self.high - self.low), -np.inf)
 
+    def quantile(self, u: ArrayLike) -> Array:
+        return np.asarray(self.low + (self.high - self.low) * np.asarray(u, dtype=float))
+
+    def cdf(self, x: ArrayLike) -> Array:
+        return np.clip((np.asarray(x, dtype=float) - self.low) / (self.high - self.low), 0.0, 1.0)
+
+    @property
+    def mean_sd(self) -> tuple[float, float]:
+        return (self.low + self.high) / 2, (self.high - self.low) / math.sqrt(12)
+
     def __str__(self) -> str:
         return f"uniform on [{self.low:g}, {self.high:g}]"
 
@@ -101,6 +134,19 @@ class HalfNormal(Prior):
     def log_density(self, x: ArrayLike) -> Array:
         z = (np.asarray(x, dtype=float) - self.origin) / self.scale
         return np.where(z >= 0, -0.5 * z * z - np.log(self.scale * np.sqrt(np.pi / 2)), -np.inf)
+
+    def quantile(self, u: ArrayLike) -> Array:
+        return np.asarray(self.origin + self.scale * ndtri((1 + np.asarray(u, dtype=float)) / 2))
+
+    def cdf(self, x: ArrayLike) -> Array:
+        return np.asarray(erf(np.maximum(np.asarray(x, dtype=float) - self.origin, 0.0) / self.scale / math.sqrt(2)))
+
+    def draw(self, rng: np.random.Generator, size: int | tuple[int, ...]) -> Array:
+        return np.asarray(self.origin + self.scale * np.abs(rng.standard_normal(size)))
+
+    @property
+    def mean_sd(self) -> tuple[float, float]:
+        return self.origin + self.scale * math.sqrt(2 / math.pi), self.scale * math.sqrt(1 - 2 / math.pi)
 
     def __str__(self) -> str:
         start = f", from {self.origin:g} on" if self.origin else ""
@@ -125,6 +171,17 @@ class Lomax(Prior):
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.where(z >= 0, -4 * np.log1p(z) + np.log(3.0 / self.scale), -np.inf)
 
+    def quantile(self, u: ArrayLike) -> Array:
+        with np.errstate(divide="ignore"):  # there is no largest value
+            return np.asarray(self.scale * np.expm1(-np.log1p(-np.asarray(u, dtype=float)) / 3))
+
+    def cdf(self, x: ArrayLike) -> Array:
+        return np.asarray(-np.expm1(-3 * np.log1p(np.maximum(np.asarray(x, dtype=float), 0.0) / self.scale)))
+
+    @property
+    def mean_sd(self) -> tuple[float, float]:
+        return self.scale / 2, self.scale * math.sqrt(3) / 2
+
     def __str__(self) -> str:
         return f"Lomax of index 3, scale {self.scale:g}"
 
@@ -145,6 +202,21 @@ class LogNormal(Prior):
             z = np.log(x / self.median) / self.spread
             value = -0.5 * z * z - np.log(x * self.spread * np.sqrt(2 * np.pi))
         return np.where(x > 0, value, -np.inf)
+
+    def quantile(self, u: ArrayLike) -> Array:
+        return np.asarray(self.median * np.exp(self.spread * ndtri(np.asarray(u, dtype=float))))
+
+    def cdf(self, x: ArrayLike) -> Array:
+        with np.errstate(divide="ignore"):  # nothing lies below zero
+            return np.asarray(ndtr(np.log(np.maximum(np.asarray(x, dtype=float), 0.0) / self.median) / self.spread))
+
+    def draw(self, rng: np.random.Generator, size: int | tuple[int, ...]) -> Array:
+        return np.asarray(self.median * np.exp(self.spread * rng.standard_normal(size)))
+
+    @property
+    def mean_sd(self) -> tuple[float, float]:
+        mean = self.median * math.exp(self.spread**2 / 2)
+        return mean, mean * math.sqrt(math.expm1(self.spread**2))
 
     def __str__(self) -> str:
         return f"log-normal, median {self.median:g}, within a factor {np.exp(self.spread):.3g}"

@@ -92,7 +92,7 @@ def _noise_nodes(surface: Surface) -> tuple[Array, Array]:
     counts = NOISE_NODES.get(len(parameters), (9,) * len(parameters))
     axes = []
     for p, count in zip(parameters, counts, strict=True):
-        middle, sd = float(p.prior.quantile(0.5)), float(p.prior.distribution().std())
+        middle, sd = float(p.prior.quantile(0.5)), p.prior.mean_sd[1]
         axes.append(np.linspace(middle - REACH * sd, middle + REACH * sd, count))
     nodes = np.stack([m.ravel() for m in np.meshgrid(*axes, indexing="ij")], axis=1)
     cell = float(np.sum([np.log(a[1] - a[0]) for a in axes]))

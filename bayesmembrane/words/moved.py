@@ -72,7 +72,7 @@ def remarks_on(run: Run) -> dict[str, str]:
             told[p.name] = "at its bound"
         elif high - low >= LOOSE * (prior[1] - prior[0]):
             told[p.name] = "the prior decides"
-        elif not FAR < float(p.prior.distribution().cdf(middle)) < 1 - FAR:
+        elif not FAR < float(p.prior.cdf(middle)) < 1 - FAR:
             told[p.name] = "far out in its prior"
     return told
 

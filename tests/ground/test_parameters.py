@@ -23,3 +23,17 @@ def test_density_is_that_of_the_distribution(prior: Prior) -> None:
     assert prior.quantile(0.5) == pytest.approx(d.median())
     above = high + 1.0 if np.isfinite(high) else np.inf
     assert prior.log_density(above) == -np.inf
+
+
+@pytest.mark.parametrize("prior", PRIORS, ids=str)
+def test_what_is_written_out_equals_scipy(prior: Prior) -> None:
+    """Also the draws, to the last bits: stored seeds stay what they were."""
+    d = prior.distribution()
+    u = np.concatenate([[0.0, 1e-12, 1.0], np.random.default_rng(2).random(50)])
+    assert prior.quantile(u) == pytest.approx(d.ppf(u), rel=1e-12)
+    x = np.concatenate([d.ppf([0.0, 1e-9, 0.5, 1 - 1e-9, 1.0]), d.rvs(50, random_state=3), [d.mean() - 30 * d.std()]])
+    assert prior.cdf(x) == pytest.approx(d.cdf(x), rel=1e-12, abs=1e-15)
+    assert prior.mean_sd == pytest.approx((d.mean(), d.std()), rel=1e-12)
+    assert prior.support == d.support()
+    mine, others = prior.draw(np.random.default_rng(4), (3, 2)), d.rvs((3, 2), random_state=np.random.default_rng(4))
+    assert mine == pytest.approx(others, rel=1e-15)

@@ -75,7 +75,7 @@ def of_runs(runs: Sequence[Run], pool: Sequence[str] = ()) -> Specimens:
     found = [_likelihood(run, full) for run in runs]
     labels = labelled([("", run.measurement) for run in runs])
     parameters = {p.name: p for p in runs[0].hypothesis.parameters}
-    priors = [parameters[n].prior.distribution() for n in full]
+    priors = np.array([parameters[n].prior.mean_sd for n in full])
     # The prior of the material is on G d: that of the population's G is centred at the mean thickness.
     mean_log = float(np.mean([np.log(run.measurement.specimen.thickness) for run in runs]))
     shift = np.array([mean_log if name == LN_MODULUS else 0.0 for name in names])
@@ -84,8 +84,8 @@ def of_runs(runs: Sequence[Run], pool: Sequence[str] = ()) -> Specimens:
         names=names,
         values=np.array([f[0] for f in found]),
         covariances=np.array([f[1] for f in found]),
-        centre=np.array([float(p.mean()) for p in priors]) - shift,
-        spread=np.array([float(p.std()) for p in priors]),
+        centre=priors[:, 0] - shift,
+        spread=priors[:, 1],
         skewed=tuple(label for label, f in zip(labels, found, strict=True) if f[2] > SKEWED),
     )
 
@@ -109,9 +109,8 @@ def _likelihood(run: Run, full: Sequence[str]) -> tuple[Array, Array, float]:
         if name.endswith(".ln_gd"):
             x[:, i] -= np.log(run.measurement.specimen.thickness)
     mean, covariance = np.mean(x, axis=0), np.atleast_2d(np.cov(x.T))
-    priors = [run.hypothesis.parameters[i].prior.distribution() for i in at]
-    before = np.array([float(p.std()) for p in priors]) ** -2
-    centre = np.array([float(p.mean()) for p in priors])
+    centre, spread = np.array([run.hypothesis.parameters[i].prior.mean_sd for i in at]).T
+    before = spread**-2
     for i, name in enumerate(full):
         if name.endswith(".ln_gd"):
             centre[i] -= np.log(run.measurement.specimen.thickness)

@@ -68,7 +68,7 @@ class JointObjective:
     @cached_property
     def spread(self) -> Array:
         """Prior standard deviations (K',)."""
-        return np.array([float(self.joint.parameters[i].prior.distribution().std()) for i in self.joint.curve])
+        return np.array([self.joint.parameters[i].prior.mean_sd[1] for i in self.joint.curve])
 
     @cached_property
     def sizes(self) -> Array:

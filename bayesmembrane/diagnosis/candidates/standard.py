@@ -10,7 +10,7 @@ from scipy.special import ndtr, ndtri
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.thresholds import SIZES
-from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Parameter, Prior, Uniform, frozen
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Parameter, Prior, Uniform
 from bayesmembrane.physics.effects.base import Effect, EffectParameter
 from bayesmembrane.physics.hypothesis import Hypothesis
 
@@ -81,7 +81,7 @@ class Shape:
                 return np.asarray((x - origin) / scale)
             case Uniform(low, high):
                 return np.asarray(ndtri(np.clip((x - low) / (high - low), EDGE, 1 - EDGE)))
-        return np.asarray(ndtri(np.clip(frozen(self.prior).cdf(x), EDGE, 1 - EDGE)))
+        return np.asarray(ndtri(np.clip(self.prior.cdf(x), EDGE, 1 - EDGE)))
 
     def slope(self, u: Array) -> Array:
         """dx / du."""

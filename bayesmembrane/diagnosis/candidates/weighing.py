@@ -15,7 +15,7 @@ from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, log_insid
 from bayesmembrane.diagnosis.candidates.standard import Standard
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.thresholds import FORM, SEARCH, TINY
-from bayesmembrane.ground.parameters import Array, Normal, Parameter, frozen
+from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.form_error import LARGEST
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -281,14 +281,9 @@ def _at_bound(hypothesis: Hypothesis, axes: Standard, u: Array) -> tuple[str, ..
     out = []
     for i, (p, axis) in enumerate(zip(hypothesis.parameters[: hypothesis.curve_size], axes.axes, strict=True)):
         low, high = axes.bounds[0][i], axes.bounds[1][i]
-        support = [float(axis.to_u(np.asarray(e))) for e in _ends(p) if np.isfinite(e)]
+        support = [float(axis.to_u(np.asarray(e))) for e in p.prior.support if np.isfinite(e)]
         ends = {*support, *([0.0] if axis.one_sided else [])}
         for bound in (low, high):
             if abs(u[i] - bound) <= SEARCH.at_bound * max(high - low, TINY) and bound not in ends:
                 out.append(p.name)
     return tuple(out)
-
-
-def _ends(p: Parameter) -> tuple[float, float]:
-    low, high = frozen(p.prior).support()
-    return float(low), float(high)

@@ -12,6 +12,7 @@ effect's own parameters in the order of ``coordinates``.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -52,8 +53,8 @@ class EffectParameter(Parameter):
 
 @cache
 def _scale(prior: Prior, null: float | None) -> float:
-    d = prior.distribution()
-    return float(d.std() if null is None else np.sqrt(d.var() + (d.mean() - null) ** 2))
+    mean, sd = prior.mean_sd
+    return sd if null is None else math.hypot(sd, mean - null)
 
 
 @dataclass(frozen=True)

@@ -197,9 +197,7 @@ def natural(material: type[Material], z: Array) -> Array:
 def standard(material: type[Material], parameters: Array) -> Array:
     """The inverse of `natural`: z (k,)."""
     x = material.to_coordinates(parameters)
-    return np.array(
-        [ndtri(p.prior.distribution().cdf(v)) for p, v in zip(material.coordinates, x.tolist(), strict=True)]
-    )
+    return np.array([ndtri(p.prior.cdf(v)) for p, v in zip(material.coordinates, x.tolist(), strict=True)])
 
 
 def half_normal(z: Array) -> tuple[Array, Array]:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import corner
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -36,6 +35,8 @@ def corner_plot(
     published: Sequence[float | None] | None = None,
 ) -> Picture:
     """Draws (S, m) of the natural parameters, each pair of them, with the optimum and the paper's point."""
+    import corner  # on demand: it imports all of arviz, and a page without draws needs neither
+
     m, c = draws.shape[1], colour(look)
     logarithmic = [_wide(draws[:, i]) for i in range(m)]
     ranges = [_span(draws[:, i], log) for i, log in enumerate(logarithmic)]
