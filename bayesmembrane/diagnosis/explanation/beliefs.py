@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import comb, log, sqrt
+from math import log, prod, sqrt
 
 
 @dataclass(frozen=True)
@@ -14,7 +15,8 @@ class Beliefs:
     """
 
     effects: tuple[float, ...] = (0.40, 0.30, 0.20, 0.10)
-    """Of none, one, two and three effects beyond those given; sets of one size are equally probable. Who sees one fault
+    """Of none, one, two and three effects beyond those given; sets of one size are as probable as the odds of their
+    effects say (`Effect.odds`), which are alike for nearly all. Who sees one fault
     of a rig has often a second one: with a twentieth for three, answers on the calibration half of
     `make study-reliability` missed the further, weaker effect more often than they said."""
     plain_gain: float = 25.0
@@ -57,9 +59,18 @@ class Beliefs:
         """What part of every ln Bayes factor counts where the best explanation has ln K = ``gain`` over none."""
         return max(1.0 / sqrt(1.0 + max(gain, 0.0) / self.plain_gain), self.least_counts)
 
-    def log_set(self, size: int, visible: int) -> float:
-        """ln of the probability of one set of ``size`` of the ``visible`` effects."""
-        return log(self.effects[size]) - log(comb(max(visible, size), size))
+    def log_set(self, odds: Sequence[float], visible: Sequence[float]) -> float:
+        """ln of the probability of one set of effects with these ``odds``, of ``visible`` ones with those.
+
+        p(set) = p(size) prod odds / e_size(odds of all that are visible), with e the elementary symmetric polynomial,
+        which is the sum of that product over all sets of the size.
+        """
+        size = len(odds)
+        sums = [1.0, *[0.0] * size]
+        for o in visible:
+            for k in range(size, 0, -1):
+                sums[k] += o * sums[k - 1]
+        return log(self.effects[size]) + log(prod(odds)) - log(max(sums[size], prod(odds)))
 
     def log_foreign(self, kinds: int) -> float:
         """ln of the probability of one of the ``kinds`` of foreign things; of none of them if there are no kinds."""

@@ -71,6 +71,7 @@ def in_tests(name: str, parts: Sequence[tuple[int, Effect]], one_clock: bool = T
             "signature": first.signature,
             "coordinates": coordinates,
             "exact": first.exact,
+            "odds": first.odds,
             "remembers": first.remembers,
             "of_the_material": first.of_the_material,
             "constant": constant,

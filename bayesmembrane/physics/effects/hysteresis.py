@@ -9,19 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesmembrane.data.motion import Motion
-from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Uniform
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
+
+SMALLEST = 1e-4  # of the full range: below it a negative power is without bounds
 
 
 @dataclass(frozen=True)
 class Hysteresis(Carried):
-    """F = F0 (1 + level z), with z = z_r + s u a / (t a + u) on each leg: s = +1 while loading, -1 while unloading.
+    """F = F0 (1 + level z |delta / D|^grows), z = z_r + s u a / (t a + u) on each leg: s = +1 loading, -1 unloading.
 
     u is the way since the reversal, z_r the z there and a = 1 - s z_r what is left to turn; half of it is turned at
     u = t a. The length is t = travel ((1 - similar) D + similar A), with A the length of the leg before the reversal
     (D, the full range, for the first loading): the same in all cycles, or small in small cycles. z = 0 at the start.
 
-    The reference's friction is constant in N; here it grows with the force that the film carries.
+    The reference's friction is constant in N; that of a filled rubber grows with the force that it carries (grows = 0),
+    or, where the film lags behind the disc by a length, with the slope of the curve (about -1).
     """
 
     name: ClassVar[str] = "hysteresis"
@@ -47,10 +50,18 @@ class Hysteresis(Carried):
         EffectParameter(
             "similar", "-", "part of that way that is shorter in small cycles", Uniform(0.0, 1.0), (0.0, 1.0)
         ),
+        EffectParameter(
+            "grows",
+            "-",
+            "power of the deflection by which the width grows beyond its proportion to the force",
+            Normal(-0.3, 0.4),
+            (-1.6, 1.0),
+        ),
     )
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
-        return np.asarray(force * (1.0 + p[:, :1] * turned(p[:, 1:2], p[:, 2:3], state.path)))
+        part = np.maximum(np.abs(state.deflection) / state.path.full_range, SMALLEST)
+        return np.asarray(force * (1.0 + p[:, :1] * part ** p[:, 3:4] * turned(p[:, 1:2], p[:, 2:3], state.path)))
 
 
 def turned(travel: Array, similar: Array, path: Motion) -> Array:

@@ -30,6 +30,7 @@ class OffCentreDisc(Carried):
     )
     needs_clamp: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
+    odds: ClassVar[float] = 0.25  # a jig centres it, and the force sees the square of what is left
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "square", "-", "square of the eccentricity over the free length", HalfNormal(3e-3), (0.0, 0.1), 0.0

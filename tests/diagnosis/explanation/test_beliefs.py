@@ -1,6 +1,7 @@
 """Prior probabilities add up, and factors count less the more an explanation gains."""
 
-from math import comb, exp
+from itertools import combinations
+from math import exp
 
 import numpy as np
 import pytest
@@ -10,8 +11,16 @@ from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 
 @pytest.mark.parametrize("visible", [3, 7, 12])
 def test_sets_share_what_their_size_has(visible: int) -> None:
-    total = sum(comb(visible, size) * exp(BELIEFS.log_set(size, visible)) for size in range(BELIEFS.most + 1))
-    assert total == pytest.approx(1.0)
+    odds = [1.0, 0.25, 1.0, *[0.5] * (visible - 3)]
+    for size in range(BELIEFS.most + 1):
+        total = sum(exp(BELIEFS.log_set(own, odds)) for own in combinations(odds, size))
+        assert total == pytest.approx(BELIEFS.effects[size])
+
+
+def test_sets_of_one_size_are_as_probable_as_the_odds_of_their_effects() -> None:
+    odds = [1.0, 1.0, 0.25, 1.0]
+    rare, usual = (BELIEFS.log_set((1.0, o), odds) for o in (0.25, 1.0))
+    assert exp(rare - usual) == pytest.approx(0.25)
 
 
 @pytest.mark.parametrize("declared", [None, "gent"])

@@ -16,6 +16,7 @@ from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import hypothesis
 
 LEFT = 100.0
+FOUR = (1.0,) * 4  # odds of all effects
 
 
 def candidate(*effects: str, log_evidence: float) -> Candidate:
@@ -35,7 +36,7 @@ def effects(monkeypatch: pytest.MonkeyPatch, takes: float, gain: float) -> dict[
     case = SimpleNamespace(
         null=plain,
         plain={"gent": plain},
-        visible=[None] * 4,
+        visible=[SimpleNamespace(odds=1.0)] * 4,
         question=SimpleNamespace(energy=None),
         twins=lambda: frozenset(),
         foreign=lambda *_: [],
@@ -53,7 +54,7 @@ def effects(monkeypatch: pytest.MonkeyPatch, takes: float, gain: float) -> dict[
 
 def test_an_effect_that_is_not_seen_keeps_a_part_of_its_probability(monkeypatch: pytest.MonkeyPatch) -> None:
     p = effects(monkeypatch, takes=0.5, gain=0.0)
-    odds = np.exp(BELIEFS.log_set(2, 4) - BELIEFS.log_set(1, 4))
+    odds = np.exp(BELIEFS.log_set((1.0,) * 2, FOUR) - BELIEFS.log_set((1.0,), FOUR))
     alone = odds / (1 + odds)
     assert p["friction+mullins"] == pytest.approx((1 - BELIEFS.unseen) * alone, rel=1e-6)
     assert p["friction"] == pytest.approx(1 - p["friction+mullins"], abs=1e-9)
@@ -63,7 +64,7 @@ def test_an_effect_that_is_not_seen_keeps_a_part_of_its_probability(monkeypatch:
 def test_one_that_is_seen_keeps_all_of_it(monkeypatch: pytest.MonkeyPatch, takes: float, gain: float) -> None:
     p = effects(monkeypatch, takes, gain)
     counted = BELIEFS.counts(50.0 + gain) * gain
-    odds = np.exp(counted + BELIEFS.log_set(2, 4) - BELIEFS.log_set(1, 4))
+    odds = np.exp(counted + BELIEFS.log_set((1.0,) * 2, FOUR) - BELIEFS.log_set((1.0,), FOUR))
     assert p["friction+mullins"] == pytest.approx(odds / (1 + odds), rel=1e-6)
 
 

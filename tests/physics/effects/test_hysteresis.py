@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from bayesmembrane.physics.effects.base import FilmState
 from bayesmembrane.physics.effects.hysteresis import Hysteresis, turned
 from tests.physics.effects.protocols import force, measured, path, staircase, two_speeds
 
@@ -36,7 +37,8 @@ def test_loading_lies_above_and_unloading_below_in_every_cycle() -> None:
         assert np.all(change[deep & (m.leg < 0)] < 0)
         late = (m.cycle == cycle) & (m.leg > 0) & (m.deflection > 0.5 * np.max(d[m.cycle == cycle]))
         assert np.all(change[late] > 0)
-    assert np.max(np.abs(change)) <= Hysteresis().typical[0]
+    level, _, _, grows = Hysteresis().typical
+    assert np.all(np.abs(change) <= level * (m.deflection / np.max(m.deflection)) ** grows)
 
 
 def test_repeated_cycles_become_one_closed_loop() -> None:
@@ -75,3 +77,14 @@ def test_a_test_that_begins_with_unloading_has_a_start_too() -> None:
     z = loop(np.concatenate([np.linspace(0.04, 0.01, 50), np.linspace(0.011, 0.04, 50)]))
     assert np.all(np.isfinite(z))
     assert z[49] < -0.5 < 0.3 < z[-1]
+
+
+@pytest.mark.parametrize(("grows", "power"), [(0.0, 1.0), (-1.0, 0.0)])
+def test_the_width_of_a_loop_grows_with_a_power_of_the_deflection(grows: float, power: float) -> None:
+    """Of a force in proportion to the deflection: with the force, or the same everywhere."""
+    d = triangles(0.04, 0.0, points=400)
+    at = FilmState(force=d[None], slope=np.ones_like(d)[None], deflection=d[None], path=path(d))
+    p = np.array([[0.1, 0.01, 0.0, grows]])
+    width = np.abs(Hysteresis().carried(p, d[None], at) - d)[0]
+    low, high = (np.argmin(np.abs(d[500:] - x)) + 500 for x in (0.01, 0.03))
+    assert width[high] / width[low] == pytest.approx(3.0**power, rel=0.05)
