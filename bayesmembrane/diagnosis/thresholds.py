@@ -177,13 +177,48 @@ class FormThresholds:
 
 
 @dataclass(frozen=True)
+class SampledThresholds:
+    """How linear evidence is checked by importance sampling, where it decides."""
+
+    draws: int = 128
+    """Of a round."""
+    rounds: int = 8
+    """At most."""
+    enough: float = 60.0
+    """Draws that count, with which it ends: ln Z to 0.13."""
+    freedom: float = 6.0
+    """Of the t-distribution: tails that no posterior of this kind has more of."""
+    kept: float = 0.1
+    """Of the covariance that draws came from, added to theirs: few draws know no direction well."""
+    to_fit: float = 3.0
+    """Draws a coordinate that must count for a covariance to be fitted to them."""
+    flatter: float = 0.7
+    """By which the power of their weights falls until as many do."""
+    flattest: float = 0.02
+    """Of that power, at least."""
+    round_off: float = 1e-9
+    """Of a variance."""
+    least_effective: float = 4.0
+    """Draws that must count for what they say to be believed: ln Z to 0.5. Of Ogden's energy with its bent valleys a
+    linear ln Z was 2 to 6 too large."""
+    decides: float = 0.003
+    """Of the sum: from that share on a hypothesis is checked."""
+    most: int = 60
+    """Hypotheses that are checked: effort, not belief."""
+
+
+@dataclass(frozen=True)
 class GrowthThresholds:
     """How far the sets of effects are followed: effort, not belief."""
 
     beam: int = 4
     """Sets that a further effect is added to: the first of a pair is often not the best alone."""
     beam_reach: float = 60.0
-    """ln of the Bayes factor behind the best set of its size, beyond which a set is not followed."""
+    """ln of the Bayes factor, as far as factors count, behind the best set of its size, beyond which one is left."""
+    beam_by_squares: int = 2
+    """Sets that a further effect is added to besides, for leaving the least squares."""
+    singles_reach: float = 15.0
+    """ln of the Bayes factor behind the best single effect, up to which every one is tried with every energy."""
     refits: int = 6
     """Effects that are fitted beside each of these sets, by what their traces promise."""
     refit_reach: float = 40.0
@@ -462,6 +497,7 @@ SEARCH = SearchThresholds()
 SIZES = Sizes()
 FORM = FormThresholds()
 OTHER_TESTS = OtherTestsThresholds()
+SAMPLED = SampledThresholds()
 GROWTH = GrowthThresholds()
 TWINS = TwinsThresholds()
 FOREIGN = ForeignThresholds()

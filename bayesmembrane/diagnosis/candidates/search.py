@@ -55,6 +55,9 @@ class Search(Weighing):
     def batch(self, hypothesis: Hypothesis, x: Array) -> tuple[Array, Array]:
         return self._objective(hypothesis).batch(x)
 
+    def misfits(self, hypothesis: Hypothesis, x: Array) -> Array:
+        return np.asarray(self._objective(hypothesis).forward(x, reached=False).force - self.force)
+
     def curves(self, hypothesis: Hypothesis, x: Array) -> Array:
         whole = self.measurement
         return Forward(hypothesis, whole, whole.deflection, self.solve)(x, reached=False).force

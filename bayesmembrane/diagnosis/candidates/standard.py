@@ -116,6 +116,12 @@ class Standard:
         return np.maximum(low, -8.0), np.minimum(high, np.where(self.heavy, np.inf, 8.0))
 
     @cached_property
+    def ends(self) -> tuple[Array, Array]:
+        """(k,), (k,) of u: its bounds, and no less than zero where the prior has one side."""
+        low, high = self.bounds
+        return np.where(self.one_sided, 0.0, low), high
+
+    @cached_property
     def heavy(self) -> Array:
         """(k,) True for sizes, whose prior is Cauchy's."""
         return np.array([a.heavy for a in self.axes])
@@ -151,6 +157,14 @@ class Standard:
         For a Cauchy density s^2 = (1 + u^2) / 2, which has its slope at u.
         """
         return np.where(self.heavy, np.sqrt(0.5 * (1 + u * u)), 1.0)
+
+    def log_prior(self, u: Array) -> Array:
+        """ln p of u (..., k) within the bounds: Cauchy's of sizes, normal of others, doubled where it has one side."""
+        low, high = self.ends
+        within = np.where(self.heavy, np.arctan(np.minimum(high, FAR)) - np.arctan(np.maximum(low, -FAR)), np.pi)
+        normal = 0.5 * np.log(2 * np.pi) - np.log(2.0) * np.where(self.heavy, 0.0, self.one_sided)
+        each = np.where(self.heavy, -np.log1p(u * u) - np.log(within), -0.5 * u * u - normal)
+        return np.asarray(np.sum(each, axis=-1))
 
     def log_replaced(self, u: Array, mean: Array, variance: Array) -> float:
         """ln Z with the priors less ln Z with the normal ones of `local`, posterior ``mean`` and ``variance`` (k,).

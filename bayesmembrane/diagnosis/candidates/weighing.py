@@ -56,6 +56,10 @@ class Weighing(ABC):
         """r (B, N) N, fitted less measured, and dr/dx (B, N, k) at x (B, k); nan where there is no curve."""
 
     @abstractmethod
+    def misfits(self, hypothesis: Hypothesis, x: Array) -> Array:
+        """r (B, N) N as `batch`, without slopes."""
+
+    @abstractmethod
     def curves(self, hypothesis: Hypothesis, x: Array) -> Array:
         """Forces (B, N) N at x (B, k), by the whole solver; nan where there is none."""
 
@@ -216,15 +220,21 @@ class Weighing(ABC):
     def _weighed(self, found: Candidate, axes: Standard, u: Array) -> Candidate:
         model = self.linear(found)
         z = weighed(model, found.theta)
-        spread = axes.local(u)
-        mean, covariance = model.coefficients(z.theta)
-        low, high = (b / spread for b in axes.bounds)
-        k = u.size
-        inside = log_inside(mean[:k], covariance[:k, :k], np.where(axes.one_sided, 0.0, low), high)
-        own = mean[:k] * spread, np.diag(covariance)[:k] * spread**2
-        replaced = axes.log_replaced(u, *own)
-        form = np.column_stack([c for _, c in self._columns(found)]) @ mean[k:]
-        return replace(found, log_evidence=z.log_evidence + replaced + inside, theta=z.theta, form=form)
+        mean, _ = model.coefficients(z.theta)
+        form = np.column_stack([c for _, c in self._columns(found)]) @ mean[u.size :]
+        return replace(
+            found, log_evidence=z.log_evidence + self.log_corrected(found, model, z.theta), theta=z.theta, form=form
+        )
+
+    def log_corrected(self, found: Candidate, model: Linear, theta: Array) -> float:
+        """ln Z under the true priors within their bounds less ln Z of the linear ``model`` with its normal ones."""
+        axes = self.axes(found.hypothesis)
+        u = axes.to_u(found.x)
+        spread, k = axes.local(u), u.size
+        mean, covariance = model.coefficients(theta)
+        low, high = axes.ends
+        inside = log_inside(mean[:k], covariance[:k, :k], low / spread, high / spread)
+        return inside + axes.log_replaced(u, mean[:k] * spread, np.diag(covariance)[:k] * spread**2)
 
 
 def beyond_noise(white: Array, candidate: Candidate) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from bayesmembrane.calibration.posterior import enough_points
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, available
+from bayesmembrane.diagnosis.candidates.sampled import checked
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.candidates.signatures import signatures
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
@@ -66,7 +67,7 @@ class DiagnosisCase(ABC):
     signatures : of these effects beside the null model, without the invisible ones
     elsewhere : names of those that are invisible there, and leave a trace beside another energy
     detection : tests of the null model
-    rng : draws of the tests
+    rng : draws of the tests, and of what checks the evidence
     tell : what is being done
     """
 
@@ -157,12 +158,12 @@ def opened(measurement: Measurement, question: Question, seed: int, solve: Solve
     plain = _energies(search, question, tell)
     best = max(plain.values(), key=lambda c: c.log_evidence)
     search = renewed(search, smooth, best)
-    plain = {name: search.weighed_anew(c) for name, c in plain.items()}
+    rng = np.random.default_rng([seed, 7])
+    plain = {name: checked(search, search.weighed_anew(c), rng) for name, c in plain.items()}
     best = max(plain.values(), key=lambda c: c.log_evidence)
     null = plain[hypothesis.material.name] if question.declared else best
     tell("testing the residual")
     effects = tuple(available(measurement, hypothesis))
-    rng = np.random.default_rng([seed, 7])
     found = signatures(search, null, effects)
     elsewhere = seen_elsewhere(search, plain, effects, {s.effect for s in found})
     seen = whitened(null.residual, null.slopes, smooth, search.noise.cautious())

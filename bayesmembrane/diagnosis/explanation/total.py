@@ -103,15 +103,11 @@ def set_name(candidate: Candidate, given: Sequence[str]) -> str:
 def summed(grown: Grown) -> Total:
     """All that was grown, and what is foreign beside the most probable of it."""
     case = grown.case
-    given, visible = case.null.names, len(case.visible)
+    given = case.null.names
     every, counts = list(grown.found.values()), grown.counts
 
-    def believed(c: Candidate) -> float:
-        energy = BELIEFS.log_energy(c.hypothesis.material.name, case.question.energy, len(case.plain))
-        return BELIEFS.log_set(len(c.names) - len(given), visible) + energy
-
     def own(c: Candidate) -> float:
-        return counts * c.log_evidence + believed(c)
+        return counts * c.log_evidence + grown.believed(c)
 
     raised = _raised(grown, {id(c): own(c) for c in every})
 
@@ -128,7 +124,9 @@ def summed(grown: Grown) -> Total:
     terms += [(f.base, f.kind, own(f.base) + f.counted(counts) + BELIEFS.log_foreign(kinds)) for f in seen]
     p = _normalised(np.array([w for _, _, w in terms]))
     judged = [
-        _judged(grown, c, float(q), believed(c)) for (c, kind, _), q in zip(terms, p, strict=True) if kind == NOTHING
+        _judged(grown, c, float(q), grown.believed(c))
+        for (c, kind, _), q in zip(terms, p, strict=True)
+        if kind == NOTHING
     ]
     owners = _owners(grown, [c for c, kind, _ in terms if kind == NOTHING])
     joint, energies = defaultdict[tuple[str, str], float](float), defaultdict[str, float](float)

@@ -121,11 +121,16 @@ def _first_order(case: DiagnosisCase, found: Sequence[Foreign]) -> Probabilities
         name: c.log_evidence + BELIEFS.log_energy(name, case.question.energy, count) for name, c in case.plain.items()
     }
     none = float(np.logaddexp.reduce(list(log_energy.values())))
-    sets = {NOTHING: BELIEFS.log_set(0, len(visible))}
+    odds = [e.odds for e in visible]
+    sets = {NOTHING: BELIEFS.log_set((), odds)}
     for e in visible:
         gain = first_order(case.search, case.null, e)
-        if gain > BELIEFS.supported:
-            sets[e.name] = BELIEFS.log_set(1, len(visible)) + gain
+        weight = BELIEFS.log_set((e.odds,), odds) + gain
+        if gain <= BELIEFS.supported:  # neither seen nor excluded
+            sets[NOTHING] = float(np.logaddexp(sets[NOTHING], weight + np.log(BELIEFS.unseen)))
+            weight += np.log(1 - BELIEFS.unseen)
+        if np.isfinite(weight):
+            sets[e.name] = weight
     kinds = kinds_of(found)
     strange = {NOTHING: none + (BELIEFS.log_foreign(0) if kinds else 0.0)}
     for f in found:

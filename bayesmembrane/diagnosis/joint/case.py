@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed
+from bayesmembrane.diagnosis.candidates.sampled import checked
 from bayesmembrane.diagnosis.candidates.signatures import signatures
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.detection.detect import Detection
@@ -97,14 +98,14 @@ def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Q
     given = effects_in_tests([{e.name: e for e in c.question.hypothesis.effects} for c in alone], labels, one_clock)
     effects = tuple(effects_in_tests([_possible(c) for c in alone], labels, one_clock))
     smooth = np.asarray(block_diag(*(c.smooth for c in alone)))
-    plain = _energies(search, alone, question, given, tell)
+    rng = np.random.default_rng([alone[0].search.seed, 8])
+    plain = {n: checked(search, c, rng) for n, c in _energies(search, alone, question, given, tell).items()}
     best = max(plain.values(), key=lambda c: c.log_evidence)
     declared = question.hypothesis.material.name
     if question.declared and declared not in plain:
         raise SettingsError(f"no {declared} film reaches the data of all tests", remedy="use another material")
     null = plain[declared] if question.declared else best
     tell("testing the residuals of all tests")
-    rng = np.random.default_rng([alone[0].search.seed, 8])
     found = signatures(search, null, effects)
     elsewhere = seen_elsewhere(search, plain, effects, {s.effect for s in found})
     white = whitened(null.residual, null.slopes, smooth, noise.cautious())

@@ -128,6 +128,10 @@ class JointSearch(Weighing):
             slopes[:, rows] = wide
         return found, slopes
 
+    def misfits(self, hypothesis: Hypothesis, x: Array) -> Array:
+        each = [p.misfits(self.of(hypothesis, i), self.coordinates(hypothesis, i, x)) for i, p in enumerate(self.parts)]
+        return np.concatenate(each, axis=1)
+
     def curves(self, hypothesis: Hypothesis, x: Array) -> Array:
         each = [p.curves(self.of(hypothesis, i), self.coordinates(hypothesis, i, x)) for i, p in enumerate(self.parts)]
         return np.concatenate(each, axis=1)

@@ -10,6 +10,7 @@ from scipy.stats import cauchy, multivariate_t, norm
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.evidence import log_inside
+from bayesmembrane.diagnosis.candidates.sampled import sampled
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.candidates.standard import standard
 from bayesmembrane.diagnosis.candidates.weighing import starts_with
@@ -106,8 +107,15 @@ def test_evidence_equals_importance_sampling(cyclic, name) -> None:
     log_prior = log_prior.sum(axis=1) - np.log(within).sum()
     weights = np.full(4000, -np.inf)
     weights[kept] = log_likelihood + log_prior - law.logpdf(draws[kept])
-    sampled = logsumexp(weights) - np.log(4000) + prior_of_sizes
-    assert linear == pytest.approx(sampled, abs=0.8)
+    drawn = logsumexp(weights) - np.log(4000) + prior_of_sizes
+    assert linear == pytest.approx(drawn, abs=0.8)
+
+    # What the diagnosis draws itself, of fewer draws, adapted: within five standard errors of both.
+    own = sampled(search, found, np.random.default_rng(9))
+    w = np.exp(weights - np.max(weights))
+    sd = np.sqrt(np.sum(w * w)) / np.sum(w)
+    assert own.good
+    assert linear + own.difference == pytest.approx(drawn, abs=5 * float(np.hypot(own.sd, sd)))
 
 
 def _inverse(search: Search, found: Candidate) -> Array:
