@@ -36,7 +36,7 @@ from tests.studies.side_samplers import SAMPLERS
 
 SEED, REPEATS = 20261124, 15
 CELLS = {1: 240, 2: 120, 3: 40}  # of the cubature, along each parameter of the curve
-THINNER = 4  # films of the same G d, in which bending is a sixteenth
+THINNER = 4  # times, at the same G d: less bends, and the membrane is the same
 # N/m and -, near the posterior of OP1.
 FILMS = {"neo_hookean": (7.5,), "gent": (5.312, 17.42), "yeoh": (8.840838, -0.6303258, 0.05632747)}
 Case = tuple[str, str, int]

@@ -16,7 +16,7 @@ from tensortrax.math.linalg import det, eigvalsh
 
 from bayesmembrane.ground.parameters import Array
 
-BULK = 2000.0  # MPa, of silicone; its shear modulus is some ten thousandth of that
+STIFF = 1e4  # bulk modulus over shear modulus: less would soften the force by the strain of volume that is left
 TOLERANCE = 1e-6  # of the norm of the forces left; round-off of the bulk keeps it from much less
 ELEMENTS = 200
 FIRST, GROWTH = 0.2, 1.25  # thicknesses of the first increment, where a flat film can only bend, and each to the next
@@ -65,7 +65,7 @@ def lifted(name: str, c: Array, thickness: float, rims: tuple[float, float], def
     mesh = fe.mesh.add_midpoints_edges(mesh)
     field = fe.FieldContainer([fe.FieldAxisymmetric(fe.RegionQuadraticQuad(mesh), dim=2)])
     umat = fe.Hyperelastic(_isochoric, energy=_energy(name, c, thickness))
-    solid = fe.SolidBodyNearlyIncompressible(umat, field, bulk=BULK)
+    solid = fe.SolidBodyNearlyIncompressible(umat, field, bulk=STIFF * 2e-3 * c[0] / thickness)
     bounds = {
         "ring": fe.Boundary(field[0], fy=outer),
         "disc, radial": fe.Boundary(field[0], fy=inner, skip=(1, 0)),
