@@ -1,6 +1,6 @@
 """`make study-growth`: how the CPU seconds of a calibration grow with the work it is given.
 
-    python -m tests.studies.growth [--seeds 2] [--only readings,walkers] [--table docs/studies/growth.md]
+    python -m tests.studies.growth [--seeds 2] [--only readings walkers] [--table docs/studies/growth.md]
 
 One thread, CPU seconds of the process, kernels compiled, nothing stored. One line of JSON a run, written at once; runs
 that stand there are skipped. All measurements are simulated by this package from the hypothesis that is calibrated.
@@ -200,13 +200,13 @@ def warmed() -> None:
 def main() -> None:
     """What is not stored yet is run; then the page is written."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", help="beginnings of what varies, with commas")
+    parser.add_argument("--only", nargs="*", default=[""], help="how the names of what varies begin")
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=float("inf"), help="begin nothing after this time")
     parser.add_argument("--results", type=Path, default=Path("chains/growth.jsonl"), help="JSON lines, one a run")
     parser.add_argument("--table", type=Path, help="Markdown")
     options = parser.parse_args()
-    axes = [a for a in AXES if not options.only or a.startswith(tuple(options.only.split(",")))]
+    axes = [a for a in AXES if a.startswith(tuple(options.only))]
     done = stored(options.results)
     todo = [c for c in plan(axes, options.seeds) if key(c) not in done]
     append(until(options.seconds, todo, measured, 1, warmed), options.results, told)

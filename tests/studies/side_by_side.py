@@ -11,9 +11,11 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -35,6 +37,7 @@ from tests.studies.side_page import FELUPE, REFERENCE, page
 from tests.studies.side_samplers import SAMPLERS
 
 SEED, REPEATS = 20261124, 15
+MOST_SECONDS = 240.0  # of a run
 CELLS = {1: 240, 2: 120, 3: 40}  # of the cubature, along each parameter of the curve
 THINNER = 4  # times, at the same G d: less bends, and the membrane is the same
 # N/m and -, near the posterior of OP1.
@@ -62,7 +65,7 @@ def measured(case: Case) -> Row:
     """One run; what a package raises is a result, too."""
     material, what, seed = case
     row: Row = {"key": key(case), "material": material, "sampler": what, "seed": seed}
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), ended_after(MOST_SECONDS):
         warnings.simplefilter("ignore")
         try:
             row |= film(material) if what == FELUPE else exactly(material) if what == REFERENCE else drawn(*case)
@@ -71,12 +74,29 @@ def measured(case: Case) -> Row:
     return row
 
 
+@contextmanager
+def ended_after(seconds: float) -> Iterator[None]:
+    """Raise `TimeoutError` in what takes more CPU seconds."""
+
+    def end(*_: Any) -> None:
+        raise TimeoutError(f"stopped after {seconds:g} CPU s")
+
+    before = signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
 def drawn(material: str, sampler: str, seed: int) -> Row:
     """One sampler: films asked for, CPU seconds of all and of the density alone, and what came out."""
     begun = time.process_time()
     with metered(Posterior, "evaluate") as density:
         found = SAMPLERS[sampler](posterior(material), seed)
-    row: Row = {"evaluations": density.films, "seconds": time.process_time() - begun, "density": density.seconds}
+    films = density.films if found.evaluations is None else found.evaluations
+    row: Row = {"evaluations": films, "seconds": time.process_time() - begun, "density": density.seconds}
     if len(found.x):
         row |= {"effective": float(found.effective), "mean": found.mean.tolist(), "sd": found.sd.tolist()}
     if found.log_evidence is not None:
@@ -95,17 +115,17 @@ def film(material: str) -> Row:
     from tests.studies.side_felupe import lifted
 
     m, c = shipped_measurement("OP1"), np.array(FILMS[material])
-    own = ritz.solve(_question(material, c[None])).force[0]
+    films = c * np.exp(0.02 * np.random.default_rng(SEED).standard_normal((BATCH, len(c))))
+    one, many = _question(material, c[None]), _question(material, films)
+    own = ritz.solve(one).force[0]
     rims, lifts = (1e3 * m.rig.inner_radius, 1e3 * m.rig.outer_radius), 1e3 * m.deflection
     theirs = lifted(material, c, 1e3 * m.specimen.thickness, rims, lifts)
     thinner = lifted(material, c, 1e3 * m.specimen.thickness / THINNER, rims, lifts)
-    alone = microseconds(lambda: ritz.solve(_question(material, c[None])), REPEATS)
-    films = c * np.exp(0.02 * np.random.default_rng(SEED).standard_normal((BATCH, len(c))))
     return {
         "seconds": theirs.seconds,
         "increments": theirs.increments,
-        "alone": alone,
-        "batch": microseconds(lambda: ritz.solve(_question(material, films)), REPEATS) / BATCH,
+        "alone": microseconds(lambda: ritz.solve(one), REPEATS),
+        "batch": microseconds(lambda: ritz.solve(many), REPEATS) / BATCH,
         "apart": (theirs.force / own - 1).tolist(),
         "thinner": (thinner.force / own - 1).tolist(),
     }

@@ -33,12 +33,14 @@ class Found:
     x : (n, k) draws; weight : (n,), summing to one
     effective : how many independent draws they are worth, as the sampler itself says
     log_evidence : ln Z and its standard error, as the sampler itself says; None where it gives none
+    evaluations : draws that were asked for, where the sampler is not all that asks
     """
 
     x: Array
     weight: Array
     effective: float
     log_evidence: tuple[float, float] | None = None
+    evaluations: int | None = None
 
     @property
     def mean(self) -> Array:
@@ -89,11 +91,11 @@ class Asked:
 
 
 def ours(posterior: Posterior, seed: int) -> Found:
-    """`bayesmembrane sample`, without its files; ln Z where a mixture was found, from the mean of its weights."""
+    """`bayesmembrane sample` with its checks, without its files; ln Z from the weights, where a mixture was found."""
     run = bm.sample(posterior.measurement, posterior.hypothesis, ess=WANTED, seed=seed)
     x, weights = run.draws(), run.status.get("importance")
     log_evidence = (weights["log_integral"], weights["log_integral_sd"]) if weights else None
-    return Found(x, even(x), float(run.quality.ess), log_evidence)
+    return Found(x, even(x), float(run.quality.ess), log_evidence, int(run.status["evaluations"]))
 
 
 def ours_with_bridge(posterior: Posterior, seed: int) -> Found:
@@ -106,8 +108,16 @@ def ours_with_bridge(posterior: Posterior, seed: int) -> Found:
     return Found(flat, even(flat), float(np.min(sampled.convergence.ess)), (found.log_evidence, found.sd))
 
 
+def ours_with_nested(posterior: Posterior, seed: int) -> Found:
+    """The second estimator of `bayesmembrane compare`: nested sampling around the draws."""
+    sampled = run_ensembles(posterior, Settings(ess=WANTED), seed)
+    x = sampled.chains.x[:, sampled.convergence.burn :].reshape(-1, posterior.size)
+    found = nested(PosteriorTarget(posterior), seed=seed, around=(x,))
+    return Found(x, even(x), float(np.min(sampled.convergence.ess)), (found.log_evidence, found.sd))
+
+
 def our_nested(posterior: Posterior, seed: int) -> Found:
-    """The second estimator of `bayesmembrane compare`, from the prior; it keeps no draws."""
+    """Nested sampling of this package from the prior; it keeps no draws."""
     found = nested(PosteriorTarget(posterior), seed=seed)
     return Found(np.empty((0, posterior.size)), np.empty(0), np.nan, (found.log_evidence, found.sd))
 
@@ -195,7 +205,8 @@ def nuts(posterior: Posterior, seed: int) -> Found:
 SAMPLERS: dict[str, Callable[[Posterior, int], Found]] = {
     "bayesmembrane sample": ours,
     "bayesmembrane sample + bridge": ours_with_bridge,
-    "bayesmembrane nested": our_nested,
+    "bayesmembrane sample + nested": ours_with_nested,
+    "bayesmembrane nested from the prior": our_nested,
     "emcee with stretch moves": plain_emcee,
     "nautilus": nautilus,
     "dynesty": dynesty,

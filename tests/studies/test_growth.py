@@ -28,8 +28,8 @@ def test_the_page_has_a_line_for_every_size() -> None:
     ]
     text = growth_page.page(rows, ["readings", "walkers"])
     assert "| readings | 15, 250 | 1.00 ± 0.00 | 1.00 ± 0.00 | 0.00 ± 0.00 | 1.00 ± 0.00 | 1.00 ± 0.00 |" in text
-    assert "| 15 | 2 | 30.00 |" in text
-    assert "alkers" not in text.partition("| what grows")[2]
+    assert "| 15 | 2 | 30 |" in text
+    assert "\n## Walkers" not in text
 
 
 def run(sampler: str, **more: object) -> dict[str, object]:
@@ -44,7 +44,7 @@ def test_samplers_are_judged_by_cubature_and_by_each_other() -> None:
         run("two", mean=[0.0, 0.0], **drawn),
         {"material": "gent", "sampler": "three", "error": "ValueError: no"},
     ]
-    assert side_page.means_off(rows[1:2], rows[2:3]) == pytest.approx(1.0)
+    assert side_page.means_off(rows[1:2], rows[2:3]) == pytest.approx(np.sqrt(0.5))
     text = side_page.page(rows, ["one", "two", "three"])
-    assert "| one | 1 | 2.0 | 50% | 500 | 100 | 5.0 | 50 | 1.0 | 0.030 | 0.040 |" in text
+    assert "| one | 1 | 2.0 | 50% | 500 | 100 | 5.0 | 50 | 0.7 | 0.030 | 0.040 |" in text
     assert "| three | 1 | ValueError: no |" in text
