@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 PY := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
+SIDE := build/side
 PYTEST_WORKERS ?= 2
 
 # One thread per process: the work is spread over processes, and nested thread pools fight for the same cores.
@@ -10,7 +11,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-sequential study-fuzz study-import study-scale study-kill study-overnight study-damage study-foretold study-seeds study-sbc study-modes clean
+.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-sequential study-fuzz study-import study-scale study-kill study-overnight study-damage study-foretold study-seeds study-sbc study-modes study-beside study-growth clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -32,6 +33,8 @@ help:
 	@echo "make study-seeds 50 seeds for the statistical tests, lanes on and off, hours; goes on where it was; SEEDS='--group quick' asks for less"
 	@echo "make study-sbc  simulation-based calibration of every material, hours; goes on where it was; SBC='--only gent --limit 20' asks for less"
 	@echo "make study-modes four rubbers in several modes each, half an hour or so; goes on where it was; MODES='--evidence-on none' asks for less"
+	@echo "make study-beside  other samplers and FElupe beside this package, in an environment of their own, an hour or so; goes on where it was; BESIDE='--materials gent' asks for less"
+	@echo "make study-growth  CPU seconds against readings, walkers, parameters, specimens, a quarter of an hour or so; goes on where it was; GROWTH='--only readings' asks for less"
 	@echo "make install  the set-up alone, into $(VENV)"
 	@echo "make lint     style, types and floors alone"
 	@echo "make clean    remove caches and build products; keeps $(VENV), chains and reports"
@@ -114,6 +117,20 @@ study-sbc: $(STAMP)
 
 study-modes: $(STAMP)
 	$(PY) -m tests.studies.modes $(MODES)
+
+# What is compared with stays out of $(VENV).
+$(SIDE)/.installed: tests/studies/side_by_side.txt constraints.txt pyproject.toml
+	@test -x $(SIDE)/bin/python || $(PYTHON) -m venv $(SIDE)
+	$(SIDE)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt hatchling editables
+	$(SIDE)/bin/python -m pip install --quiet --disable-pip-version-check --no-build-isolation \
+	  --requirement tests/studies/side_by_side.txt --editable .
+	@touch $@
+
+study-beside: $(SIDE)/.installed
+	$(SIDE)/bin/python -m tests.studies.side_by_side --table docs/studies/side_by_side.md $(BESIDE)
+
+study-growth: $(STAMP)
+	$(PY) -m tests.studies.growth --table docs/studies/growth.md $(GROWTH)
 
 clean:
 	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

@@ -66,13 +66,13 @@ def try_points(posterior: Posterior, rng: np.random.Generator, wanted: int, coun
     """Points around the valleys of the posterior, at least ``wanted`` of them possible.
 
     They are prior draws brought to their best modulus, draws around the valleys that a descent finds from them, and
-    what differential evolution makes of the better ones.
+    what differential evolution makes of the better ones, in as many rounds as very many walkers need.
 
     Raises `SettingsError` if next to no admissible parameters reach the data.
     """
     x = _candidates(posterior, rng)
     lp = _evaluate(posterior, x, counts)
-    for _ in range(ROUNDS):
+    for _ in range(max(ROUNDS, int(np.ceil((SPARE * wanted - len(x)) / EACH)))):
         good = np.isfinite(lp)
         if np.count_nonzero(good) < 4:
             more = posterior.prior.draw(rng, 2 * EACH)

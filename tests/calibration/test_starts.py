@@ -28,6 +28,13 @@ def test_films_without_slopes_on_the_way_do_not_end_the_search(seed: int) -> Non
     assert np.all(np.isfinite(posterior.evaluate(x.reshape(-1, posterior.size)).log_posterior))
 
 
+def test_a_thousand_walkers_find_a_place_each() -> None:
+    """They were more than the points that were tried, and were told that no film reaches the data."""
+    curve = read_measurement(shipped("elastosil_50um_op1.csv"), shipped("elastosil_50um_op1.toml"))
+    x = starting_points(Posterior(hypothesis("gent"), curve), np.random.default_rng(1), 2, 1024, Outcomes())
+    assert len(np.unique(x.reshape(2048, -1), axis=0)) == 2048
+
+
 def around(level: float, each: float = 1.0) -> Array:
     """(k,) how far draws around the valleys of a strip lie apart, read with noise of this part of its force."""
     d, rng = np.linspace(1e-3, 0.03, 30), np.random.default_rng(4)
