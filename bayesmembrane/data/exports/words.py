@@ -83,7 +83,7 @@ FACTS = {
     "speed": (
         SPEED,
         r"(?:test |crosshead |cross head )?speed|\w*prufgeschwindigkeit|vitesse\w*|velocidad\w*|predkosc|速度|v1"
-        r"|test (?:rate|tempo)(?: 1)?$",
+        r"|test (?:rate|tempo)(?: 1)?$|(?:crosshead|cross head) rate",
     ),
     "strain_length": (LENGTH, r"(?!)"),
     "length": (LENGTH, r"(?:length|lange|longueur|longitud|dlugosc|长度)$"),
@@ -95,6 +95,9 @@ NAME = re.compile(
     r"(?:specimen|sample)(?: (?:name|id|label|designation|identifier))?|probenbezeichnung|probe|probenname"
     r"|proben ?beschriftung|etykiet\w* probki"
     r"|aktuelle probe|eprouvette|nom de l eprouvette|probeta|muestra|probka|试样|试样名称|样品"
+)
+_EXTENSOMETER = re.compile(
+    r"exten[sz]ometer\w*|extensometr\w*|extensometre|langenanderungsaufnehmer|ekstensometr\w*|引伸计"
 )
 COMPRESSION = re.compile(r"compress\w*|druck(?:versuch|spannung|kraft)|\w*stauch\w*|compresion|sciskani\w*|压缩|壓縮")
 
@@ -221,8 +224,11 @@ def _word(pattern: re.Pattern[str], text: str) -> bool:
 def fact_of(key: str) -> str:
     """Which fact of specimen or test a key of the preamble names, "" if none."""
     text = plain(key)
-    if len(text) <= 90 and _FACT["gauge_length"].search(text) and _PATTERN[STRAIN].search(text):
-        return "gauge_length" if _PATTERN[TRAVEL].search(text) else "strain_length"
+    if len(text) <= 90 and _FACT["gauge_length"].search(text):
+        if _EXTENSOMETER.search(text):
+            return "strain_length"
+        if _PATTERN[STRAIN].search(text):
+            return "gauge_length" if _PATTERN[TRAVEL].search(text) else "strain_length"
     if len(text) > 60 or re.search(r"(?<![a-z])(?:modul\w*|e modul|strain|dehnung|end|ende)(?![a-z])", text):
         return ""
     for name in ("grip_length", "gauge_length", "area", "thickness", "width", "diameter", "speed", "length"):
