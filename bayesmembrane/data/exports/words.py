@@ -69,7 +69,8 @@ FACTS = {
     "gauge_length": (
         LENGTH,
         r"gauge length|gage length|\w*messlange|\w*messlaenge|lo|l0|longueur (?:initiale|utile|de reference)"
-        r"|longitud (?:calibrada|inicial|de referencia)|dlugosc pomiarowa|initial length|original length|标距|原始标距",
+        r"|longueur entre reperes|distancia inicial|longitud (?:calibrada|inicial|de referencia)|dlugosc pomiarowa"
+        r"|initial length|original length|标距|原始标距",
     ),
     "grip_length": (
         LENGTH,
@@ -93,7 +94,7 @@ FACTS = {
 _FACT = {name: re.compile(rf"(?<![a-z])(?:{words})(?![a-z0-9])") for name, (_, words) in FACTS.items()}
 NAME = re.compile(
     r"(?:specimen|sample)(?: (?:name|id|label|designation|identifier))?|probenbezeichnung|probe|probenname"
-    r"|proben ?beschriftung|etykiet\w* probki"
+    r"|proben ?beschriftung|etykiet\w* probki|etiqueta de la probeta"
     r"|aktuelle probe|eprouvette|nom de l eprouvette|probeta|muestra|probka|试样|试样名称|样品"
 )
 _EXTENSOMETER = re.compile(
@@ -109,6 +110,7 @@ _UNIT_WORDS = {
     "microns": "um", "newton": "N", "newtons": "N", "牛": "N", "牛顿": "N", "千牛": "kN", "kp": "kgf",
     "lb": "lbf", "lbs": "lbf", "lb_f": "lbf", "pounds": "lbf", "兆帕": "MPa", "pct": "percent", "prozent": "percent",
     "kg_per_cm2": "kgf_per_cm2", "kp_per_cm2": "kgf_per_cm2", "kg_per_mm2": "kgf_per_mm2", "lbf_per_in2": "psi",
+    "microstrain": "um_per_m", "ustrain": "um_per_m", "uε": "um_per_m", "με": "um_per_m", "ue": "um_per_m",
     "in_per_in": "mm_per_mm", "m_per_m": "m_per_m", "cm_per_cm": "mm_per_mm", "nmm-2": "N_per_mm2",
     "mm_per_mn": "mm_per_min", "in_per_minute": "in_per_min", "mm_per_sec": "mm_per_s",
 }  # fmt: skip
@@ -229,7 +231,9 @@ def fact_of(key: str) -> str:
             return "strain_length"
         if _PATTERN[STRAIN].search(text):
             return "gauge_length" if _PATTERN[TRAVEL].search(text) else "strain_length"
-    if len(text) > 60 or re.search(r"(?<![a-z])(?:modul\w*|e modul|strain|dehnung|end|ende)(?![a-z])", text):
+    if len(text) > 60 or re.search(
+        r"(?<![a-z])(?:modul\w*|e modul|strain|dehnung|end|ende|final\w*|koncow\w*|最终)(?![a-z])", text
+    ):
         return ""
     for name in ("grip_length", "gauge_length", "area", "thickness", "width", "diameter", "speed", "length"):
         if _FACT[name].search(text):

@@ -133,6 +133,10 @@ def test_a_moment_is_neither_a_length_nor_a_force(unit: str) -> None:
         ("Odkształcenie : Odkształcenie 1 długość pomiarowa", "strain_length"),
         ("Gage Length (Extensometer)", "strain_length"),
         ("Messlänge Extensometer", "strain_length"),
+        ("Deformación : Deformación por tracción (Extensión) distancia inicial", "gauge_length"),
+        ("Propiedades de la probeta : Anchura", "width"),
+        ("Propiedades de la probeta : Anchura final", ""),
+        ("Final Diameter", ""),
         ("Dimension : Length", "length"),
         ("Crosshead Rate", "speed"),
         ("Gauge length", "gauge_length"),
@@ -162,6 +166,12 @@ def test_brackets_of_a_name_do_not_hide_the_row_of_units() -> None:
     large = 20 * (STRETCH - 1) / 0.4
     found = imported(lines(header, TIME, FORCE, large).encode(), width=WIDTH, thickness=THICKNESS)
     assert found.columns["stretch"] == pytest.approx(1 + large, abs=1e-5)
+
+
+@pytest.mark.parametrize("unit", ["microstrain", "µε", "um/m", "µm/m"])
+def test_strain_in_millionths(unit: str) -> None:
+    text = lines(f"Time (s),Strain ({unit}),Stress (MPa)", TIME, 1e6 * (STRETCH - 1), STRESS / 1e6)
+    assert imported(text.encode()).columns["stretch"] == pytest.approx(STRETCH, abs=1e-5)
 
 
 def test_results_of_whole_tests_are_no_readings() -> None:
