@@ -100,7 +100,7 @@ NAME = re.compile(
 _EXTENSOMETER = re.compile(
     r"exten[sz]ometer\w*|extensometr\w*|extensometre|langenanderungsaufnehmer|ekstensometr\w*|引伸计"
 )
-COMPRESSION = re.compile(r"compress\w*|druck(?:versuch|spannung|kraft)|\w*stauch\w*|compresion|sciskani\w*|压缩|壓縮")
+COMPRESSION = re.compile(r"compress\w*|druck(?:versuch|spannung|kraft)|\w*stauch\w*|compresion|sciska\w*|压缩|壓縮")
 
 _AREAS = {"mm2": 1e-6, "cm2": 1e-4, "m2": 1.0, "in2": 0.0254**2}
 _UNIT_WORDS = {

@@ -67,6 +67,7 @@ def test_the_zero_of_a_strips_force_is_told_and_settled() -> None:
         "时间 (s),位移 (mm),载荷 (N),压缩应变 (%),压缩应力 (MPa)",
         "Time (s),Displacement (mm),Force (N),Compressive strain (%),Compressive stress (MPa)",
         "Zeit (s),Weg (mm),Kraft (N),Stauchung (%),Druckspannung (MPa)",
+        "Czas (s),Droga (mm),Siła (N),Odkształcenie przy ściskaniu (%),Naprężenie ściskające (MPa)",
     ],
 )
 @pytest.mark.parametrize("size", [1.0, 0.02])
