@@ -14,7 +14,7 @@ import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -164,7 +164,8 @@ def judged(name: str, noise: float, seed: int, states: int = POINTS) -> dict[str
             found[claimed], how[claimed] = bounds[claimed], "bound"
             continue
         found[claimed], how[claimed] = evidence(m, claims[claimed], seed)
-        best = max(best, found[claimed] if found[claimed] is not None else -np.inf)
+        z = found[claimed]
+        best = best if z is None else max(best, z)
     known = [z for z in found.values() if z is not None]
     total = float(np.logaddexp.reduce(known))
     return {
@@ -182,58 +183,78 @@ def judged(name: str, noise: float, seed: int, states: int = POINTS) -> dict[str
 # ---- the page --------------------------------------------------------------------------------------------------------
 
 
+BINS = (0.0, 0.1, 0.3, 0.7, 0.9, 1.0)
+
+
 def page(rows: list[dict[str, Any]]) -> str:
-    """The table in Markdown."""
+    """The tables in Markdown."""
     parts = [
         "# Which of nine laws is behind a curve",
         "",
-        "Made by `python -m tests.studies.nine_laws` (seed 1). Each of the nine energies is simulated from "
-        "its authors' own 3-D equations (complex steps, nothing of the package; Arruda-Boyce with the whole inverse "
-        "Langevin function, of which the package has five terms) in a biaxial machine: a uniaxial way to a stretch of "
+        "Made by `python -m tests.studies.nine_laws`. Each of the nine energies is simulated from its authors' own 3-D "
+        "equations (complex steps, nothing of the package; Arruda-Boyce with the whole inverse Langevin function, of "
+        "which the package has five terms) in a biaxial machine: a uniaxial way to a stretch of "
         f"{SPANS['uniaxial']:g}, a planar one to {SPANS['planar']:g} and an equibiaxial one to "
-        f"{SPANS['equibiaxial']:g}, {POINTS} states each, one rubber, constants in the script. Noise is proportional "
-        f"to every stress and stated; where none is added, {100 * FLOOR:g} % is stated, for no curve is known better. "
-        "All nine are weighed by ln Z, with equal probabilities beforehand: by the weights of what a mixture proposed, "
-        "or by the bridge where emcee's ensembles walked (`compare` has both beside nested sampling, which takes ten "
-        "times as long and is left out here).",
+        f"{SPANS['equibiaxial']:g}, one rubber, constants in the script. Noise is proportional to every stress and "
+        f"stated; where none is added, {100 * FLOOR:g} % is stated, for no curve is known better. All nine are weighed "
+        "by ln Z, with equal probabilities beforehand: by the weights of what a mixture proposed, or by the bridge "
+        "where emcee's ensembles walked (`compare` has both beside nested sampling, which takes ten times as long and "
+        f"is left out here). An energy whose largest likelihood lies {BEHIND:g} in ln below the best ln Z is not "
+        "sampled: its ln Z is lower still. A second energy in the table may be such a bound, and the lead is then at "
+        "least what it says.",
         "",
-        "| truth | noise | first | probability of the truth | runner-up, or the first | ln Z, truth less best other |",
-        "|---|---|---|---|---|---|",
+        "arXiv 2509.16040 asks this of sparse regressions, three of them by three criteria (nine algorithms), with 5 "
+        "and 10 % noise. How many states its curves have could not be read where this was written (its abstract and "
+        "summaries alone could), so that two numbers of states are shown.",
+    ]
+    for states in sorted({r["states"] for r in rows}, reverse=True):
+        parts += _section(states, [r for r in rows if r["states"] == states])
+    parts += _calibration(rows)
+    return "\n".join(parts) + "\n"
+
+
+def _section(states: int, rows: list[dict[str, Any]]) -> list[str]:
+    """One number of states of each mode."""
+    parts = [
+        "",
+        f"## {states} states of each mode",
+        "",
+        "| truth | noise | seed | first | probability of the truth | other | ln Z, truth less best other |",
+        "|---|---|---|---|---|---|---|",
     ]
     parts += [f"| {' | '.join(_cells(r))} |" for r in rows]
     parts.append("")
     for noise in sorted({r["noise"] for r in rows}):
-        own = [r for r in rows if r["noise"] == noise]
-        right = sum(_lead(r) > 0 for r in own)
-        parts.append(f"- At {100 * noise:g} %: the truth is first in {right} of {len(own)}.")
-    told = [r for r in rows if r["probability"][r["truth"]] is not None]
-    if told:
-        mean = np.mean([r["probability"][r["truth"]] for r in told])
-        best = np.mean([max(v or 0.0 for v in r["probability"].values()) for r in told])
-        hit = np.mean([_lead(r) > 0 for r in told])
-        parts.append(
-            f"- Over {len(told)} curves the first one has {best:.2f} of the probability on average and is the truth in "
-            f"{hit:.2f} of them; the truth has {mean:.2f}."
-        )
-    exact = next((_lead(r) for r in rows if r["truth"] == "yeoh" and not r["noise"]), None)
-    if exact is not None:
-        widths = {q.name: q.prior.distribution().std() for q in hypothesis("yeoh").parameters}
-        parts.append(
-            f"- Why not more: a misfit counts by 1 / noise^2, so that Yeoh's lead of {exact:.0f} in ln Z at "
-            f"{100 * FLOOR:g} % is one of {exact * (FLOOR / 0.05) ** 2:.2f} at 5 %. Where two energies fit alike, "
-            f"their priors decide, and those of Yeoh (standard deviations {widths['yeoh.c2_c1']:.1g} and "
-            f"{widths['yeoh.c3_c1']:.1g} of C2/C1 and C3/C1) are made for films that stretch to 2 or 3: a rubber with "
-            "-0.011 and 0.00033 is unlikely before anything is measured."
-        )
-    missing = [
-        f"{n} at {100 * e:g} %"
-        for e in NOISES
-        for n in LAWS
-        if not any(r["truth"] == n and r["noise"] == e for r in rows)
+        for seed in sorted({r["seed"] for r in rows if r["noise"] == noise}):
+            own = [r for r in rows if (r["noise"], r["seed"]) == (noise, seed)]
+            first = sum(_lead(r) > 0 for r in own)
+            parts.append(f"- At {100 * noise:g} %, seed {seed}: the truth is first in {first} of {len(own)}.")
+    return parts
+
+
+def _calibration(rows: list[dict[str, Any]]) -> list[str]:
+    """How often energies are the truth, by the probability that they were given."""
+    told = [(p, c == r["truth"]) for r in rows if len(r["probability"]) == len(LAWS) for c, p in _stated(r).items()]
+    curves = sum(len(r["probability"]) == len(LAWS) for r in rows)
+    parts = [
+        "",
+        "## Stated against found",
+        "",
+        f"Every energy of {curves} curves of which all probabilities are kept, by the probability it was given.",
+        "",
+        "| stated | energies | stated on average | the truth |",
+        "|---|---|---|---|",
     ]
-    if missing:
-        parts.append(f"- Not computed yet: {', '.join(missing)}.")
-    return "\n".join(parts) + "\n"
+    for low, high in pairwise(BINS):
+        own = [(p, hit) for p, hit in told if low <= p < high or (high == 1.0 and p == 1.0)]
+        if own:
+            mean, share = np.mean(own, axis=0)
+            parts.append(f"| {low:g} to {high:g} | {len(own)} | {mean:.3f} | {share:.3f} |")
+    return parts
+
+
+def _stated(row: dict[str, Any]) -> dict[str, float]:
+    return {c: p for c, p in row["probability"].items() if p is not None}
 
 
 def _others(row: dict[str, Any]) -> tuple[str, float]:
@@ -253,7 +274,7 @@ def _cells(row: dict[str, Any]) -> list[str]:
     p = row["probability"][row["truth"]]
     first = row["truth"] if lead > 0 else other
     told = "no ranking" if p is None else f"{p:.3g}"
-    return [row["truth"], f"{100 * row['noise']:g} %", first, told, other, f"{lead:+.1f}"]
+    return [row["truth"], f"{100 * row['noise']:g} %", str(row["seed"]), first, told, other, f"{lead:+.1f}"]
 
 
 def main() -> None:
