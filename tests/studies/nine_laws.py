@@ -198,8 +198,8 @@ def page(rows: list[dict[str, Any]]) -> str:
         f"{SPANS['equibiaxial']:g}, one rubber, constants in the script. Noise is proportional to every stress and "
         f"stated; where none is added, {100 * FLOOR:g} % is stated, for no curve is known better. All nine are weighed "
         "by ln Z, with equal probabilities beforehand: by the weights of what a mixture proposed, or by the bridge "
-        "where emcee's ensembles walked, to 100 effective draws or more (`compare` has both beside nested sampling, which "
-        "takes ten times as long and "
+        "where emcee's ensembles walked, to 100 effective draws or more (`compare` has both beside nested sampling, "
+        "which takes ten times as long and "
         f"is left out here). An energy whose largest likelihood lies {BEHIND:g} in ln below the best ln Z is not "
         "sampled: its ln Z is lower still. A second energy in the table may be such a bound, and the lead is then at "
         "least what it says.",
@@ -250,9 +250,9 @@ def _why(rows: list[dict[str, Any]]) -> list[str]:
         "## Why sixteen states are too few",
         "",
         "A misfit counts by states / noise^2, and what a free coefficient costs by the logarithm of its prior's width. "
-        f"Where two energies fit alike, the priors decide: those of Yeoh (standard deviations "
-        f"{widths['yeoh.c2_c1']:.2g} and {widths['yeoh.c3_c1']:.2g} of C2/C1 and C3/C1) are wide for films that stretch to 2 or 3, and wider still "
-        "for a rubber at 5, whose -0.011 and 0.00033 are a small corner of them. The leads of the laws "
+        "Where two energies fit alike, the priors decide: those of Yeoh (standard deviations "
+        f"{widths['yeoh.c2_c1']:.2g} and {widths['yeoh.c3_c1']:.2g} of C2/C1 and C3/C1) are wide for films that "
+        "stretch to 2 or 3, and wider still for a rubber at 5, whose -0.011 and 0.00033 are a small corner of them. The leads of the laws "
         f"that were missed with {POINTS} states move with {MANY}: {'; '.join(told)}.",
     ]
 
