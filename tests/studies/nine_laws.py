@@ -252,7 +252,8 @@ def _why(rows: list[dict[str, Any]]) -> list[str]:
         "A misfit counts by states / noise^2, and what a free coefficient costs by the logarithm of its prior's width. "
         "Where two energies fit alike, the priors decide: those of Yeoh (standard deviations "
         f"{widths['yeoh.c2_c1']:.2g} and {widths['yeoh.c3_c1']:.2g} of C2/C1 and C3/C1) are wide for films that "
-        "stretch to 2 or 3, and wider still for a rubber at 5, whose -0.011 and 0.00033 are a small corner of them. The leads of the laws "
+        "stretch to 2 or 3, and wider still for a rubber at 5, "
+        "whose -0.011 and 0.00033 are a small corner of them. The leads of the laws "
         f"that were missed with {POINTS} states move with {MANY}: {'; '.join(told)}.",
     ]
 
