@@ -59,7 +59,7 @@ _FACTORS: dict[str, dict[str, float]] = {
         "mm_per_h": 1e-3 / 3600.0,
         "in_per_min": _INCH / 60.0,
     },
-    RATIO: {"": 1.0, "percent": 1e-2, "mm_per_mm": 1.0, "m_per_m": 1.0},
+    RATIO: {"": 1.0, "percent": 1e-2, "mm_per_mm": 1.0, "m_per_m": 1.0, "um_per_m": 1e-6},
 }
 
 _SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "²": "2"})

@@ -155,7 +155,10 @@ def _names(sheet: Sheet, row: int, width: int) -> Sequence[Cell]:
 
 def _column(index: int, header: str, beside: str) -> ExportColumn:
     name, unit = named(header)
-    return ExportColumn(index, header, name, unit or beside.strip("[]() "))
+    beside = beside.strip("[]() ")
+    if unit_of(beside) and not unit_of(unit):  # "Tensile strain (Extension)" above "(mm/mm)"
+        return ExportColumn(index, header, name, beside)
+    return ExportColumn(index, header, name, unit or beside)
 
 
 def _padded(cells: Sequence[Cell], width: int) -> list[Cell]:
@@ -265,7 +268,8 @@ def name_in(sheet: Sheet, used: set[int]) -> str:
         cells = [str(c) for c in sheet.cells(r) if c != ""]
         if len(cells) == 1 and ":" in cells[0]:
             cells = [x.strip() for x in cells[0].split(":", 1)]
-        if len(cells) == 2 and NAME.fullmatch(plain(cells[0])) and cells[1].strip():
+        words = [plain(w) for w in (cells[0], cells[0].rpartition(" : ")[2])] if len(cells) == 2 else []
+        if any(NAME.fullmatch(w) for w in words) and cells[1].strip():
             return cells[1].strip()[:60]
     return ""
 

@@ -28,6 +28,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.units import FORCE, LENGTH, RATIO, STRESS, TIME, UNITS, factor, to_si
 
 TRUE, ENGINEERING = "true", "engineering"
+_BARE = ("time", "zeit", "temps", "tiempo", "czas", "时间", "時間")
 _OTHER_ROLE = {
     (TRAVEL, RATIO): STRAIN,
     (STRAIN, LENGTH): TRAVEL,
@@ -37,7 +38,13 @@ _OTHER_ROLE = {
 }
 _ROLE_OF = {TIME: TIME, LENGTH: TRAVEL, FORCE: FORCE, STRESS: STRESS}
 _ALIASES = {"displacement": TRAVEL, "deflection": TRAVEL, "extension": TRAVEL, "load": FORCE, "nominal_stress": STRESS}
-EXAMPLE = "--columns time_s,travel_mm,force_N"
+_ALIKE = 1e-3
+"""Columns that differ by no more than this part of their range are two copies of one signal."""
+
+
+def example(width: int) -> str:
+    """How ``--columns`` names so many columns."""
+    return f"--columns {'travel_mm,force_N' if width == 2 else 'time_s,travel_mm,force_N'}"
 
 
 @dataclass(frozen=True)
@@ -72,7 +79,7 @@ def candidates(block: NumberBlock, hints: Hints) -> list[PossibleColumn]:
         return _by_position(block, hints)
     found = [c for c in (_candidate(column, hints) for column in block.columns) if c is not None]
     if not hints.columns:
-        return found
+        return [c for c in found if not _empty(c.column, block)]
     said = {k: _pointed(v, block) for k, v in pairs_of(hints.columns, "--columns").items()}
     return _replaced(found, said, hints)
 
@@ -92,6 +99,9 @@ def best(
         return None
     top = max(c.score for c in of_role)
     equal = [c for c in of_role if c.score == top]
+    if len(equal) > 1 and role == TIME:  # "Time" beside "Video Time": the clock that needs no other word
+        bare = [c for c in equal if plain(c.column.name) in _BARE]
+        equal = bare if len(bare) == 1 else equal
     if len(equal) > 1 and not _alike(equal, block):
         names = " and ".join(f'"{c.column.header or c.column.at + 1}"' for c in equal[:4])
         first = equal[0].column
@@ -186,7 +196,8 @@ def _by_position(block: NumberBlock, hints: Hints) -> list[PossibleColumn]:
     names = [n.strip() for n in hints.columns.split(",")]
     if len(names) > len(block.columns):
         raise SettingsError(
-            f"--columns names {len(names)} columns, and the file has {len(block.columns)}", remedy=f"write {EXAMPLE}"
+            f"--columns names {len(names)} columns, and the file has {len(block.columns)}",
+            remedy=f"write {example(len(block.columns))}",
         )
     found = []
     for name, column in zip(names, block.columns, strict=False):
@@ -238,9 +249,22 @@ def _replaced(found: list[PossibleColumn], said: dict[str, ExportColumn], hints:
 
 
 def _alike(equal: Sequence[PossibleColumn], block: NumberBlock) -> bool:
-    """Whether columns hold the same numbers, so that it does not matter which is taken."""
+    """Whether columns hold the same signal, so that it does not matter which is taken."""
     columns = [[_at(block.sheet.cells(r), c.column.at) for r in block.rows] for c in equal]
-    return all(c == columns[0] for c in columns[1:]) and len({c.unit for c in equal}) == 1
+    if len({c.unit for c in equal}) > 1:
+        return False
+    if all(c == columns[0] for c in columns[1:]):
+        return True
+    numbers = [[block.sheet.marks.number(cell) for cell in column] for column in columns]
+    if any(value is None for column in numbers for value in column):
+        return False
+    values = np.array(numbers, dtype=float)
+    return bool(np.max(np.abs(values - values[0])) <= _ALIKE * np.ptp(values[0]))
+
+
+def _empty(column: ExportColumn, block: NumberBlock) -> bool:
+    """True for a column that is named and has nothing in any row: a channel that was not connected."""
+    return not any(_at(block.sheet.cells(row), column.at) for row in block.rows)
 
 
 def _refuse_unit(chosen: PossibleColumn, block: NumberBlock) -> None:

@@ -16,7 +16,7 @@ from bayesmembrane.data.exports.hints import Guess, Hints
 from bayesmembrane.data.exports.parts import facts_beside, part
 from bayesmembrane.data.exports.relations import gaps, jumps, speed_against
 from bayesmembrane.data.exports.sheets import Sheet
-from bayesmembrane.data.exports.signs import signed, zeroed, zeroed_force
+from bayesmembrane.data.exports.signs import carried, signed, zero_told, zeroed, zeroed_force
 from bayesmembrane.data.exports.strip import nominal_of, stretch_of
 from bayesmembrane.data.exports.words import COMPRESSION, CYCLE, STRAIN, STRETCH, TRAVEL, plain
 from bayesmembrane.data.motion import check_order, holds, legs
@@ -54,7 +54,7 @@ def curve_of(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: Sequence
         export.guess("sheet", block.sheet.name, "it has the readings", "--sheet")
     facts, remarks, name = facts_beside(sheets, blocks, block)
     film = film_of(facts, hints, name, export, grips=not {c.role for c in found} & {STRAIN, STRETCH})
-    export.lengths = [f for f in facts if f.name in ("gauge_length", "grip_length")]
+    export.lengths = [f for f in facts if f.name.endswith("length")]
     export.notes += remarks
     export.rows = trimmed(block, found)
     if len(export.rows) < 2:
@@ -190,6 +190,8 @@ def _strip(export: Export, film: Film, time: Array | None) -> dict[str, Array]:
     force = export.column(FORCE)
     stress, true = export.column(STRESS, "|engineering"), export.column(STRESS, "true")
     stretch, travel = stretch_of(export, film, force or stress or true)
+    force, stress, true = (carried(export, load) for load in (force, stress, true))
+    zero_told(export, force or stress or true, "force" if force is not None else "stress")
     nominal = nominal_of(export, film, (force, stress, true), stretch)
     if np.any(stretch <= 0):
         k = int(np.argmin(stretch))
@@ -270,10 +272,10 @@ def _refuse_nonsense(export: Export, columns: Mapping[str, Array]) -> None:
             raise DataError(
                 f"the {what} is the same in all rows", export.block.place, "check which column is which, --columns"
             )
-    text = plain(
-        " ".join(str(c) for r in range(min(20, len(export.block.sheet))) for c in export.block.sheet.cells(r)[:3])
-    )
+    above = [str(c) for r in range(min(20, len(export.block.sheet))) for c in export.block.sheet.cells(r)[:3]]
+    text = plain(" ".join([*above, *(c.header for c in export.block.columns if c.at in export.used)]))
     pulls = columns.get("stretch")
-    if pulls is not None and COMPRESSION.search(text) and float(np.max(pulls)) > 1.02 and not export.hints.sign:
+    longer = pulls is not None and float(np.max(pulls)) - 1 > max(1 - float(np.min(pulls)), 0.0)
+    if longer and COMPRESSION.search(text) and not export.hints.sign:
         fault = "the file speaks of compression, and the film gets longer in it"
         raise DataError(fault, export.block.place, "say --rig compression if it was pressed, --sign keep if not")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from bayesmembrane.data.exports.blocks import Fact, NumberBlock
-from bayesmembrane.data.exports.columns import EXAMPLE, PossibleColumn, Read, best, guess_of, read
+from bayesmembrane.data.exports.columns import PossibleColumn, Read, best, example, guess_of, read
 from bayesmembrane.data.exports.hints import Guess, Hints
 from bayesmembrane.ground.errors import DataError
 
@@ -42,7 +42,11 @@ class Export:
         found = self.column(role)
         if found is None:
             shown = ", ".join(c.header for c in self.block.columns if c.header)
-            raise DataError(f"there is no column of {role} among {shown}", self.block.place, f"name it, {EXAMPLE}")
+            raise DataError(
+                f"there is no column of {role} among {shown}",
+                self.block.place,
+                f"name it, {example(len(self.block.columns))}",
+            )
         return found
 
     @property

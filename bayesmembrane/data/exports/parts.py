@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from typing import Any
 
 from bayesmembrane.data.exports.blocks import Fact, NumberBlock, blocks_of, facts_of, name_in
-from bayesmembrane.data.exports.columns import EXAMPLE, PossibleColumn, candidates, has_curve
+from bayesmembrane.data.exports.columns import PossibleColumn, candidates, example, has_curve
 from bayesmembrane.data.exports.hints import Hints
 from bayesmembrane.data.exports.sheets import Sheet
-from bayesmembrane.data.exports.words import STRAIN, STRETCH, TRAVEL
+from bayesmembrane.data.exports.words import STRAIN, STRETCH, TRAVEL, names_result
 from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.units import FORCE, STRESS
+
+RESULTS = 30
+"""Fewer lines with a maximum, a modulus or a break among their names are results, one line a specimen."""
 
 
 def part(
@@ -77,13 +80,19 @@ def _refuse_columns(block: NumberBlock, hints: Hints) -> None:
     n = len(block.columns)
     if not names:
         fault = f"nothing above the {n} columns of numbers names them"
-        raise DataError(fault, block.place, f"name them in their order, {EXAMPLE}, with - for one that is not needed")
+        raise DataError(
+            fault, block.place, f"name them in their order, {example(n)}, with - for one that is not needed"
+        )
     found = candidates(block, hints)
     roles = {c.role for c in found}
     missing = "how far the film was pulled" if roles & {FORCE, STRESS} else "the force or stress"
     missing = missing if roles & {FORCE, STRESS, TRAVEL, STRAIN, STRETCH} else "travel and force"
     shown = ", ".join(names[:12])
-    raise DataError(f"no column is known to hold {missing} among {shown}", block.place, f"name them, {EXAMPLE}")
+    if len(block.rows) < RESULTS and sum(names_result(c.name) for c in block.columns) >= 2:
+        fault = f"the {len(block.rows)} lines of numbers seem to be results of whole tests ({shown})"
+        raise DataError(fault, block.place, f"export the readings of a test (raw data), or name them, {example(n)}")
+    fault = f"no column is known to hold {missing} among {shown}"
+    raise DataError(fault, block.place, f"name them, {example(n)}")
 
 
 def facts_beside(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from bayesmembrane.data.exports.columns import Read
@@ -18,16 +20,18 @@ NEAR = 0.05
 """A travel that starts within this part of its range starts near zero."""
 
 
+_FLIPS = {"keep": (1, 1), "flip": (-1, -1), "flip-force": (1, -1), "flip-travel": (-1, 1)}
+
+
 def signed(export: Export, x: Array, f: Array, free: bool) -> tuple[Array, Array]:
     """Travel and force so that both are positive where the film is pulled; ``free``: a push is a pull from below."""
     said = export.hints.sign
-    flips = {"keep": (1, 1), "flip": (-1, -1), "flip-force": (1, -1), "flip-travel": (-1, 1)}
     if said:
         export.guess("sign", said, "it was said", "--sign")
-        return flips[said][0] * x, flips[said][1] * f
+        return _FLIPS[said][0] * x, _FLIPS[said][1] * f
     at = int(np.argmax(np.abs(f)))
     back, pushed = bool(x[at] < x[0]), bool(f[at] < 0)
-    if not free and export.hints.rig and component("rigs", export.hints.rig).presses:
+    if _presses(export) and not free:
         if not back or not pushed:
             why = "the rig presses, and the file counts that as positive"
             export.guess("sign", "turned round where positive", why, "--sign")
@@ -35,19 +39,68 @@ def signed(export: Export, x: Array, f: Array, free: bool) -> tuple[Array, Array
     if not back and not pushed:
         return x, f
     if not free:
-        if back != pushed:
-            which = (
-                "force is negative and the travel goes on" if pushed else "travel goes back and the force is positive"
-            )
-            fault = f"where most is carried the {which}"
-            raise DataError(fault, export.block.place, "say --sign flip-force or flip-travel (pulled), or flip or keep")
+        _agree(export, back, pushed, "travel")
         export.guess("sign", "kept", "travel and force are negative, as in compression", "--sign")
         return x, f
     words = {(True, True): "travel and force are", (True, False): "the travel is", (False, True): "the force is"}
     why = f"{words[back, pushed]} negative where most is carried, and a lifted disc has both positive"
     turned = "both" if back and pushed else "travel" if back else "force"
     export.guess("sign", f"{turned} turned round", why, "--sign")
-    return (-x if back else x), (-f if pushed else f)
+    return (0.0 - x if back else x), (0.0 - f if pushed else f)
+
+
+def _presses(export: Export) -> bool:
+    rig = export.hints.rig
+    return bool(rig) and component("rigs", rig).presses
+
+
+def _agree(export: Export, back: bool, pushed: bool, what: str) -> None:
+    """Raise `DataError` where a strip gets longer under a push, or shorter under a pull."""
+    if back != pushed:
+        which = f"force is negative and the {what} goes on" if pushed else f"{what} goes back and the force is positive"
+        pulled, pressed = ("flip-force", "flip-travel") if pushed else ("flip-travel", "flip-force")
+        remedy = f"say --sign {pulled} if it was pulled, {pressed} if it was pressed"
+        raise DataError(f"where most is carried the {which}", export.block.place, remedy)
+
+
+def lengthened(export: Export, e: Array, travel: Array | None, load: Read | None) -> Array:
+    """A strip's own strain, positive where it gets longer, as `signed` does it with its travel (N,) m."""
+    f = load.values if load is not None else np.zeros(e.size)
+    at = int(np.argmax(np.abs(f)))
+    back = bool(e[at] < e[0])
+    if export.hints.sign:
+        raw_back = bool(travel is not None and travel[at] < travel[0])
+        turn = _FLIPS[export.hints.sign][0] < 0 and (travel is None or raw_back != back)
+        return -e if turn else e
+    if _presses(export):
+        if travel is None and not back:
+            why = "the rig presses, and the file counts that as positive"
+            export.guess("sign", "turned round where positive", why, "--sign")
+        return e if back else -e
+    if travel is None and f[at]:
+        _agree(export, back, bool(f[at] < 0), "strain")
+    return e
+
+
+def carried(export: Export, load: Read | None) -> Read | None:
+    """A strip's force or stress, positive where it is pulled, and from its start if that was said."""
+    if load is None:
+        return None
+    f = load.values
+    if export.hints.sign:
+        f = _FLIPS[export.hints.sign][1] * f
+    elif _presses(export) and f[int(np.argmax(np.abs(f)))] > 0:
+        f = -f
+    return replace(load, values=f - f[0] if "force" in export.hints.zero else f)
+
+
+def zero_told(export: Export, load: Read | None, what: str) -> None:
+    """Say where the force of a strip is zero, if it does not start there."""
+    if load is not None:
+        if "force" in export.hints.zero:
+            export.guess(f"zero of the {what}", "where it starts", "it was said", "--zero")
+        else:
+            _as_it_is(export, load.values, what)
 
 
 def zeroed(export: Export, travel: Read, x: Array, f: Array) -> Array:
@@ -95,9 +148,13 @@ def zeroed_force(export: Export, f: Array) -> Array:
     if "force" in said:
         export.guess("zero of the force", f"{start:.4g} N", "it was said: where it starts", "--zero")
         return f - start
-    if abs(start) > 0.01 * float(np.max(np.abs(f))):
-        share = f"{100 * abs(start) / float(np.max(np.abs(f))):.2g} % of the largest"
-        export.guess(
-            "zero of the force", "as the file has it", f"its start at {share} may be a preload", "--zero force"
-        )
+    _as_it_is(export, f, "force")
     return f
+
+
+def _as_it_is(export: Export, f: Array, what: str) -> None:
+    """Say that a force does not start at zero and was left so."""
+    start, largest = abs(float(f[0])), float(np.max(np.abs(f)))
+    if start > 0.01 * largest:
+        why = f"its start at {100 * start / largest:.3g} % of the largest may be a preload"
+        export.guess(f"zero of the {what}", "as the file has it", why, "--zero force")

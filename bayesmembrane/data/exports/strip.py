@@ -10,7 +10,7 @@ from bayesmembrane.data.exports.columns import Read, best, read
 from bayesmembrane.data.exports.export import Export
 from bayesmembrane.data.exports.film import Film
 from bayesmembrane.data.exports.relations import contradiction, gauge_length_behind, logarithmic_length_behind
-from bayesmembrane.data.exports.signs import signed, zeroed
+from bayesmembrane.data.exports.signs import lengthened, signed, zeroed
 from bayesmembrane.data.exports.words import STRAIN, STRETCH, TRAVEL
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
@@ -21,7 +21,7 @@ def stretch_of(export: Export, film: Film, load: Read | None) -> tuple[Array, Ar
     roles = {c.role for c in export.found}
     travel = _travel(export, load) if TRAVEL in roles else None
     by_length = 1.0 + travel / film.length if travel is not None and film.length else None
-    stated = _stated_stretch(export, travel) if roles & {STRAIN, STRETCH} else None
+    stated = _stated_stretch(export, travel, load) if roles & {STRAIN, STRETCH} else None
     if by_length is not None and (stated is None or export.hints.gauge_length):
         if stated is not None:
             export.contradict(
@@ -32,7 +32,9 @@ def stretch_of(export: Export, film: Film, load: Read | None) -> tuple[Array, Ar
         )
         return by_length, travel
     if stated is None:
-        fault = "the travel cannot become a stretch: the gauge length is not known"
+        others = ", ".join(f'"{f.words}" ({f.place})' for f in export.lengths if f.name in ("length", "strain_length"))
+        told = f", and nothing says whether it is {others}" if others else ""
+        fault = f"the travel cannot become a stretch: the gauge length is not known{told}"
         raise DataError(fault, export.block.place, "say --gauge-length-mm")
     if by_length is not None:
         export.contradict(
@@ -48,7 +50,7 @@ def _travel(export: Export, load: Read | None) -> Array:
     return zeroed(export, travel, x, f)
 
 
-def _stated_stretch(export: Export, travel: Array | None) -> Array:
+def _stated_stretch(export: Export, travel: Array | None, load: Read | None) -> Array:
     """1 + e, exp(e) or l, as the file's column of strain or stretch says."""
     stretch = export.column(STRETCH)
     if stretch is not None:
@@ -67,6 +69,7 @@ def _stated_stretch(export: Export, travel: Array | None) -> Array:
     if not kind and float(np.min(e)) > 0.9 and abs(e[0] - 1) < 0.1:
         fault = f"{name} is called a strain and starts at {e[0]:g}, as a stretch does"
         raise DataError(fault, export.block.place, "say --strain stretch, or engineering if it is one")
+    e = lengthened(export, e, travel, load)
     if "travel" in export.hints.zero:
         e = e - e[0]
     elif abs(e[0]) > 0.01 * float(np.ptp(e)):
@@ -97,7 +100,7 @@ def _unnamed_strain(export: Export, name: str, e: Array, travel: Array | None) -
 def _against_length(export: Export, length: float) -> None:
     """A contradiction if the export states another length than the one that its strain is made with."""
     for fact in export.lengths:
-        if abs(fact.value / length - 1) > 0.02:
+        if fact.name != "strain_length" and fact.name != "length" and abs(fact.value / length - 1) > 0.02:
             export.contradict(
                 f'the strain is the travel over {1e3 * length:.5g} mm, and "{fact.words}" ({fact.place}) is not'
             )

@@ -34,7 +34,7 @@ _ROLE = {
     r"|deplacement|allongement|course|fleche|desplazamiento|alargamiento|carrera|elongacion|posicion|recorrido"
     r"|przemieszczenie|wydluzenie|droga|przesuniecie|ugiecie|位移|伸长|行程|变形|挠度|横梁",
     FORCE: r"force|load|\w*kraft|\w*last|charge|effort|fuerza|carga|sila|obciazenie|力|载荷|负荷|荷重|荷载",
-    TIME: r"time|\w*zeit|temps|tiempo|czas|elapsed|时间|時間",
+    TIME: r"time|\w*zeit|temps|tiempo|czas|godzina|elapsed|时间|時間",
 }
 _PATTERN = {role: re.compile(rf"(?<![a-z])(?:{words})(?![a-z])") for role, words in _ROLE.items()}
 _SYMBOLS = {
@@ -54,7 +54,10 @@ _LOGARITHMIC = re.compile(r"log|logarithmic\w*|logarithmisch\w*|hencky|ln")
 _ASIDE = re.compile(
     r"soll\w*|\w+sollwert|set ?point|command|cmd|target|demand|consigne|max|maximum|maximal\w*|min|minimum|peak|break"
     r"|bruch|rupture|yield|modulus|modul|mean|average|preset|fmax|ultimate|transverse|lateral|quer|width|breite|break"
-    r"|preload|vorkraft|start|datum|date|temperature|temperatur|green|lagrange|almansi|energy|arbeit|work|error|desviacion|最大"
+    r"|torque|\w*moment|rotation|angle|\w*winkel|twist|couple|preload|vorkraft|start|datum|date|temperature|temperatur|green|lagrange|almansi|energy|arbeit|work|error|desviacion|最大"
+)
+_RESULT = re.compile(
+    r"max|maximum|min|minimum|peak|break|bruch|rupture|yield|modulus|modul|mean|average|ultimate|fmax|最大"
 )
 _SD = re.compile(r"sd|std|stdev|standard deviation|standardabweichung")
 _ABSOLUTE = re.compile(r"abs|absolute?\w*|position|posicion|posicao|pos|位置")
@@ -66,7 +69,8 @@ FACTS = {
     "gauge_length": (
         LENGTH,
         r"gauge length|gage length|\w*messlange|\w*messlaenge|lo|l0|longueur (?:initiale|utile|de reference)"
-        r"|longitud (?:calibrada|inicial|de referencia)|dlugosc pomiarowa|initial length|original length|标距|原始标距",
+        r"|longueur entre reperes|distancia inicial|longitud (?:calibrada|inicial|de referencia)|dlugosc pomiarowa"
+        r"|initial length|original length|标距|原始标距",
     ),
     "grip_length": (
         LENGTH,
@@ -79,15 +83,24 @@ FACTS = {
     "diameter": (LENGTH, r"diameter|\w*durchmesser|diametre|diametro|srednica|直径"),
     "speed": (
         SPEED,
-        r"(?:test |crosshead |cross head )?speed|\w*prufgeschwindigkeit|vitesse\w*|velocidad\w*|predkosc|速度|v1",
+        r"(?:test |crosshead |cross head )?speed|\w*prufgeschwindigkeit|vitesse\w*|velocidad\w*|predkosc|速度|v1"
+        r"|test (?:rate|tempo)(?: 1)?$|(?:crosshead|cross head) rate",
     ),
+    "strain_length": (LENGTH, r"(?!)"),
+    "length": (LENGTH, r"(?:length|lange|longueur|longitud|dlugosc|长度)$"),
 }
+"""What a preamble says of specimen and test. ``strain_length`` is that of a strain of its own, an extensometer's;
+``length`` is one that does not say whether it is free, total or gauge length: both are told and not used."""
 _FACT = {name: re.compile(rf"(?<![a-z])(?:{words})(?![a-z0-9])") for name, (_, words) in FACTS.items()}
 NAME = re.compile(
     r"(?:specimen|sample)(?: (?:name|id|label|designation|identifier))?|probenbezeichnung|probe|probenname"
+    r"|proben ?beschriftung|etykiet\w* probki|etiqueta de la probeta"
     r"|aktuelle probe|eprouvette|nom de l eprouvette|probeta|muestra|probka|试样|试样名称|样品"
 )
-COMPRESSION = re.compile(r"compress\w*|druckversuch|druckl?versuch|stauch\w*|compresion|sciskanie|压缩")
+_EXTENSOMETER = re.compile(
+    r"exten[sz]ometer\w*|extensometr\w*|extensometre|langenanderungsaufnehmer|ekstensometr\w*|引伸计"
+)
+COMPRESSION = re.compile(r"compress\w*|druck(?:versuch|spannung|kraft)|\w*stauch\w*|compresion|sciska\w*|压缩|壓縮")
 
 _AREAS = {"mm2": 1e-6, "cm2": 1e-4, "m2": 1.0, "in2": 0.0254**2}
 _UNIT_WORDS = {
@@ -97,10 +110,13 @@ _UNIT_WORDS = {
     "microns": "um", "newton": "N", "newtons": "N", "牛": "N", "牛顿": "N", "千牛": "kN", "kp": "kgf",
     "lb": "lbf", "lbs": "lbf", "lb_f": "lbf", "pounds": "lbf", "兆帕": "MPa", "pct": "percent", "prozent": "percent",
     "kg_per_cm2": "kgf_per_cm2", "kp_per_cm2": "kgf_per_cm2", "kg_per_mm2": "kgf_per_mm2", "lbf_per_in2": "psi",
+    "microstrain": "um_per_m", "ustrain": "um_per_m", "uε": "um_per_m", "με": "um_per_m", "ue": "um_per_m",
     "in_per_in": "mm_per_mm", "m_per_m": "m_per_m", "cm_per_cm": "mm_per_mm", "nmm-2": "N_per_mm2",
     "mm_per_mn": "mm_per_min", "in_per_minute": "in_per_min", "mm_per_sec": "mm_per_s",
 }  # fmt: skip
 _MASSES = {"kg": "kgf", "g": "gf"}
+_MOMENT = re.compile(r"[kKmM]?N ?[·⋅*.]? ?[cm]?m")
+"""A unit of a moment, which without its sign would look like a nanometre."""
 _LOWER = {name.lower(): name for name in UNITS if name not in ("mN", "m", "h", "") and len(name) > 0}
 
 
@@ -118,12 +134,11 @@ def unit_of(text: str, quantity: str = "") -> str:
     Masses are forces only where ``quantity`` says that a force is meant.
     """
     bare = unicodedata.normalize("NFKC", text).strip().strip("[]()<>{}\"' ").strip().rstrip(".")
-    bare = bare.replace("·", "").replace("**", "").replace("⁻", "-")
     if bare in ("-", "1", "—", "–"):
         return "one"
-    if not bare or len(bare) > 12:
+    if not bare or len(bare) > 12 or _MOMENT.fullmatch(bare):
         return ""
-    name = spelled(bare)
+    name = spelled(bare.replace("·", "").replace("**", "").replace("⁻", "-").replace("−", "-"))
     low = name.lower()
     found = name if name in UNITS else _UNIT_WORDS.get(low, "") or _LOWER.get(low, "")
     if not found and quantity in (FORCE, ""):
@@ -199,6 +214,11 @@ def reading_of(name: str) -> Reading:
 ROLES_BY_RANK = (SPEED, CYCLE, STRETCH, STRAIN, STRESS, TRAVEL, FORCE, TIME)
 
 
+def names_result(name: str) -> bool:
+    """Whether a name is that of what is read off a whole test, as a maximum or a modulus."""
+    return bool(_RESULT.fullmatch(reading_of(name).aside))
+
+
 def _word(pattern: re.Pattern[str], text: str) -> bool:
     return bool(re.search(rf"(?<![a-z])(?:{pattern.pattern})(?![a-z])", text))
 
@@ -206,9 +226,16 @@ def _word(pattern: re.Pattern[str], text: str) -> bool:
 def fact_of(key: str) -> str:
     """Which fact of specimen or test a key of the preamble names, "" if none."""
     text = plain(key)
-    if len(text) > 60 or re.search(r"(?<![a-z])(?:modul\w*|e modul|strain|dehnung|end|ende)(?![a-z])", text):
+    if len(text) <= 90 and _FACT["gauge_length"].search(text):
+        if _EXTENSOMETER.search(text):
+            return "strain_length"
+        if _PATTERN[STRAIN].search(text):
+            return "gauge_length" if _PATTERN[TRAVEL].search(text) else "strain_length"
+    if len(text) > 60 or re.search(
+        r"(?<![a-z])(?:modul\w*|e modul|strain|dehnung|end|ende|final\w*|koncow\w*|最终)(?![a-z])", text
+    ):
         return ""
-    for name in ("grip_length", "gauge_length", "area", "thickness", "width", "diameter", "speed"):
+    for name in ("grip_length", "gauge_length", "area", "thickness", "width", "diameter", "speed", "length"):
         if _FACT[name].search(text):
             return name
     return ""

@@ -20,6 +20,12 @@ MM, LONGEST = 1e3 * TRAVEL, 5.0
 _HEAD = '"Results Table 1"\n"","Maximum Load","Extension at Break"\n"","(N)","(mm)"\n"1","0.51","20.0"\n\n"Raw Data"\n'
 _ZWICK = '"Probendicke a0"\t0.5\t"mm"\n"Probenbreite b0"\t10\t"mm"\n"Messlänge"\t50\t"mm"\n'
 _MTS = "MTS793|MPT|DEU|x|x|,|.|:|49|1|1|A\n\nDatenerfassung\t\tZeit:\t3,5\ts\n"
+_SPANISH = """Deformación : Deformación por tracción (Extensión) distancia inicial,"50.00000",mm
+Propiedades de la probeta : Anchura,"10.00000",mm
+Propiedades de la probeta : Anchura final,"9.00000",mm
+Propiedades de la probeta : Espesor,"0.50000",mm
+
+"""
 _SIZE = 0 * TIME + 50
 
 FILES: dict[str, bytes] = {
@@ -27,6 +33,8 @@ FILES: dict[str, bytes] = {
     "delimited": lines("Czas [s];Wydłużenie [mm];Siła [N]", TIME, MM, FORCE, sep=";", decimal=",").encode("cp1250"),
     "delimited, strain": lines("Strain (%),Stress (MPa)", 100 * (STRETCH - 1), STRESS / 1e6).encode(),
     "delimited, Chinese": lines("时间(s)\t位移(mm)\t力(N)", TIME, MM, FORCE, sep="\t").encode("gbk"),
+    "delimited, Spanish": lines(("Tiempo,Extensión,Carga", "(s),(mm),(N)"), TIME, MM, FORCE, quote=True, form="%.5f",
+                                before=_SPANISH, end="\r\n").encode("cp1252"),
     "zwick": lines(('"Prüfzeit"\t"Standardweg"\t"Standardkraft"', '"s"\t"mm"\t"N"'), TIME, MM, FORCE, sep="\t",
                    before=_ZWICK, form="%.6f").encode("cp1252"),
     "instron": lines(('"Time","Extension","Load"', '"(s)","(mm)","(N)"'), TIME, MM, FORCE, quote=True, before=_HEAD,
