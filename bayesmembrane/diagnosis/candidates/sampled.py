@@ -32,17 +32,17 @@ class Sampled:
 
     difference : ln Z less that of the linear model
     sd : standard error of it
-    effective : draws that count, (sum w)^2 / sum w^2
+    efficiency : part of the draws that counts, (sum w)^2 / (n sum w^2)
     """
 
     difference: float
     sd: float
-    effective: float
+    efficiency: float
 
     @property
     def good(self) -> bool:
-        """Whether it can be relied on."""
-        return self.effective >= SAMPLED.least_effective
+        """Whether it can be relied on: of a proposal that misses a part of a valley few draws count."""
+        return self.efficiency >= SAMPLED.least_efficiency
 
 
 def checked(search: Weighing, candidate: Candidate, rng: np.random.Generator) -> Candidate:
@@ -76,7 +76,7 @@ def sampled(search: Weighing, candidate: Candidate, rng: np.random.Generator) ->
         return Sampled(-np.inf, np.inf, 0.0)
     log_z = float(np.logaddexp.reduce(weights) - np.log(weights.size))
     sd = float(np.sqrt(max(1 / effective - 1 / weights.size, 0.0)))
-    return Sampled(log_z - target.linear, sd, effective)
+    return Sampled(log_z - target.linear, sd, effective / weights.size)
 
 
 @dataclass(frozen=True, eq=False)
