@@ -98,7 +98,7 @@ def test_draws_have_the_covariance(noise: Noise, given: str) -> None:
     assert bound.sd(x[:1])[0] == pytest.approx(np.sqrt(np.diag(sigma)))
     z = bound.draw(x, np.random.default_rng(SEED + 4))
     root = np.sqrt(np.diag(sigma))
-    assert np.max(np.abs(np.cov(z.T) - sigma) / np.outer(root, root)) < 0.04
+    assert np.max(np.abs(np.cov(z.T) - sigma) / np.outer(root, root)) < 0.06  # six deviations of a variance
 
 
 @pytest.mark.parametrize("noise", MODELS, ids=lambda n: n.name)
@@ -151,11 +151,12 @@ def test_stated_noise_alone_must_be_stated() -> None:
 def test_a_filter_of_readings_is_found_where_the_speed_changes() -> None:
     """Every reading remembers half of the one before, on a slow leg and on one ten times as fast alike."""
     rng = np.random.default_rng(SEED + 9)
-    r = rng.standard_normal(400)
+    n = 2400  # the deviation of a correlation found from so many is 0.018
+    r = rng.standard_normal(n)
     for i in range(1, r.size):
         r[i] = 0.5 * r[i - 1] + np.sqrt(0.75) * r[i]
-    time = np.cumsum(np.where(np.arange(400) < 200, 1.0, 0.1))
-    d = np.linspace(1e-3, 0.04, 400)
+    time = np.cumsum(np.where(np.arange(n) < n // 2, 1.0, 0.1))
+    d = np.linspace(1e-3, 0.04, n)
     m = Measurement(d, 100 * d, Annulus(0.01, 0.035), Specimen("film", 5e-5), time=time)
     by_reading, by_time = (components("noise")[n]().bind(m) for n in ("ar1_readings", "ar1"))
     lengths = np.linspace(-2.0, 3.0, 101)
