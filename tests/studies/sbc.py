@@ -49,12 +49,15 @@ SCALED = "noise.ln_sd"
 
 @dataclass(frozen=True)
 class Design:
-    """What is calibrated: a hypothesis, whether the noise is stated, and how many replicates there are to be."""
+    """What is calibrated: a hypothesis, whether the noise is stated, how many replicates there are to be, and whether the
+    disc comes back although nothing in the hypothesis remembers.
+    """
 
     name: str
     hypothesis: Hypothesis
     stated: bool = False
     replicates: int = VARIATIONS
+    cyclic: bool = False
 
 
 def designs() -> Iterator[Design]:
@@ -70,6 +73,7 @@ def designs() -> Iterator[Design]:
         yield Design(f"{name}, zero offset", hypothesis(name, ["zero_offset"]))
         yield Design(f"{name}, viscoelastic", hypothesis(name, ["viscoelastic"]))
         yield Design(f"{name}, form error", hypothesis(name, (), "form"))
+        yield Design(f"{name}, form error, up and down", hypothesis(name, (), "form"), cyclic=True)
 
 
 def readings(force: Array | None = None, sd: float | None = None, cyclic: bool = False) -> Measurement:
@@ -100,7 +104,7 @@ def replicate(design: Design, number: int) -> dict[str, Any]:
     """Ranks of one truth: of every coordinate, of the force at the end, and of the log likelihood."""
     rng = np.random.default_rng([SEED, number, *design.name.encode()])
     h = design.hypothesis
-    blank = readings(sd=GIVEN if design.stated else None, cyclic=bool(h.effects))
+    blank = readings(sd=GIVEN if design.stated else None, cyclic=design.cyclic or bool(h.effects))
     asked = Posterior(h, blank)
     x = truth(asked, rng)
     # Plain films come from the other solver; effects and form errors are put on top by the only code that knows them.
