@@ -1,7 +1,8 @@
 """How often 90 % intervals hold with the right effect named, by white noise and with a form error.
 
 Parameters and the force of the film itself, without faults, at half and at the end of the range. Posteriors are
-linearised in the parameters of the curve at their mode and exact in those of the noise. One line of JSON a case.
+linearised in the parameters of the curve at their mode, the prior as the square of a root that is linear there, and
+exact in those of the noise. One line of JSON a case.
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ DRAWS = 400
 FINE, COARSE = (1.45, 9, 7), (3.2, 5, 5)
 """Steps of the noise's logarithm in its own deviations, nodes of eta_a, and of every other coordinate."""
 RATIOS = (-2.5, -0.75, 1.0, 2.75, 4.5)  # ln of the error where nothing is steady over that of all readings
+LEVEL = 0.1  # of a prior that is level: as if its deviation were ten times as large
 AT_ONCE, FAR = 500, 20.0  # nodes; nats below the most probable one that count for nothing
 INTERVAL, PLACES, FORCES = (0.05, 0.95), (0.5, 1.0), ("half", "end")
 MATERIALS = ("neo_hookean", "mooney_rivlin", "gent", "yeoh")
@@ -102,8 +104,8 @@ def truth_of(h: Hypothesis, data: Dataset) -> Array:
 class Line:
     """A posterior whose curve is a line in its parameters about ``x`` (1, k): F + J (x' - x), white noise inferred.
 
-    force (1, N), residual (N,), slopes (N, k); nodes (M, m) of the noise's coordinates with log_prior (M,) and log_weights (M,), and means
-    (M, k) and covariances (M, k, k) of x' - x at each.
+    force (1, N), residual (N,), slopes (N, k); nodes (M, m) of the noise's coordinates with log_prior (M,) and
+    log_weights (M,), and means (M, k) and covariances (M, k, k) of x' - x at each.
     """
 
     posterior: Posterior
@@ -163,12 +165,12 @@ def _line(posterior: Posterior, objective: Objective, x: Array, grid: tuple[floa
     every = np.concatenate([columns, slopes, residual[:, None]], axis=1)
     c, k = columns.shape[1], slopes.shape[1]
     nodes, prior, louder = _nodes(h, residual / scale, float(local_size(force[0])) / scale, grid)
-    pull, offset = np.diag(objective.spread**-2), objective.centre - x[0]
+    pull, by_x = (v[0] for v in pulls(objective, x))
     added = np.zeros((c + k + 1, c + k + 1))
     added[:c, :c] = np.eye(c)
-    added[c:-1, c:-1] = pull
-    added[c:-1, -1] = added[-1, c:-1] = pull @ offset
-    added[-1, -1] = offset @ pull @ offset
+    added[c:-1, c:-1] = np.diag(by_x**2)
+    added[c:-1, -1] = added[-1, c:-1] = -by_x * pull
+    added[-1, -1] = pull @ pull
     kinds, kind = np.unique(np.column_stack([louder, nodes[:, -1]]), axis=0, return_inverse=True)
     log_weights, roots = np.empty(len(nodes)), np.empty((len(nodes), k + 1, k + 1))
     for number, (ratio, length) in enumerate(kinds):
@@ -248,15 +250,33 @@ def _nodes(h: Hypothesis, share: Array, scale: float, grid: tuple[float, int, in
     return np.column_stack([nodes[:, [0, 2]], level, nodes[:, 3:]]), log_prior, louder
 
 
-def _residuals(objective: Objective, inverse: Array) -> Any:
-    pull = np.diag(1 / objective.spread)
+def pulls(objective: Objective, x: Array) -> tuple[Array, Array]:
+    """(r, dr/dx), (B, k) each, with r^2 / 2 what the prior's logarithm lies below its largest value at x (B, k)."""
+    r, by_x = np.zeros(x.shape), np.zeros(x.shape)
+    for i, (p, sd) in enumerate(zip(objective.parameters, objective.spread, strict=True)):
+        # Of what can only be positive the most probable is often the bound.
+        grid = np.concatenate([p.prior.quantile(np.linspace(1e-4, 1 - 1e-4, 2001)), p.bounds])
+        density = p.prior.log_density(grid)
+        density[~np.isfinite(density)] = -np.inf
+        mode, top = grid[np.argmax(density)], np.max(density)
+        h = 1e-5 * sd
+        high, at, low = (p.prior.log_density(x[:, i] + s) for s in (h, 0.0, -h))
+        slope = np.where(np.isfinite(low), (high - low) / (2 * h), (high - at) / h)
+        r[:, i] = np.sign(x[:, i] - mode) * np.sqrt(2 * np.maximum(top - at, 0.0))
+        steep = np.abs(r[:, i]) > 1e-3
+        by_x[:, i] = np.where(steep, -slope / np.where(steep, r[:, i], 1.0), LEVEL / sd)
+    return r, by_x
 
+
+def _residuals(objective: Objective, inverse: Array) -> Any:
     def residuals(x: Array) -> tuple[Array, Array]:
         r, j = objective.batch(x)
-        wide = np.broadcast_to(pull, (len(x), *pull.shape))
+        pull, by_x = pulls(objective, x)
         return (
-            np.concatenate([r @ inverse.T, (x - objective.centre) / objective.spread], axis=1),
-            np.concatenate([np.einsum("mn,bnk->bmk", inverse, j, optimize=True), wide], axis=1),
+            np.concatenate([r @ inverse.T, pull], axis=1),
+            np.concatenate(
+                [np.einsum("mn,bnk->bmk", inverse, j, optimize=True), by_x[:, :, None] * np.eye(x.shape[1])], axis=1
+            ),
         )
 
     return residuals
@@ -290,6 +310,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--energy", default="", help="median,spread of the prior of eta_a, instead of its own")
     parser.add_argument("--law", default="", help="the same of eta_e")
     parser.add_argument("--half", choices=("even", "odd", "all"), default="all", help="which seeds")
+    parser.add_argument("--only", default="", help="cases with one of these effects, by comma")
     parser.add_argument("--steady", action="store_true", help="no error at starts, turns and slack ends")
     asked = parser.parse_args(arguments)
     if asked.steady:
@@ -301,7 +322,8 @@ def main(arguments: list[str] | None = None) -> int:
     asked.results.parent.mkdir(parents=True, exist_ok=True)
     done, end = stored(asked.results), time.monotonic() + asked.seconds
     halves = {"all": (0, 1), "even": (0,), "odd": (1,)}[asked.half]
-    chosen = [c for c in islice(cases(asked.seed), asked.limit) if c.seed % 2 in halves]
+    some = (c for c in cases(asked.seed) if not asked.only or any(n in c.kind for n in asked.only.split(",")))
+    chosen = [c for c in islice(some, asked.limit) if c.seed % 2 in halves]
     for case in chosen:
         for noise in asked.noise.split(","):
             key = f"{case.key}|{noise}{' steady' * asked.steady}"

@@ -49,8 +49,9 @@ SCALED = "noise.ln_sd"
 
 @dataclass(frozen=True)
 class Design:
-    """What is calibrated: a hypothesis, whether the noise is stated, how many replicates there are to be, and whether the
-    disc comes back although nothing in the hypothesis remembers.
+    """What is calibrated: a hypothesis, whether the noise is stated, how many replicates there are to be.
+
+    cyclic : whether the disc comes back although nothing in the hypothesis remembers
     """
 
     name: str
