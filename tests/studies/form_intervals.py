@@ -52,6 +52,7 @@ FINE, COARSE = (1.45, 9, 7), (3.2, 5, 5)
 """Steps of the noise's logarithm in its own deviations, nodes of eta_a, and of every other coordinate."""
 RATIOS = (-2.5, -0.75, 1.0, 2.75, 4.5)  # ln of the error where nothing is steady over that of all readings
 LEVEL = 0.1  # of a prior that is level: as if its deviation were ten times as large
+OUTSIDE = 6.0  # deviations from the mode, where a prior is zero within its bounds
 AT_ONCE, FAR = 500, 20.0  # nodes; nats below the most probable one that count for nothing
 INTERVAL, PLACES, FORCES = (0.05, 0.95), (0.5, 1.0), ("half", "end")
 MATERIALS = ("neo_hookean", "mooney_rivlin", "gent", "yeoh")
@@ -261,10 +262,12 @@ def pulls(objective: Objective, x: Array) -> tuple[Array, Array]:
         mode, top = grid[np.argmax(density)], np.max(density)
         h = 1e-5 * sd
         high, at, low = (p.prior.log_density(x[:, i] + s) for s in (h, 0.0, -h))
-        slope = np.where(np.isfinite(low), (high - low) / (2 * h), (high - at) / h)
-        r[:, i] = np.sign(x[:, i] - mode) * np.sqrt(2 * np.maximum(top - at, 0.0))
-        steep = np.abs(r[:, i]) > 1e-3
-        by_x[:, i] = np.where(steep, -slope / np.where(steep, r[:, i], 1.0), LEVEL / sd)
+        with np.errstate(invalid="ignore"):
+            slope = np.where(np.isfinite(low), (high - low) / (2 * h), (high - at) / h)
+        far = np.where(np.isfinite(at), np.sqrt(2 * np.maximum(top - at, 0.0)), OUTSIDE)
+        r[:, i] = np.sign(x[:, i] - mode) * far
+        steep = (far > 1e-3) & np.isfinite(at) & np.isfinite(slope)
+        by_x[:, i] = np.where(steep, -np.where(steep, slope, 0.0) / np.where(steep, r[:, i], 1.0), LEVEL / sd)
     return r, by_x
 
 
