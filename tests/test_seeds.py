@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.seeds import NAME, NUMPY, move, moved
-from tests.studies.seeds import GROUPS, ROOT, Row, page
+from tests.studies.seeds import GROUPS, ROOT, Heard, Row, missing, page
 
 
 def test_an_offset_moves_every_seed_of_whole_numbers() -> None:
@@ -36,3 +36,20 @@ def test_the_files_of_the_study_exist_and_its_table_counts() -> None:
         assert all((ROOT / f).exists() for f in files), files
     rows = [Row("quick", s, "wide", "a::b", "failed" if s == 2 else "passed", 0.5) for s in (1, 2, 3)]
     assert "| quick | `a::b` | 3 | 2 | 0 | - | 0.5 |" in page(rows)
+
+
+def test_seeds_go_on_where_they_were_by_group_and_arithmetic() -> None:
+    rows = [Row("quick", s, "wide", "a::b", "passed", 0.5) for s in (1, 2, 4)]
+    assert missing("quick", "wide", 5, rows) == [3, 5]
+    assert missing("quick", "off", 2, rows) == missing("slow", "wide", 2, rows) == [1, 2]
+    assert len(missing("quick", "off", None, rows)) == GROUPS["quick"][0]
+
+
+def test_a_test_is_as_bad_as_the_worst_of_its_parts() -> None:
+    heard = Heard()
+    for outcome in ("passed", "failed", "passed"):
+        heard.pytest_runtest_logreport(
+            pytest.TestReport("a.py::b", ("a.py", 1, "b"), {}, outcome, None, "call", duration=0.5)  # type: ignore[arg-type]
+        )
+    assert heard.outcomes == {"a.py::b": "failed"}
+    assert heard.seconds == {"a.py::b": 1.5}

@@ -1,11 +1,13 @@
 """No energy is exact and no machine follows a textbook's law: how far both may be off, as smooth relative errors.
 
-    F_true = F (1 + eta_a u(state)) + sum_e eta_e t_e v_e(progress) + m F w(state),     u, v_e, w ~ GP(0, K),
+    F_true = F (1 + eta_a u(state)) + sum_e eta_e t_e v_e(progress) + m F w(state) + eta_l F_max z 1[unsteady],
+    u, v_e, w ~ GP(0, K),     z ~ N(0, 1) at each reading,
 
 with t_e the trace of effect e, what it changes of the force, and m what effects may take of the film's own force or
-leave to it: `MIXED` times the size of their traces over that of the force, up to `MOST_MIXED`. Beside the noise S of
-the readings the covariance is S + (eta_a^2 + m^2) D_F K_u D_F + sum_e eta_e^2 D_t K_v D_t, with D of F and t on their
-diagonals: of low rank, as K is smooth.
+leave to it: `MIXED` times the size of their traces over that of the force, up to `MOST_MIXED`. A reading is unsteady
+where the test starts, turns or goes slack. Beside the noise S of the readings the covariance is
+S + (eta_a^2 + m^2) D_F K_u D_F + sum_e eta_e^2 D_t K_v D_t + (eta_l F_max)^2 P, with D of F and t on their diagonals, P
+with ones at the unsteady readings: but for P of low rank, as K is smooth.
 
 An energy knows no history: its error is a function of the state alone, the deflection (and the stretch across, where
 that was measured). A law's error may differ from leg to leg: it is a function of the progress of the test.
@@ -206,7 +208,7 @@ def form_columns(
     ``traces`` (E, N) N; of what these and the film mix; at last of what is not steady.
     """
     laws = [trace for effect, trace in zip(effects, traces, strict=True) if not effect.exact]
-    local = [] if factors.local is None else [(LOCAL, float(np.max(np.abs(force))) * factors.local)]
+    local = [] if factors.local is None else [(LOCAL, float(local_size(force)) * factors.local)]
     mix = [(None, float(mixed(force, np.array(laws))) * force[:, None] * factors.state)] if laws else []
     return [
         (ENERGY, force[:, None] * factors.state),
@@ -214,6 +216,11 @@ def form_columns(
         *mix,
         *local,
     ]
+
+
+def local_size(force: Array) -> Array:
+    """F_max (...) = max |F| of forces F (..., N): to what an error at starts, turns and slack ends is relative."""
+    return np.asarray(np.max(np.abs(force), axis=-1))
 
 
 def mixed(force: Array, traces: Array) -> Array:

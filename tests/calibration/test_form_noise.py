@@ -31,7 +31,10 @@ def draws(count: int = 4) -> tuple[Posterior, Array]:
 
 
 def test_the_likelihood_is_the_normal_density_of_noise_energy_and_laws() -> None:
-    """Sigma = tau^2 1 + (eta_a^2 + m^2) D_F K_u D_F + eta_e^2 D_t K_v D_t, t that of friction; an offset has none."""
+    """Sigma = tau^2 1 + (eta_a^2 + m^2) D_F K_u D_F + eta_e^2 D_t K_v D_t + (eta_l F_max)^2 P, t that of friction.
+
+    An offset has none; P has ones at starts, turns and slack ends.
+    """
     posterior, x = draws()
     m, k = posterior.measurement, posterior.hypothesis.curve_size
     found, factors = posterior.evaluate(x), form_factors(m)
@@ -39,12 +42,12 @@ def test_the_likelihood_is_the_normal_density_of_noise_energy_and_laws() -> None
     offset = posterior.hypothesis.names.index("force_offset.offset")
     without = plain.forward(x[:, [0, offset]], reached=False).force
     for b in range(len(x)):
-        tau, eta, law = np.exp(x[b, k:]) * [np.max(m.force), 1, 1]
+        tau, eta, at_turns, law = np.exp(x[b, k:]) * [np.max(m.force), 1, np.max(found.force[b]), 1]
         trace = found.force[b] - without[b]
         mix = min(MIXED * np.linalg.norm(trace) / np.linalg.norm(found.force[b]), MOST_MIXED)
         u = np.hypot(eta, mix) * found.force[b, :, None] * factors.state
         v = law * trace[:, None] * factors.progress
-        sigma = tau**2 * np.eye(len(m)) + u @ u.T + v @ v.T
+        sigma = tau**2 * np.eye(len(m)) + u @ u.T + v @ v.T + at_turns**2 * factors.local @ factors.local.T
         expected = multivariate_normal(found.force[b], sigma).logpdf(m.force)
         assert found.log_likelihood[b] == pytest.approx(expected, rel=1e-6)
 
@@ -55,8 +58,8 @@ def test_what_an_emulator_asks_is_the_posterior_at_the_true_curves() -> None:
     assert e.curves.shape == (len(x), 3 * len(posterior.measurement))
     assert posterior.given(e.curves, x) == pytest.approx(e.log_posterior)
     plain = Posterior(hypothesis("neo_hookean"), posterior.measurement)
-    found = plain.evaluate(x[:, [0, -3]])
-    assert plain.given(found.curves, x[:, [0, -3]]) == pytest.approx(found.log_posterior)
+    found = plain.evaluate(x[:, [0, -4]])
+    assert plain.given(found.curves, x[:, [0, -4]]) == pytest.approx(found.log_posterior)
 
 
 # ---- an energy that is not in the library ----------------------------------------------------------------------------

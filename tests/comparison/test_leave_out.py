@@ -187,3 +187,17 @@ def test_draws_without_a_curve_predict_nothing():
     assert found.lost == 1.0
     assert found.elpd < -1e3 or found.elpd == -np.inf
     assert np.isnan(found.rmse_N)
+
+
+@pytest.mark.parametrize("noise", ["form", "form_ar1"])
+def test_sizes_relative_to_the_largest_force_are_carried_over_to_a_larger_one(noise):
+    whole = measured("none")
+    first = Posterior(hypothesis("neo_hookean", ["mullins"], noise), whole.up_to(0.03))
+    draws = np.zeros((2, first.size))
+    shift = dict(
+        zip((p.name for p in first.hypothesis.noise.coordinates), pc._carried(first, draws, whole)[0], strict=True)
+    )
+    ratio = np.log(np.max(np.abs(first.measurement.force)) / np.max(np.abs(whole.force)))
+    assert ratio < -0.3
+    assert shift["ln_sd"] == shift["ln_eta_local"] == pytest.approx(ratio)
+    assert shift["ln_eta"] == shift["ln_eta_law"] == 0

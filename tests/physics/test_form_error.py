@@ -86,7 +86,7 @@ def test_the_trace_is_what_an_effect_changes(name: str) -> None:
 @pytest.mark.parametrize("name", EXACT)
 def test_what_is_exact_has_no_law_to_be_inferred(name: str) -> None:
     names = [p.name for p in hypothesis("neo_hookean", [name], "form").parameters]
-    assert names[-2:] == ["noise.ln_sd", "noise.ln_eta"]
+    assert names[-3:] == ["noise.ln_sd", "noise.ln_eta", "noise.ln_eta_local"]
 
 
 def test_one_law_that_may_be_off_adds_one_coordinate_however_many_there_are() -> None:
@@ -94,7 +94,7 @@ def test_one_law_that_may_be_off_adds_one_coordinate_however_many_there_are() ->
     two = hypothesis("neo_hookean", [*LAWS[:2], *EXACT[:1]], "form")
     assert one.noise == two.noise
     assert one.parameters[-1].name == "noise.ln_eta_law"
-    assert one.natural_names[-3:] == ("noise.sd", "noise.eta", "noise.eta_law")
+    assert one.natural_names[-4:] == ("noise.sd", "noise.eta", "noise.eta_local", "noise.eta_law")
 
 
 def test_unsteady_readings_are_those_at_the_start_at_turns_and_at_slack_ends() -> None:

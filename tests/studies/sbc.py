@@ -49,12 +49,17 @@ SCALED = "noise.ln_sd"
 
 @dataclass(frozen=True)
 class Design:
-    """What is calibrated: a hypothesis, whether the noise is stated, and how many replicates there are to be."""
+    """What is calibrated: a hypothesis, whether the noise is stated, how many replicates there are to be.
+
+    turns : whether the disc comes halfway back although nothing in the hypothesis remembers: no further, as which
+        readings are slack follows from those of the film and not from the truth
+    """
 
     name: str
     hypothesis: Hypothesis
     stated: bool = False
     replicates: int = VARIATIONS
+    turns: bool = False
 
 
 def designs() -> Iterator[Design]:
@@ -70,12 +75,13 @@ def designs() -> Iterator[Design]:
         yield Design(f"{name}, zero offset", hypothesis(name, ["zero_offset"]))
         yield Design(f"{name}, viscoelastic", hypothesis(name, ["viscoelastic"]))
         yield Design(f"{name}, form error", hypothesis(name, (), "form"))
+        yield Design(f"{name}, form error, halfway back", hypothesis(name, (), "form"), turns=True)
 
 
-def readings(force: Array | None = None, sd: float | None = None, cyclic: bool = False) -> Measurement:
-    """The test that all replicates are of: one loading, or up and down at a steady speed where time matters."""
+def readings(force: Array | None = None, sd: float | None = None, back: float = 0.0) -> Measurement:
+    """The test that all replicates are of: one loading, and the part ``back`` of it back at a steady speed."""
     up = np.linspace(FARTHEST / POINTS, FARTHEST, POINTS)
-    deflection = np.concatenate([up, up[-2::-1]]) if cyclic else up
+    deflection = np.concatenate([up, up[-2::-1][: int(back * (POINTS - 1))]])
     moved = np.abs(np.diff(deflection, prepend=0.0))
     return Measurement(
         deflection,
@@ -100,7 +106,7 @@ def replicate(design: Design, number: int) -> dict[str, Any]:
     """Ranks of one truth: of every coordinate, of the force at the end, and of the log likelihood."""
     rng = np.random.default_rng([SEED, number, *design.name.encode()])
     h = design.hypothesis
-    blank = readings(sd=GIVEN if design.stated else None, cyclic=bool(h.effects))
+    blank = readings(sd=GIVEN if design.stated else None, back=1.0 if h.effects else 0.5 * design.turns)
     asked = Posterior(h, blank)
     x = truth(asked, rng)
     # Plain films come from the other solver; effects and form errors are put on top by the only code that knows them.

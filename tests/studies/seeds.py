@@ -1,8 +1,9 @@
 """`make study-seeds`: the statistical tests of the suite on many seeds, with wide SIMD lanes and without.
 
-One process of pytest for each group of files, seed and arithmetic; one line of JSON a test under reports/study-seeds/,
-as soon as its process is done. What stands there is skipped, so that the study can be interrupted and goes on where it
-was. Writes docs/studies/seeds.md. Seeds enter by the environment (`tests/seeds.py`).
+One process of pytest for each group of files and arithmetic, which imports and compiles once for `ROUND` seeds; test
+modules are imported anew for each, as they may draw when they are made. One line of JSON a test under
+reports/study-seeds/, as soon as its seed is done. What stands there is skipped, so that the study can be interrupted
+and goes on where it was. Writes docs/studies/seeds.md. Seeds enter by the environment (`tests/seeds.py`).
 
 Without lanes means: numba compiles for the oldest processor of this kind (two lanes, no fused operations), and so does
 OpenBLAS choose its kernels. It is what another machine does to the last digits.
@@ -15,12 +16,14 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
-import xml.etree.ElementTree as ET
+import time
 from collections import defaultdict
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Sequence
+from contextlib import redirect_stdout
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+
+import pytest
 
 from tests.seeds import NAME
 
@@ -31,6 +34,7 @@ LANES = {
     "wide": {},
     "off": {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "OPENBLAS_CORETYPE": "NEHALEM"},
 }
+ROUND = 10  # seeds of one process
 # Files by what a run of theirs takes, and for how many seeds each group is run.
 GROUPS: dict[str, tuple[int, tuple[str, ...]]] = {
     "quick": (
@@ -39,9 +43,9 @@ GROUPS: dict[str, tuple[int, tuple[str, ...]]] = {
             "tests/comparison/test_layers.py",
             "tests/comparison/test_prior_widths.py",
             "tests/diagnosis/detection/test_scores.py",
-            "tests/physics/noise/test_noise.py",
         ),
     ),
+    "noise": (50, ("tests/physics/noise/test_noise.py",)),
     "slow": (
         10,
         (
@@ -88,31 +92,75 @@ def stored(path: Path) -> list[Row]:
     return rows
 
 
-def run(group: str, seed: int, lanes: str) -> list[Row]:
-    """The tests of a group in a process of their own.
+def missing(group: str, lanes: str, most: int | None, rows: Iterable[Row]) -> list[int]:
+    """Seeds, from 1 on, of which ``rows`` say nothing."""
+    done = {r.seed for r in rows if (r.group, r.lanes) == (group, lanes)}
+    return [s for s in range(1, min(GROUPS[group][0], most or GROUPS[group][0]) + 1) if s not in done]
 
-    Raises RuntimeError if pytest could not run them, with what it printed.
+
+def run(group: str, seeds: Sequence[int], lanes: str) -> None:
+    """The tests of a group in a process of their own, whose arithmetic is settled when it begins.
+
+    Raises CalledProcessError if pytest could not run them.
+    """
+    words = ["--within", lanes, "--group", group, "--seeds", ",".join(map(str, seeds))]
+    environment = {**os.environ, **LANES[lanes]}
+    subprocess.run([sys.executable, "-m", "tests.studies.seeds", *words], cwd=ROOT, env=environment, check=True)
+
+
+def within(group: str, seeds: Sequence[int], lanes: str) -> None:
+    """The tests of a group in this process, seed by seed; rows are stored as soon as a seed is done.
+
+    Raises RuntimeError if pytest could not run them.
     """
     files = [f for f in GROUPS[group][1] if (ROOT / f).exists()]
-    with tempfile.TemporaryDirectory() as folder:
-        report = Path(folder) / "report.xml"
-        words = ["-n0", "-q", "--tb=no", "-p", "no:cacheprovider", f"--junitxml={report}", *files]
-        environment = {**os.environ, **LANES[lanes], NAME: str(seed)}
-        done = subprocess.run(
-            [sys.executable, "-m", "pytest", *words],
-            cwd=ROOT, env=environment, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        if done.returncode not in (0, 1) or not report.exists():
-            raise RuntimeError(done.stdout + done.stderr)
-        cases = ET.parse(report).getroot().iter("testcase")
-        return [_row(group, seed, lanes, case) for case in cases]
+    for seed in seeds:
+        os.environ[NAME] = str(seed)
+        for name in [n for n in sys.modules if n.startswith("tests.") and n not in KEPT]:
+            del sys.modules[name]
+        heard, begun = Heard(), time.process_time()
+        with Path(os.devnull).open("w", encoding="utf-8") as nowhere, redirect_stdout(nowhere):
+            code = pytest.main(["-n0", "-q", "--tb=no", "-p", "no:cacheprovider", *files], plugins=[heard])
+        if code not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
+            raise RuntimeError(f"pytest ended with {code!r}")
+        rows = [
+            Row(group, seed, lanes, _name(node), heard.outcomes[node], round(heard.seconds[node], 3))
+            for node in heard.outcomes
+        ]
+        with RESULTS.open("a", encoding="utf-8") as file:
+            file.write("".join(json.dumps(asdict(r)) + "\n" for r in rows))
+        lost = [r.test for r in rows if r.outcome == "failed"]
+        spent = time.process_time() - begun
+        print(
+            f"{group}, seed {seed}, lanes {lanes}: {len(rows)} tests in {spent:.0f} s of a processor, "
+            f"failed: {lost or 'none'}",
+            flush=True,
+        )
 
 
-def _row(group: str, seed: int, lanes: str, case: ET.Element) -> Row:
-    kinds = {child.tag for child in case}
-    outcome = "failed" if kinds & {"failure", "error"} else "skipped" if "skipped" in kinds else "passed"
-    name = f"{case.get('classname')}::{case.get('name')}"
-    return Row(group, seed, lanes, name, outcome, float(case.get("time", 0.0)))
+KEPT = ("tests.seeds", "tests.studies", "tests.studies.seeds")
+"""What is not imported anew: `tests.seeds` keeps the generator as it was before it was moved."""
+
+
+@dataclass
+class Heard:
+    """What pytest says of each test, by its node."""
+
+    outcomes: dict[str, str] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Of its set-up, its call and its end: the worst."""
+        node = report.nodeid
+        self.seconds[node] += report.duration
+        before = self.outcomes.get(node, "passed")
+        self.outcomes[node] = before if report.passed or before == "failed" else report.outcome
+
+
+def _name(node: str) -> str:
+    """tests/a/b.py::c as tests.a.b::c."""
+    path, _, rest = node.partition("::")
+    return f"{path.removesuffix('.py').replace('/', '.')}::{rest}"
 
 
 def page(rows: Iterable[Row]) -> str:
@@ -149,20 +197,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--group", choices=GROUPS, action="append", help="only this one; may be repeated")
     parser.add_argument("--most", type=int, help="seeds at most")
+    parser.add_argument("--within", choices=LANES, help=argparse.SUPPRESS)
+    parser.add_argument("--seeds", help=argparse.SUPPRESS)
     asked = parser.parse_args()
     RESULTS.parent.mkdir(parents=True, exist_ok=True)
+    if asked.within:
+        within(asked.group[0], [int(s) for s in asked.seeds.split(",")], asked.within)
+        return
     for group in asked.group or GROUPS:
-        for seed in range(1, min(GROUPS[group][0], asked.most or GROUPS[group][0]) + 1):
-            for lanes in LANES:
-                if any((r.group, r.seed, r.lanes) == (group, seed, lanes) for r in stored(RESULTS)):
-                    continue
-                rows = run(group, seed, lanes)
-                text = "".join(json.dumps(asdict(r)) + "\n" for r in rows)
-                with RESULTS.open("a", encoding="utf-8") as file:
-                    file.write(text)
-                lost = [r.test for r in rows if r.outcome == "failed"]
-                print(f"{group}, seed {seed}, lanes {lanes}: {len(rows)} tests, failed: {lost or 'none'}", flush=True)
-                PAGE.write_text(page(stored(RESULTS)), encoding="utf-8")
+        # In turn, so that both arithmetics have as many seeds whenever it ends.
+        while any((left := {lanes: missing(group, lanes, asked.most, stored(RESULTS)) for lanes in LANES}).values()):
+            for lanes, seeds in left.items():
+                if seeds:
+                    run(group, seeds[:ROUND], lanes)
+                    PAGE.write_text(page(stored(RESULTS)), encoding="utf-8")
 
 
 if __name__ == "__main__":

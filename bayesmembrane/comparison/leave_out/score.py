@@ -19,7 +19,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.quiet import arviz
-from bayesmembrane.physics.form_error import ENERGY, LAW, traces
+from bayesmembrane.physics.form_error import ENERGY, LAW, LOCAL, traces
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.noise.base import force_scale
@@ -216,8 +216,10 @@ def _carried(posterior: Posterior, draws: Array, whole: Measurement) -> Array:
     They are relative to the largest force and to the median step, and both change with the range.
     """
     part = posterior.measurement
+    of_force = np.log(force_scale(part) / force_scale(whole))
     shifts = {
-        "ln_sd": np.log(force_scale(part) / force_scale(whole)),
+        "ln_sd": of_force,
+        LOCAL.name: of_force,
         "ln_length": np.log(_median_step(part) / _median_step(whole)),
         ENERGY.name: 0.0,
         LAW.name: 0.0,

@@ -1,11 +1,13 @@
-"""White noise, and smooth relative errors of the energy and of the laws of effects: see `physics/form_error.py`."""
+"""White noise, and relative errors of the energy, of the laws of effects and where nothing is steady: see
+`physics/form_error.py`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -13,7 +15,16 @@ from scipy.linalg import solve_triangular
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array, Natural, Parameter
-from bayesmembrane.physics.form_error import ENERGY, LAW, FormFactors, form_factors, joint_factors, mixed
+from bayesmembrane.physics.form_error import (
+    ENERGY,
+    LAW,
+    LOCAL,
+    FormFactors,
+    form_factors,
+    joint_factors,
+    local_size,
+    mixed,
+)
 from bayesmembrane.physics.noise.base import LN_SD, SD, Elsewhere, Noise, NoiseLikelihood, conditional, force_scale
 
 if TYPE_CHECKING:
@@ -25,7 +36,9 @@ TINY = 1e-12
 
 @dataclass(frozen=True)
 class Form(Noise):
-    """Sigma = Sigma_given + tau^2 I + (eta_a^2 + m^2) D_F K_u D_F + sum_e eta_e^2 D_te K_v D_te, one eta_e for all e.
+    """Sigma = Sigma_given + tau^2 I + (eta_a^2 + m^2) D_F K_u D_F + sum_e eta_e^2 D_te K_v D_te + (eta_l F_max)^2 P.
+
+    One eta_e for all e; P has ones where the test starts, turns or goes slack.
 
     laws : whether there are effects whose law may be off; without, eta_e is not inferred
     """
@@ -40,12 +53,12 @@ class Form(Noise):
 
     @property
     def coordinates(self) -> tuple[Parameter, ...]:
-        return (LN_SD, ENERGY, LAW) if self.laws else (LN_SD, ENERGY)
+        return (LN_SD, ENERGY, LOCAL, LAW) if self.laws else (LN_SD, ENERGY, LOCAL)
 
     @property
     def natural_parameters(self) -> tuple[Natural, ...]:
-        found = (SD, Natural("eta", "-", ENERGY.meaning.removeprefix("log of the ")))
-        return (*found, Natural("eta_law", "-", LAW.meaning.removeprefix("log of the "))) if self.laws else found
+        named = (("eta", ENERGY), ("eta_local", LOCAL), *((("eta_law", LAW),) if self.laws else ()))
+        return (SD, *(Natural(name, "-", p.meaning.removeprefix("log of the ")) for name, p in named))
 
     def natural(self, x: Array, scale: float) -> Array:
         return np.asarray(np.exp(x) * np.array([scale, *(1.0,) * (x.shape[1] - 1)]))
@@ -54,12 +67,22 @@ class Form(Noise):
         return FormLikelihood(measurement, self.laws)
 
 
+class FormSizes(NamedTuple):
+    """Of B draws, (B,) each: tau^2 in N^2, eta_a, eta_e, and eta_l F_max in N."""
+
+    power: Array
+    energy: Array
+    law: Array
+    local: Array
+
+
 class FormLikelihood(NoiseLikelihood):
     """O(N r^2) a draw, with r columns of all factors: Sigma = Lambda + U U^T, and M = 1 + U^T Lambda^-1 U is r x r.
 
     r^T Sigma^-1 r = (r - U a)^T Lambda^-1 (r - U a) + a^T a with a = M^-1 U^T Lambda^-1 r, the most probable errors,
     and |Sigma| = |Lambda| |M| (M. A. Woodbury, Princeton SRG Memo 42, 1950). A covariance that the measurement states
-    is turned to its axes first, O(N^2 r).
+    is turned to its axes first, O(N^2 r). What is not steady is noise of its own at its readings, a part of Lambda, or
+    further columns of U beside such axes.
 
     Until it is told of curves (`at`), those measured stand for them, and effects have no trace.
     """
@@ -69,7 +92,8 @@ class FormLikelihood(NoiseLikelihood):
         self.scale = force_scale(measurement)
         self.factors = form_factors(measurement)
         self.axes: Array | None = None
-        self.own = np.zeros(len(measurement))
+        self.own, self.spots = np.zeros(len(measurement)), np.zeros(len(measurement))
+        self.spots[self.factors.spots] = 1.0
         if measurement.covariance is not None:
             self.own, self.axes = np.linalg.eigh(measurement.covariance)
         elif measurement.force_sd is not None:
@@ -92,24 +116,36 @@ class FormLikelihood(NoiseLikelihood):
         return told
 
     def log_likelihood(self, residual: Array, x: Array) -> Array:
-        power, eta, law = self._sizes(x)
-        square, log_det = self._squares(residual, power, self._staying(x), (eta, law))
+        square, log_det = self._squares(residual, self._sizes(x), self._staying(x))
         return np.asarray(-0.5 * (square + log_det + residual.shape[1] * np.log(2 * np.pi)))
 
     def stated(self, residual: Array, x: Array) -> Array | None:
         if not np.any(self.own):
             return None
-        _, eta, law = self._sizes(x)
-        return self._squares(residual, np.zeros(len(x)), np.zeros(residual.shape), (eta, law))[0]
+        sizes = self._sizes(x)._replace(power=np.zeros(len(x)))
+        return self._squares(residual, sizes, np.zeros(residual.shape))[0]
 
-    def _squares(self, residual: Array, power: Array, stays: Array, errors: tuple[Array, Array]) -> tuple[Array, Array]:
-        """(r^T Sigma^-1 r, ln |Sigma|), (B,) each, of tau^2 (B,), what stays of it (B, N), and eta_a and eta_e (B,)."""
+    def _squares(self, residual: Array, sizes: FormSizes, stays: Array) -> tuple[Array, Array]:
+        """(r^T Sigma^-1 r, ln |Sigma|), (B,) each, with what stays of the noise (B, N)."""
         force, traces = self._curves(len(residual))
         axes = np.empty((0, 0)) if self.axes is None else self.axes
-        r = residual if self.axes is None else residual @ self.axes
-        eta, law = errors
-        parts = (r, force, traces, power, self.own, stays, self._on_film(eta), law)
-        square, log_det = _squares(*(np.ascontiguousarray(p, dtype=float) for p in parts), *self._roots, axes)
+        r = self._turned(residual)
+        own, film = self._own(sizes), self._on_film(sizes.energy)
+        parts = (
+            r,
+            force,
+            traces,
+            sizes.power,
+            own,
+            stays,
+            film,
+            sizes.law,
+            sizes.local,
+            *self._roots,
+            axes,
+            self._turns,
+        )
+        square, log_det = _squares(*(np.ascontiguousarray(p, dtype=float) for p in parts))
         return square, log_det
 
     def _staying(self, x: Array) -> Array:
@@ -117,25 +153,26 @@ class FormLikelihood(NoiseLikelihood):
         return np.zeros((len(x), self.own.size))
 
     def covariance(self, x: Array) -> Array:
-        power, eta, law = self._sizes(x[None, :])
-        total = float(self._on_film(eta)[0])
-        u = self._columns(self.factors, self.force[0], self.traces[0], total, float(law[0]))
+        sizes = self._sizes(x[None, :])
+        total = float(self._on_film(sizes.energy)[0])
+        u = self._columns(self.factors, self.force[0], self.traces[0], total, float(sizes.law[0]))
         own = np.diag(self.own) if self.axes is None else (self.axes * self.own) @ self.axes.T
-        return np.asarray(own + power[0] * np.eye(len(own)) + u @ u.T)
+        return np.asarray(own + np.diag(sizes.power + sizes.local**2 * self.spots) + u @ u.T)
 
     def sd(self, x: Array) -> Array:
-        power, eta, law = self._sizes(x)
+        sizes = self._sizes(x)
         force, traces = self._curves(len(x))
         own = self.own if self.axes is None else (self.axes**2) @ self.own
-        total = self._on_film(eta)
-        smooth = (total[:, None] * force) ** 2 + law[:, None] ** 2 * np.sum(traces**2, axis=1)
-        return np.asarray(np.sqrt(own + power[:, None] + smooth))
+        smooth = (self._on_film(sizes.energy)[:, None] * force) ** 2
+        smooth = smooth + sizes.law[:, None] ** 2 * np.sum(traces**2, axis=1)
+        return np.asarray(np.sqrt(own + sizes.power[:, None] + sizes.local[:, None] ** 2 * self.spots + smooth))
 
     def pointwise(self, residual: Array, x: Array) -> Array:
         out = np.empty_like(residual)
-        power, _, _ = self._sizes(x)
+        sizes = self._sizes(x)
+        own = self._own(sizes)
         for b, u in enumerate(self._each(x)):
-            r, variance = residual[b], np.maximum(self.own + power[b], 1e-300)
+            r, variance = residual[b], np.maximum(own[b] + sizes.power[b], 1e-300)
             root = _root(np.ascontiguousarray(u / np.sqrt(variance)[:, None]))
             w = solve_triangular(root, (u / variance[:, None]).T, lower=True, check_finite=False)
             a = _solved(root, u.T @ (self._turned(r) / variance))
@@ -150,18 +187,23 @@ class FormLikelihood(NoiseLikelihood):
 
     def draw(self, x: Array, rng: np.random.Generator) -> Array:
         force, traces = self._curves(len(x))
-        _, eta, law = self._sizes(x)
-        total = self._on_film(eta)
+        sizes = self._sizes(x)
+        total = self._on_film(sizes.energy)
         out = self.fresh(x, rng)
         for b in range(len(x)):
-            u = self._columns(self.factors, force[b], traces[b], total[b], law[b])
+            u = self._columns(self.factors, force[b], traces[b], total[b], sizes.law[b])
             out[b] += u @ rng.standard_normal(u.shape[1])
         return out
 
     def fresh(self, x: Array, rng: np.random.Generator) -> Array:
-        power, _, _ = self._sizes(x)
-        z = rng.standard_normal((len(x), self.own.size)) * np.sqrt(self.own + power[:, None])
-        return z if self.axes is None else np.asarray(z @ self.axes.T)
+        """With what is not steady: no drive repeats that."""
+        z = rng.standard_normal((len(x), self.own.size)) * np.sqrt(self.own + self._sizes(x).power[:, None])
+        return (z if self.axes is None else z @ self.axes.T) + self._unsteady(x, rng)
+
+    def _unsteady(self, x: Array, rng: np.random.Generator) -> Array:
+        """(B, N) N: a draw of the error where the test starts, turns or goes slack."""
+        z: Array = rng.standard_normal((len(x), self.own.size)) * self.spots
+        return z * self._sizes(x).local[:, None]
 
     def recurring(self, residual: Array, x: Array, rng: np.random.Generator, there: Elsewhere | None = None) -> Array:
         """(B, N) or (B, G) N: U a with a ~ N(M^-1 U^T Lambda^-1 r, M^-1), the errors of this energy and these laws.
@@ -175,20 +217,21 @@ class FormLikelihood(NoiseLikelihood):
         force, traces = self._curves(len(x)) if there is None else self._shown(there)
         beyond = slice(0, n) if there is None else slice(n, None)
         away = FormFactors(joint.state[beyond], joint.progress[beyond])
-        _, eta, law = self._sizes(x)
+        _, eta, law, _ = self._sizes(x)
         total = self._on_film(eta)
-        alone, size = there is not None and there.traces is None, joint.state.shape[1]
+        alone, size, own = there is not None and there.traces is None, joint.state.shape[1], self._own(self._sizes(x))
         out = np.empty(force.shape)
         for b, u in enumerate(self._each(x, here)):
             both = np.column_stack([u, self._turned(residual[b])])
-            white = self._whitened(both, x[b])
+            white = self._whitened(both, x[b], own[b])
             root = _root(np.ascontiguousarray(white[:, :-1]))
             a = _solved(root, white[:, :-1].T @ white[:, -1])
             a += solve_triangular(root, rng.standard_normal(len(a)), lower=True, trans="T", check_finite=False)
             if alone:
-                own = eta[b] / total[b]
-                a[:size] = own * a[:size] + np.sqrt(1 - own**2) * rng.standard_normal(size)
-            out[b] = self._columns(away, force[b], traces[b], eta[b] if alone else total[b], law[b]) @ a
+                part = eta[b] / total[b]
+                a[:size] = part * a[:size] + np.sqrt(1 - part**2) * rng.standard_normal(size)
+            beyond_here = self._columns(away, force[b], traces[b], eta[b] if alone else total[b], law[b])
+            out[b] = beyond_here @ a[: beyond_here.shape[1]]
         return out
 
     # ---- pieces ------------------------------------------------------------------------------------------------------
@@ -197,10 +240,24 @@ class FormLikelihood(NoiseLikelihood):
     def _roots(self) -> tuple[Array, Array]:
         return self.factors.state, self.factors.progress
 
-    def _sizes(self, x: Array) -> tuple[Array, Array, Array]:
-        """tau^2 (N^2), eta_a and eta_e of x (B, k), (B,) each."""
-        law = np.exp(x[:, 2]) if self.laws else np.zeros(len(x))
-        return (np.exp(x[:, 0]) * self.scale) ** 2, np.exp(x[:, 1]), law
+    @property
+    def _turns(self) -> Array:
+        """(N, m) columns of the unsteady readings on the axes; none where these are noise of their own."""
+        return np.empty((len(self.spots), 0)) if self.axes is None else self.axes.T[:, self.spots > 0]
+
+    def _sizes(self, x: Array) -> FormSizes:
+        """Of x (B, k) and the curves."""
+        law = np.exp(x[:, 3]) if self.laws else np.zeros(len(x))
+        local = np.exp(x[:, 2]) * local_size(self._curves(len(x))[0])
+        return FormSizes((np.exp(x[:, 0]) * self.scale) ** 2, np.exp(x[:, 1]), law, local)
+
+    def _own(self, sizes: FormSizes) -> Array:
+        """(B, N) variances on the axes beside tau^2: what the measurement states, and without such axes what is not
+        steady.
+        """
+        if self.axes is not None:
+            return np.broadcast_to(self.own, (len(sizes.local), self.own.size))
+        return self.own + sizes.local[:, None] ** 2 * self.spots
 
     def _on_film(self, eta: Array) -> Array:
         """(B,) the relative error along the states, of the energy (B,) and of what the film and its effects mix."""
@@ -227,20 +284,20 @@ class FormLikelihood(NoiseLikelihood):
         parts = [eta * force[:, None] * factors.state]
         return np.concatenate([*parts, *(law * t[:, None] * factors.progress for t in traces)], axis=1)
 
-    def _whitened(self, values: Array, x: Array) -> Array:
-        """(N, c) values on the axes freed of the readings' noise, with coordinates x (k,)."""
-        power, _, _ = self._sizes(x[None, :])
-        white: Array = innovations(values, float(power[0]), self.own, self._staying(x[None, :])[0])
+    def _whitened(self, values: Array, x: Array, own: Array) -> Array:
+        """(N, c) values on the axes freed of ``own`` (N,) noise and tau^2, with coordinates x (k,)."""
+        power = (np.exp(x[0]) * self.scale) ** 2
+        white: Array = innovations(values, float(power), own, self._staying(x[None, :])[0])
         return white
 
     def _each(self, x: Array, factors: FormFactors | None = None) -> Iterator[Array]:
-        """U (N, r) on the axes, draw by draw."""
+        """U (N, r) on the axes, draw by draw; beside such axes with what is not steady at its end."""
         force, traces = self._curves(len(x))
-        _, eta, law = self._sizes(x)
-        total = self._on_film(eta)
+        sizes = self._sizes(x)
+        total = self._on_film(sizes.energy)
         for b in range(len(x)):
-            u = self._columns(factors or self.factors, force[b], traces[b], total[b], law[b])
-            yield u if self.axes is None else self.axes.T @ u
+            u = self._columns(factors or self.factors, force[b], traces[b], total[b], sizes.law[b])
+            yield u if self.axes is None else np.column_stack([self.axes.T @ u, sizes.local[b] * self._turns])
 
 
 def _solved(root: Array, right: Array) -> Array:
@@ -304,12 +361,12 @@ def _root(w):  # type: ignore[no-untyped-def]
 
 
 @compiled(nogil=True, error_model="numpy")
-def _squares(residual, force, traces, power, own, stays, eta, law, state, progress, axes):  # type: ignore[no-untyped-def]
-    """(r^T Sigma^-1 r (B,), ln |Sigma| (B,)); residual and own variance on the axes, if there are any."""
+def _squares(residual, force, traces, power, own, stays, eta, law, local, state, progress, axes, turns):  # type: ignore[no-untyped-def]
+    """(r^T Sigma^-1 r (B,), ln |Sigma| (B,)); residual, own variance and turns on the axes, if any."""
     draws, n = residual.shape
     r, q = state.shape[1], progress.shape[1]
     effects = traces.shape[1] if np.any(law > 0.0) else 0
-    size = r + effects * q
+    smooth, size = r + effects * q, r + effects * q + turns.shape[1]
     w = np.empty((n, size + 1))
     square, log_det = np.empty(draws), np.empty(draws)
     a = np.empty(size)
@@ -321,9 +378,10 @@ def _squares(residual, force, traces, power, own, stays, eta, law, state, progre
                 for j in range(q):
                     w[i, r + e * q + j] = law[b] * traces[b, e, i] * progress[i, j]
         if axes.size:
-            w[:, :size] = np.dot(np.ascontiguousarray(axes.T), np.ascontiguousarray(w[:, :size]))
+            w[:, :smooth] = np.dot(np.ascontiguousarray(axes.T), np.ascontiguousarray(w[:, :smooth]))
+            w[:, smooth:size] = local[b] * turns
         w[:, size] = residual[b]
-        white = innovations(w, power[b], own, stays[b])
+        white = innovations(w, power[b], own[b], stays[b])
         root = _root(np.ascontiguousarray(white[:, :size]))
         a[:] = 0.0
         for i in range(n):
@@ -337,7 +395,7 @@ def _squares(residual, force, traces, power, own, stays, eta, law, state, progre
             for k in range(j + 1, size):
                 a[j] -= root[k, j] * a[k]
             a[j] /= root[j, j]
-        total, logs = 0.0, log_scale(power[b], own, stays[b])
+        total, logs = 0.0, log_scale(power[b], own[b], stays[b])
         for i in range(n):
             left = white[i, size]
             for j in range(size):

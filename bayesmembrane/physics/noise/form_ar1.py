@@ -65,17 +65,18 @@ class FormAR1Likelihood(FormLikelihood):
         return np.asarray(white + tau**2 * (np.exp(-np.exp(-x[-1]) * self.memory.distance) - np.eye(len(white))))
 
     def fresh(self, x: Array, rng: np.random.Generator) -> Array:
-        return self.memory.draw(x[:, [0, -1]], rng)  # with the noise that the measurement states
+        stated = self.memory.draw(x[:, [0, -1]], rng)  # with the noise that the measurement states
+        return stated + self._unsteady(x, rng)
 
     def _staying(self, x: Array) -> Array:
         return np.repeat(np.exp(-np.exp(-x[:, -1]))[:, None], self.own.size, axis=1)
 
-    def _whitened(self, values: Array, x: Array) -> Array:
+    def _whitened(self, values: Array, x: Array, own: Array) -> Array:
         if self.axes is None:
-            return super()._whitened(values, x)
+            return super()._whitened(values, x, own)
         tau = float(np.exp(x[0])) * self.scale
         remembered = tau**2 * np.exp(-np.exp(-x[-1]) * self.memory.distance)
-        root = root_of((np.diag(self.own) + self.axes.T @ remembered @ self.axes)[None])[0]
+        root = root_of((np.diag(own) + self.axes.T @ remembered @ self.axes)[None])[0]
         return np.asarray(solve_triangular(root, values, lower=True))
 
     def _one(self, b: int, count: int) -> FormLikelihood:

@@ -98,7 +98,7 @@ def test_draws_have_the_covariance(noise: Noise, given: str) -> None:
     assert bound.sd(x[:1])[0] == pytest.approx(np.sqrt(np.diag(sigma)))
     z = bound.draw(x, np.random.default_rng(SEED + 4))
     root = np.sqrt(np.diag(sigma))
-    assert np.max(np.abs(np.cov(z.T) - sigma) / np.outer(root, root)) < 0.04
+    assert np.max(np.abs(np.cov(z.T) - sigma) / np.outer(root, root)) < 0.06  # six deviations of a variance
 
 
 @pytest.mark.parametrize("noise", MODELS, ids=lambda n: n.name)
@@ -151,11 +151,12 @@ def test_stated_noise_alone_must_be_stated() -> None:
 def test_a_filter_of_readings_is_found_where_the_speed_changes() -> None:
     """Every reading remembers half of the one before, on a slow leg and on one ten times as fast alike."""
     rng = np.random.default_rng(SEED + 9)
-    r = rng.standard_normal(400)
+    n = 2400  # the deviation of a correlation found from so many is 0.018
+    r = rng.standard_normal(n)
     for i in range(1, r.size):
         r[i] = 0.5 * r[i - 1] + np.sqrt(0.75) * r[i]
-    time = np.cumsum(np.where(np.arange(400) < 200, 1.0, 0.1))
-    d = np.linspace(1e-3, 0.04, 400)
+    time = np.cumsum(np.where(np.arange(n) < n // 2, 1.0, 0.1))
+    d = np.linspace(1e-3, 0.04, n)
     m = Measurement(d, 100 * d, Annulus(0.01, 0.035), Specimen("film", 5e-5), time=time)
     by_reading, by_time = (components("noise")[n]().bind(m) for n in ("ar1_readings", "ar1"))
     lengths = np.linspace(-2.0, 3.0, 101)
@@ -188,8 +189,8 @@ def test_white_noise_can_do_without_its_own() -> None:
 
 
 def smooth_part(bound: NoiseLikelihood, x: np.ndarray) -> np.ndarray:
-    """The covariance of the form error alone."""
-    quiet, none = np.array([-25.0, *x[1:]]), np.array([-25.0, -40.0, -40.0, *x[3:]])
+    """The covariance of the form error alone, without what is not steady."""
+    quiet, none = np.array([-25.0, x[1], -40.0, *x[3:]]), np.array([-25.0, -40.0, -40.0, -40.0, *x[4:]])
     return bound.covariance(quiet) - bound.at(bound.force, 0 * bound.traces).covariance(none)
 
 
@@ -197,7 +198,7 @@ def smooth_part(bound: NoiseLikelihood, x: np.ndarray) -> np.ndarray:
 def test_no_form_error_is_white_noise(given: str) -> None:
     m = measurement(given)
     residual = 0.03 * np.random.default_rng(SEED).standard_normal((5, N))
-    x = np.column_stack([np.full(5, -3.0), np.full(5, -40.0), np.full(5, -40.0)])
+    x = np.column_stack([np.full(5, -3.0), *(np.full(5, -40.0),) * 3])
     white, form = White().bind(m), Form(laws=True).bind(m).at(np.full((5, N), 2.0), np.zeros((5, 2, N)))
     assert form.log_likelihood(residual, x) == pytest.approx(white.log_likelihood(residual, x[:, :1]), rel=1e-12)
     assert form.pointwise(residual, x) == pytest.approx(white.pointwise(residual, x[:, :1]), rel=1e-9)
@@ -215,15 +216,15 @@ def test_noise_that_forgets_at_once_is_white_beside_a_form_error(given: str) -> 
 @pytest.mark.parametrize("given", ["none", "sd"])
 def test_no_form_error_is_noise_that_remembers(given: str) -> None:
     m, residual = measurement(given), 0.03 * np.random.default_rng(SEED).standard_normal((5, N))
-    x = np.column_stack([np.full(5, -3.0), np.full(5, -40.0), np.full(5, 0.4)])
+    x = np.column_stack([np.full(5, -3.0), np.full(5, -40.0), np.full(5, -40.0), np.full(5, 0.4)])
     alone, beside = AR1Readings().bind(m), FormAR1().bind(m).at(np.full((5, N), 2.0))
-    assert beside.log_likelihood(residual, x) == pytest.approx(alone.log_likelihood(residual, x[:, [0, 2]]), rel=1e-9)
+    assert beside.log_likelihood(residual, x) == pytest.approx(alone.log_likelihood(residual, x[:, [0, 3]]), rel=1e-9)
 
 
 def test_effects_without_a_trace_have_no_form_error() -> None:
     bound, x = Form(laws=True).bind(measurement("sd")), draws(Form(laws=True))
     force, residual = np.full((5, N), 2.0), 0.03 * np.random.default_rng(SEED).standard_normal((5, N))
-    without = Form().bind(measurement("sd")).at(force).log_likelihood(residual, x[:, :2])
+    without = Form().bind(measurement("sd")).at(force).log_likelihood(residual, x[:, :3])
     assert bound.at(force, np.zeros((5, 2, N))).log_likelihood(residual, x) == pytest.approx(without, rel=1e-12)
 
 
@@ -247,7 +248,10 @@ def test_what_recurs_is_the_form_error_given_the_residual(given: str, noise: Noi
 
 
 def test_what_film_and_effects_mix_is_as_large_as_the_traces() -> None:
-    bound, x = told(Form(laws=True), Form(laws=True).bind(measurement("none")), 0), np.array([-25.0, -40.0, -40.0])
+    bound, x = (
+        told(Form(laws=True), Form(laws=True).bind(measurement("none")), 0),
+        np.array([-25.0, -40.0, -40.0, -40.0]),
+    )
     small = bound.at(bound.force, 0.1 * bound.traces)
     assert np.trace(small.covariance(x)) == pytest.approx(MIXED**2 * np.sum(small.traces[0] ** 2), rel=1e-6)
     # However large they are, it stays a small part of the force.
@@ -259,7 +263,7 @@ def test_the_film_alone_has_no_part_in_what_effects_mix() -> None:
     """Where no effect is at work, only the energy's error recurs; with the effects, the other does too."""
     m, count = measurement("none"), 2000
     bound = told(Form(laws=True), Form(laws=True).bind(m), 0)
-    x = np.tile([-7.0, np.log(1e-4), np.log(1e-4)], (count, 1))
+    x = np.tile([-7.0, np.log(1e-4), -40.0, np.log(1e-4)], (count, 1))
     force = np.repeat(bound.force, count, axis=0)
     one = np.zeros((count, N)), x, np.random.default_rng(SEED)
     alone = bound.recurring(*one, Elsewhere(m.path, force))
@@ -269,7 +273,7 @@ def test_the_film_alone_has_no_part_in_what_effects_mix() -> None:
 
 
 def test_far_from_the_readings_the_form_error_is_that_of_the_prior() -> None:
-    m, x = measurement("sd"), np.array([[-7.0, np.log(0.05)]])
+    m, x = measurement("sd"), np.array([[-7.0, np.log(0.05), -40.0]])
     bound = Form().bind(m).at(np.ones((1, N)))
     far = Elsewhere(replace(m.path, deflection=m.deflection + 4 * m.full_range), np.ones((1, N)))
     one = (np.zeros((1, N)), x, np.random.default_rng(SEED))
@@ -282,9 +286,26 @@ def test_chi_square_counts_the_form_error_beside_the_stated_noise() -> None:
     m, x = measurement("covariance"), draws(Form(laws=True), 1)
     bound = told(Form(laws=True), Form(laws=True).bind(m), 0)
     r = 0.03 * np.random.default_rng(SEED).standard_normal(N)
-    expected = r @ np.linalg.solve(m.covariance + smooth_part(bound, x[0]), r)
+    local = np.diag(np.exp(2 * x[0, 2]) * np.max(bound.force) ** 2 * bound.spots)
+    expected = r @ np.linalg.solve(m.covariance + smooth_part(bound, x[0]) + local, r)
     assert bound.stated(r[None], x) == pytest.approx(expected, rel=1e-6)
     assert Form().bind(measurement("none")).stated(r[None], draws(Form(), 1)) is None
+
+
+@pytest.mark.parametrize("noise", [Form(), FormAR1()], ids=lambda n: n.name)
+@pytest.mark.parametrize("given", GIVEN)
+def test_what_is_not_steady_is_an_error_of_its_readings_alone(given: str, noise: Noise) -> None:
+    """Sigma + (eta_l F_max)^2 P; the first three of seven readings of one loading, and nothing else."""
+    bound, x = told(noise, noise.bind(measurement(given)), 0), draws(noise, 1)[0]
+    without = np.array([*x[:2], -40.0, *x[3:]])
+    expected = np.zeros(N)
+    expected[:3] = (np.exp(x[2]) * np.max(bound.force)) ** 2
+    assert bound.covariance(x) - bound.covariance(without) == pytest.approx(np.diag(expected), abs=1e-15)
+    # It is no error of the film: another test has it anew.
+    once = (np.full((4000, N), 0.0), np.tile([-20.0, -40.0, x[2], *x[3:]], (4000, 1)), np.random.default_rng(SEED + 8))
+    assert np.max(np.abs(bound.recurring(*once))) < 1e-9
+    if given == "none":
+        assert np.std(bound.fresh(*once[1:]), axis=0) == pytest.approx(np.sqrt(expected), rel=0.08, abs=1e-6)
 
 
 def test_twenty_thousand_readings_need_no_square_of_that() -> None:
@@ -293,7 +314,7 @@ def test_twenty_thousand_readings_need_no_square_of_that() -> None:
     m = Measurement(d, 50 * d, Annulus(0.01, 0.035), Specimen("film", 5e-5))
     tracemalloc.start()
     try:
-        found = Form().bind(m).log_likelihood(np.full((1, n), 1e-3), np.array([[-6.0, -6.0]]))
+        found = Form().bind(m).log_likelihood(np.full((1, n), 1e-3), np.array([[-6.0, -6.0, -6.0]]))
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -316,5 +337,5 @@ def test_a_memory_of_many_times_the_test_beside_a_given_covariance_has_a_likelih
     found = AR1Likelihood(m).log_likelihood(np.full((2, n), 1e-3), x)
     assert np.all(np.isfinite(found))
     # The same beside a form error, which is none at ln_eta = -40.
-    both = FormAR1().bind(m).log_likelihood(np.full((2, n), 1e-3), np.insert(x, 1, -40.0, axis=1))
+    both = FormAR1().bind(m).log_likelihood(np.full((2, n), 1e-3), np.insert(x, [1, 1], -40.0, axis=1))
     assert both == pytest.approx(found, rel=1e-6)
