@@ -35,6 +35,8 @@ MOST_TOLD = 3
 """Explanations whose probability is told."""
 MOST_SIZES = 3
 """Effects whose size is told with it; what is not told on the first screen is below."""
+FAR_APART = 100.0
+"""Times the noise from which it is not told by how much a test would tell two explanations apart."""
 ANSWERED = ("named", "material", "ambiguous")
 """Verdicts that rest on another model than the one that was given."""
 
@@ -252,6 +254,8 @@ _ANSWERS = {
 
 def _explained(d: Diagnosis) -> str:
     share = d.remaining.share
+    if 0.0 < share <= 1.0 - WORDS.all_of_it:
+        return "nearly all"
     return "all" if share == 0.0 else language.percent(1.0 - share)
 
 
@@ -302,7 +306,7 @@ def noise_alone(d: Diagnosis) -> bool:
 def _kind(d: Diagnosis) -> str:
     r = d.remaining
     if r.carried < VERDICT.form_carries:
-        return "of no kind that is known here"
+        return "of no known kind"
     laws = [f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in r.law_errors.items() if e > WORDS.law_error]
     return f"smooth as if {listed([f'the energy were {100 * r.energy_error:.2g} %', *laws])} off"
 
@@ -374,7 +378,7 @@ def _tell_apart(d: Diagnosis) -> str:
     best = next(iter(d.experiments), None)
     if best is None or best.separation < NEXT_TEST.clear:
         return "No further test that was simulated tells them apart: rely on what holds for each of them."
-    apart = "" if np.isinf(best.separation) else f" ({best.separation:.2g} times the noise apart)"
+    apart = f" ({best.separation:.2g} times the noise apart)" if best.separation < FAR_APART else ""
     return f"To tell them apart: {spoken_test(best.test, d.rig)}{apart}."
 
 

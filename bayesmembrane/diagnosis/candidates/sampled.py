@@ -27,7 +27,7 @@ from bayesmembrane.ground.parameters import Array
 
 
 @dataclass(frozen=True)
-class Sampled:
+class ByDraws:
     """What draws say of a linear evidence.
 
     difference : ln Z less that of the linear model
@@ -51,13 +51,13 @@ def checked(search: Weighing, candidate: Candidate, rng: np.random.Generator) ->
     return replace(candidate, log_evidence=candidate.log_evidence + found.difference) if found.good else candidate
 
 
-def sampled(search: Weighing, candidate: Candidate, rng: np.random.Generator) -> Sampled:
+def sampled(search: Weighing, candidate: Candidate, rng: np.random.Generator) -> ByDraws:
     """How far the evidence of ``candidate`` is off for being linear.
 
     Every round of draws is from a t-distribution about what the draws before say of the posterior, and all of them
     count, each over the mixture of all that was drawn from (J.-M. Cornuet et al., Scand. J. Stat. 39 (2012) 798).
     """
-    target = _Target(search, candidate)
+    target = _TruePosterior(search, candidate)
     proposals = [_Proposal.about(target.mean, target.covariance)]
     u, density = np.empty((0, candidate.x.size)), np.empty(0)
     for _ in range(SAMPLED.rounds):
@@ -73,10 +73,10 @@ def sampled(search: Weighing, candidate: Candidate, rng: np.random.Generator) ->
         else:  # no film where the linear model sees one: closer to the fit
             proposals.append(_Proposal.about(target.fit, 0.1 ** len(proposals) * target.covariance))
     if not effective:
-        return Sampled(-np.inf, np.inf, 0.0)
+        return ByDraws(-np.inf, np.inf, 0.0)
     log_z = float(np.logaddexp.reduce(weights) - np.log(weights.size))
     sd = float(np.sqrt(max(1 / effective - 1 / weights.size, 0.0)))
-    return Sampled(log_z - target.linear, sd, effective / weights.size)
+    return ByDraws(log_z - target.linear, sd, effective / weights.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,7 @@ def _effective(log_weights: Array) -> float:
     return float(np.sum(w) ** 2 / np.sum(w * w))
 
 
-class _Target:
+class _TruePosterior:
     """The posterior of a hypothesis at the sizes of noise and form error that its fit shows, in the coordinates u of
     `Standard`, not normalised.
     """

@@ -28,7 +28,7 @@ def nothing(u: np.ndarray) -> np.ndarray:
 def target(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A posterior whose linear model is a unit normal, and as whose evidence ln Z = -3 was told."""
     made = SimpleNamespace(log_density=bent, mean=np.zeros(2), fit=np.zeros(2), covariance=np.eye(2), linear=LINEAR)
-    monkeypatch.setattr(module, "_Target", lambda *_: made)
+    monkeypatch.setattr(module, "_TruePosterior", lambda *_: made)
     return made
 
 

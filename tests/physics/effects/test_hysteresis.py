@@ -84,7 +84,7 @@ def test_the_width_of_a_loop_grows_with_a_power_of_the_deflection(grows: float, 
     """Of a force in proportion to the deflection: with the force, or the same everywhere."""
     d = triangles(0.04, 0.0, points=400)
     at = FilmState(force=d[None], slope=np.ones_like(d)[None], deflection=d[None], path=path(d))
-    p = np.array([[0.1, 0.01, 0.0, grows]])
+    p = np.array([[0.1, 2e-3, 0.0, grows]])
     width = np.abs(Hysteresis().carried(p, d[None], at) - d)[0]
     low, high = (np.argmin(np.abs(d[500:] - x)) + 500 for x in (0.01, 0.03))
     assert width[high] / width[low] == pytest.approx(3.0**power, rel=0.05)

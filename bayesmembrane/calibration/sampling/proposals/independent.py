@@ -52,7 +52,7 @@ def independent(posterior: Posterior, tried: Tried, rng: np.random.Generator, co
     Stat. Comput. 18 (2008) 447, with the walk on an emulator instead of reweighting what has been solved. Where no
     round finds one that is good enough the best is `filled`.
     """
-    search = _Search(posterior, rng, counts)
+    search = _Learning(posterior, rng, counts)
     found: list[Independent] = []
     with suppress(np.linalg.LinAlgError):  # what was tried fills no volume
         for _ in range(ROUNDS):
@@ -82,7 +82,7 @@ def _rank(found: Independent) -> tuple[bool, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
+class _Learning:
     """What mixtures are learned for."""
 
     posterior: Posterior

@@ -36,7 +36,8 @@ Mask = NDArray[np.bool_]
 def nearly_resolved(result: Array, d: Array) -> Mask:
     """(B, N) True where the next bubbles would change the force by less than 1e-3 or so."""
     even = result[:, kernels.VARIATION] < LOOSE_VARIATION
-    return np.asarray(even & (result[:, kernels.GAIN] < LOOSE_GAIN * np.abs(result[:, kernels.FORCE] * d)))
+    with np.errstate(invalid="ignore"):  # no force, or one without bounds: not resolved
+        return np.asarray(even & (result[:, kernels.GAIN] < LOOSE_GAIN * np.abs(result[:, kernels.FORCE] * d)))
 
 
 @dataclass(frozen=True)
