@@ -108,7 +108,7 @@ def test_a_name_says_what_it_leaves_in_its_own_sentence(named: Loop, strip: Diag
     assert strip.remaining.reduced_chi2 > 1.2
     (sentence,) = (s for s in lead_of(strip).lines if "viscoelastic" in s)
     times = strip.after.rmse_N / strip.noise.sd
-    assert re.search(rf"leaving {times:.2g} times the noise, (mostly .*, )?(of no known kind|smooth as if) ", sentence)
+    assert re.search(rf"leaving {times:.2g} times the noise, (mostly .*, )?(of no known kind|smooth as if)\b", sentence)
 
 
 def test_the_small_table_has_the_numbers_of_the_json_answer(named: Loop, strip: Diagnosis) -> None:
