@@ -102,8 +102,9 @@ def without_effect(candidate: Candidate, name: str) -> tuple[Hypothesis, Array]:
 
 def available(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
     """Effects of the library that can be seen in this test, can be told from the material, and are not there yet."""
-    thin = measurement.specimen.thickness
-    return [e for e in _possible(measurement, hypothesis) if not e.absorbed and not e.negligible(thin)]
+    thin, returns = measurement.specimen.thickness, bool(np.any(measurement.leg < 0))
+    possible = [e for e in _possible(measurement, hypothesis) if not e.absorbed and not e.negligible(thin)]
+    return [e for e in possible if returns or not e.needs_return]
 
 
 def absorbed(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
