@@ -229,6 +229,8 @@ class GrowthThresholds:
     """Effects that are fitted beside each of these sets none the less, for a trace is that of a little effect."""
     with_other_energies: int = 3
     """Sets of each size that are tried with every energy."""
+    untried: int = 6
+    """Sets beside which further effects that nobody fitted are weighed by their traces."""
     further_starts: int = 1
     """Draws of the material's prior that searches for a first effect start from, besides the plain fit."""
     polished: int = 12

@@ -92,7 +92,7 @@ def rivals(row: Row) -> bool:
 
 def right_sets(row: Row) -> set[tuple[str, ...]]:
     """The keys of `merged` that are right."""
-    if row["foreign"]:
+    if row["foreign"] and rivals(row):
         return {(FOREIGN + n,) for k in row["foreign"] for n in ALIASES.get(k, (k,))}
     names = {tuple(row["truth"])}
     if not row["family_known"] and not row["truth"]:

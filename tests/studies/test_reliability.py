@@ -148,6 +148,15 @@ def test_the_truth_is_held_where_the_most_probable_sets_reach_it() -> None:
     assert of_truth(with_({"friction": 0.4, "none": 0.1}, ripple=0.5)) == pytest.approx(0.4)
 
 
+def test_no_effect_is_the_right_set_where_what_is_foreign_is_a_question_of_its_own() -> None:
+    strange = {"effects": {"ripple": {}}, "snr_own": {"ripple": 30.0}}
+    apart = row({"effects": {"none": 0.999}, "energies": {}, "foreign": {"ripple": 0.999}}, truth=strange)
+    together = row({"effects": {"none": 0.001}, "energies": {}, "foreign": {"ripple": 0.999}}, truth=strange)
+    for r in (apart, together):
+        sets = report([r], "made up").split("## Sets of effects")[1].split("##")[0]
+        assert "| 0.99 to 1 | 0.9990 | 1 / 1" in sets
+
+
 def test_names_of_sets_are_in_one_order_and_nothing_is_lost() -> None:
     found = beliefs(
         {"effects": {"b+a": 0.2, "a+b": 0.3, "none": 0.5}, "energies": {"gent": 1.0}, "foreign": {"none": 1}}

@@ -13,9 +13,9 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
-from bayesmembrane.diagnosis.explanation.growth import Grown
+from bayesmembrane.diagnosis.explanation.growth import Grown, first_order
 from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
-from bayesmembrane.diagnosis.thresholds import FOREIGN, TWINS, VERDICT
+from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
 
 Named = TypeVar("Named")
@@ -135,9 +135,43 @@ def summed(grown: Grown) -> Total:
         joint[owners[name], kind] += BELIEFS.unseen * float(q)
         joint[name, kind] += (1.0 - BELIEFS.unseen) * float(q)
         energies[c.hypothesis.material.name] += float(q)
-    both = _falling(joint)
+    for name, q in _untried(grown, every, joint).items():
+        joint[name, NOTHING] += q
+    whole = sum(joint.values())
+    both = _falling({key: q / whole for key, q in joint.items()})
     marginal = Probabilities(_summed_out(both, 0), _falling(energies), _summed_out(both, 1))
     return Total(tuple(judged), marginal, both, tuple(found))
+
+
+def _untried(grown: Grown, every: Sequence[Candidate], joint: Mapping[tuple[str, str], float]) -> dict[str, float]:
+    """{set: probability} of the first sets with one more effect, where that was never fitted, for it promised little.
+
+    Weighed to first order, and a part (`BELIEFS.untried`) of that: what was not looked at is not excluded.
+    """
+    case, given, tried = grown.case, set(grown.case.null.names), {frozenset(c.names) for c in every}
+    out = defaultdict[str, float](float)
+    for base in _leaders(every)[: GROWTH.untried]:
+        own, odds = set_name(base, case.null.names), [e.odds for e in base.hypothesis.effects if e.name not in given]
+        for e in case.visible if len(odds) < BELIEFS.most else []:
+            names = frozenset((*base.names, e.name))
+            if e.name in base.names or names in tried:
+                continue
+            visible = [v.odds for v in case.visible]
+            prior = BELIEFS.log_set([*odds, e.odds], visible) - BELIEFS.log_set(odds, visible)
+            gain = min(grown.counts * first_order(grown.search, base, e), BELIEFS.supported)
+            q = BELIEFS.untried * joint[own, NOTHING] * float(np.exp(prior + gain))
+            if q > 0:
+                name = _joined(names - given)
+                out[name] = max(out[name], q)
+    return out
+
+
+def _leaders(every: Sequence[Candidate]) -> list[Candidate]:
+    """Of every set of effects the first of ``every``."""
+    first: dict[frozenset[str], Candidate] = {}
+    for c in every:
+        first.setdefault(frozenset(c.names), c)
+    return list(first.values())
 
 
 def _raised(grown: Grown, weights: Mapping[int, float]) -> dict[frozenset[str], float]:

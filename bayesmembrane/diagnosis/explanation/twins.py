@@ -1,9 +1,10 @@
 """Effects that a test cannot tell apart: no shape of a law is sure enough to choose between them.
 
 Two effects are twins on a measurement where both change the curve by functions of the deflection alone that nearly
-coincide beside the plain model (`confounded`), or where one follows time and the other the way, and the disc moved at
-one speed without a hold. Laws of a library are close to what happens, not the same: of two sets that differ by twins,
-and stand nearly as well, none is told to be more than `BELIEFS.apart` times as probable as the other.
+coincide beside the plain model (`confounded`), where both make loops at any speed, or where one follows time and the
+other the way, and the disc moved at one speed without a hold. Laws of a library are close to what happens, not the
+same: of two sets that differ by twins, and stand nearly as well, none is told to be more than `BELIEFS.apart` times as
+probable as the other.
 """
 
 from __future__ import annotations
@@ -46,10 +47,11 @@ Pairs = Mapping[Set, Near]
 
 
 def twins(effects: Sequence[Effect], signatures: Sequence[Signature]) -> dict[Set, Near]:
-    """Pairs of ``effects`` that are functions of the deflection alone, and nearly coincide."""
-    still = {e.name for e in effects if not e.remembers}
+    """Pairs of ``effects`` that are functions of the deflection alone, and nearly coincide, or loops at any speed."""
+    still, known = {e.name for e in effects if not e.remembers}, {e.name for e in effects}
     alike = Near(TWINS.alike, TWINS.behind)
-    return {frozenset((a, b)): alike for a, b, _ in confounded(signatures) if {a, b} <= still}
+    loops = {frozenset((e.name, o)): alike for e in effects for o in e.twins_at_any_speed if o in known}
+    return loops | {frozenset((a, b)): alike for a, b, _ in confounded(signatures) if {a, b} <= still}
 
 
 def twins_in_time(effects: Sequence[Effect], measurement: Measurement) -> dict[Set, Near]:

@@ -13,7 +13,7 @@ from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import first_order
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, Total, set_name
-from bayesmembrane.diagnosis.thresholds import VERDICT
+from bayesmembrane.diagnosis.thresholds import GROWTH, VERDICT
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,29 +115,42 @@ def _without_effects(case: DiagnosisCase, total: Total, members: tuple[Judged, .
 
 
 def _first_order(case: DiagnosisCase, found: Sequence[Foreign]) -> Probabilities:
-    """Probabilities of single effects beside the energies, from their traces alone, and of what is foreign."""
-    count, visible = len(case.plain), case.visible
-    log_energy = {
-        name: c.log_evidence + BELIEFS.log_energy(name, case.question.energy, count) for name, c in case.plain.items()
-    }
-    none = float(np.logaddexp.reduce(list(log_energy.values())))
-    odds = [e.odds for e in visible]
-    sets = {NOTHING: BELIEFS.log_set((), odds)}
-    for e in visible:
-        gain = first_order(case.search, case.null, e)
-        weight = BELIEFS.log_set((e.odds,), odds) + gain
-        if gain <= BELIEFS.supported:  # neither seen nor excluded
+    """Probabilities of single effects beside every energy, from their traces alone, and of what is foreign."""
+    plain, best = _with_energy(case), case.best_plain.log_evidence
+    odds = [e.odds for e in case.visible]
+    none = float(np.logaddexp.reduce(list(plain.values())))
+    near = [n for n, c in case.plain.items() if best - c.log_evidence < GROWTH.energy_reach]
+    sets, energies = {NOTHING: none + BELIEFS.log_set((), odds)}, {n: [w] for n, w in plain.items()}
+    for e in case.visible:
+        beside = {n: plain[n] + first_order(case.search, case.plain[n], e) for n in near}
+        together, prior = float(np.logaddexp.reduce(list(beside.values()))), BELIEFS.log_set((e.odds,), odds)
+        for n, w in beside.items():
+            energies[n].append(w + prior - BELIEFS.log_set((), odds))
+        weight = together + prior
+        if together - none <= BELIEFS.supported:  # neither seen nor excluded
             sets[NOTHING] = float(np.logaddexp(sets[NOTHING], weight + np.log(BELIEFS.unseen)))
             weight += np.log(1 - BELIEFS.unseen)
         if np.isfinite(weight):
             sets[e.name] = weight
-    kinds = kinds_of(found)
+    summed = {n: float(np.logaddexp.reduce(w)) for n, w in energies.items()}
+    return Probabilities(_shares(sets), _shares(summed), _foreign_first(case, found, plain))
+
+
+def _with_energy(case: DiagnosisCase) -> dict[str, float]:
+    """By energy, ln of its probability without effects, up to a constant."""
+    count, declared = len(case.plain), case.question.energy
+    return {n: c.log_evidence + BELIEFS.log_energy(n, declared, count) for n, c in case.plain.items()}
+
+
+def _foreign_first(case: DiagnosisCase, found: Sequence[Foreign], plain: Mapping[str, float]) -> dict[str, float]:
+    """By kind, the probability of what is foreign beside energies without effects."""
+    kinds, none = kinds_of(found), float(np.logaddexp.reduce(list(plain.values())))
     strange = {NOTHING: none + (BELIEFS.log_foreign(0) if kinds else 0.0)}
     for f in found:
         if f.gain > BELIEFS.supported:
-            weight = log_energy[f.base.hypothesis.material.name] + f.gain + BELIEFS.log_foreign(kinds)
+            weight = plain[f.base.hypothesis.material.name] + f.gain + BELIEFS.log_foreign(kinds)
             strange[f.kind] = float(np.logaddexp(strange.get(f.kind, -np.inf), weight))
-    return Probabilities(_shares(sets), _shares({n: w - none for n, w in log_energy.items()}), _shares(strange))
+    return _shares(strange)
 
 
 def _shares(log_weights: dict[str, float]) -> dict[str, float]:

@@ -37,6 +37,7 @@ class Hysteresis(Carried):
         "do not close at rest and do not remember the largest deflection."
     )
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ("viscoelastic",)
+    twins_at_any_speed: ClassVar[tuple[str, ...]] = ("friction",)
     of_the_material = True
     needs_return: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (

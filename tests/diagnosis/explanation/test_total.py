@@ -1,5 +1,6 @@
 """The sum over hypotheses: what a further effect that the data do not speak for is worth."""
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -17,6 +18,7 @@ from bayesmembrane.physics.hypothesis import hypothesis
 
 LEFT = 100.0
 FOUR = (1.0,) * 4  # odds of all effects
+TRIED = [SimpleNamespace(odds=1.0, name=n) for n in ("friction", "mullins")]
 
 
 def candidate(*effects: str, log_evidence: float) -> Candidate:
@@ -25,9 +27,16 @@ def candidate(*effects: str, log_evidence: float) -> Candidate:
     return Candidate(claim, x, nothing, nothing[:, None], log_evidence, (), nothing[None], np.zeros(2), nothing)
 
 
-def effects(monkeypatch: pytest.MonkeyPatch, takes: float, gain: float) -> dict[str, float]:
-    """Probabilities where friction explains the curve, and Mullins beside it ``takes`` squares and ``gain`` in ln Z."""
+def effects(
+    monkeypatch: pytest.MonkeyPatch, takes: float, gain: float, untried: Sequence[Any] = (), promised: float = -np.inf
+) -> dict[str, float]:
+    """Probabilities where friction explains the curve, and Mullins beside it ``takes`` squares and ``gain`` in ln Z.
+
+    Of four effects that can be seen some may be ``untried``, where traces of those that were not fitted have a
+    ``promised`` ln of the Bayes factor.
+    """
     monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
+    monkeypatch.setattr(total, "first_order", lambda *_: promised)
     squares = {frozenset(): LEFT, frozenset({"friction"}): 20.0, frozenset({"friction", "mullins"}): 20.0 - takes}
     search = SimpleNamespace(
         excess=lambda c: squares[frozenset(c.names)], expected_sizes=lambda e: np.array([e.size.scale])
@@ -36,7 +45,7 @@ def effects(monkeypatch: pytest.MonkeyPatch, takes: float, gain: float) -> dict[
     case = SimpleNamespace(
         null=plain,
         plain={"gent": plain},
-        visible=[SimpleNamespace(odds=1.0)] * 4,
+        visible=[*untried, *TRIED, *TRIED][:4],
         question=SimpleNamespace(energy=None),
         twins=lambda: frozenset(),
         foreign=lambda *_: [],
@@ -70,3 +79,14 @@ def test_one_that_is_seen_keeps_all_of_it(monkeypatch: pytest.MonkeyPatch, takes
 
 def test_probabilities_add_up_to_one(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sum(effects(monkeypatch, takes=3.0, gain=-1.0).values()) == pytest.approx(1.0)
+
+
+def test_a_further_effect_that_nobody_fitted_is_not_excluded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It keeps a small part of what its trace promises beside the set, and no more however much that is."""
+    unseen = [SimpleNamespace(odds=1.0, name="tearing")]
+    nothing = effects(monkeypatch, takes=3.0, gain=-1.0)
+    assert "friction+tearing" not in nothing
+    found = {p: effects(monkeypatch, takes=3.0, gain=-1.0, untried=unseen, promised=p) for p in (-2.0, 50.0)}
+    assert 0 < found[-2.0]["friction+tearing"] < found[50.0]["friction+tearing"] < BELIEFS.untried * np.e
+    assert found[50.0]["friction"] == pytest.approx(nothing["friction"], abs=2 * BELIEFS.untried)
+    assert [sum(p.values()) for p in found.values()] == pytest.approx([1.0, 1.0])

@@ -5,7 +5,7 @@ import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.twins import Near, Stands, levelled, one_speed, swapped
+from bayesmembrane.diagnosis.explanation.twins import Near, Stands, levelled, one_speed, swapped, twins
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -50,6 +50,12 @@ def test_levels_are_those_of_a_first_look_whoever_is_raised() -> None:
     weights = {A: 0.0, B: -60.0, frozenset(["c"]): -90.0}
     raised = levelled(weights, dict.fromkeys(weights, Stands(0.0)), pairs)
     assert weights[frozenset(["c"])] + raised[frozenset(["c"])] == pytest.approx(-60.0 - np.log(BELIEFS.apart))
+
+
+def test_loops_of_whatever_law_are_twins_whatever_the_motion() -> None:
+    every = [cls() for cls in components("effects").values()]
+    assert frozenset(("friction", "hysteresis")) in twins(every, ())
+    assert not twins([e for e in every if e.name != "friction"], ())
 
 
 def test_sets_differ_by_one_twin() -> None:

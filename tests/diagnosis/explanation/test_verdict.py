@@ -1,5 +1,6 @@
 """Verdicts follow from probabilities: of the effects, and of what is foreign beside them."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -7,6 +8,8 @@ import numpy as np
 import pytest
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
+from bayesmembrane.diagnosis.explanation import verdict as verdicts
+from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, Foreign
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, Total
@@ -91,3 +94,26 @@ def test_an_energy_that_is_far_off_is_not_known() -> None:
     poor = candidate(NOTHING, energy_error=0.2)
     assert verdict({NOTHING: 1.0}, describes=False, best=poor)[0] == "unknown"
     assert verdict({"friction": 1.0}, best=candidate("friction", energy_error=0.2))[0] == "unknown"
+
+
+def test_an_effect_beside_one_energy_is_a_rival_of_another_energy_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An energy with many parameters may follow an effect wholly; a simpler one with the effect is as good."""
+    plain = {n: replace(candidate(NOTHING, material=n), log_evidence=z) for n, z in (("ogden", 0.0), ("yeoh", -15.0))}
+    drift = SimpleNamespace(name="force_drift", odds=1.0)
+    promised = {"ogden": -50.0, "yeoh": 20.0}
+    monkeypatch.setattr(verdicts, "first_order", lambda _, base, __: promised[base.hypothesis.material.name])
+    search = SimpleNamespace(excess=lambda _: 0.0)
+    case = SimpleNamespace(
+        null=plain["ogden"],
+        best_plain=plain["ogden"],
+        plain=plain,
+        visible=[drift],
+        search=search,
+        question=SimpleNamespace(energy=None),
+        tell=lambda _: None,
+        foreign=lambda *_: [],
+    )
+    p = verdicts.adequate(cast(OpenCase, case)).probabilities
+    odds = float(np.exp(5.0 + BELIEFS.log_set((1.0,), (1.0,)) - BELIEFS.log_set((), (1.0,))))
+    assert p.effects["force_drift"] / p.effects[NOTHING] == pytest.approx(odds, rel=0.02)
+    assert p.energies["yeoh"] / p.energies["ogden"] == pytest.approx(odds, rel=0.02)
