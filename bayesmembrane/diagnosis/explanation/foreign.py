@@ -17,7 +17,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import Block, extended, weighed
 from bayesmembrane.diagnosis.candidates.search import Search
-from bayesmembrane.diagnosis.explanation.limit import limit_of
+from bayesmembrane.diagnosis.explanation.limit import Limit, limit_of
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.diagnosis.thresholds import FOREIGN
@@ -44,6 +44,7 @@ class Foreign:
     share : part of the squares that the model leaves, which it takes away
     trace : (N,) N, what it changes
     soft : of a limit, over what part of it the reading yields; 0 where it is met at once
+    limit : that limit
     """
 
     kind: str
@@ -59,6 +60,7 @@ class Foreign:
     share: float = 0.0
     trace: Array | None = None
     soft: float = 0.0
+    limit: Limit | None = None
 
     def counted(self, counts: float) -> float:
         """ln of the Bayes factor of which a part ``counts``: laws may be off, yet not where a thing could have been."""
@@ -98,25 +100,29 @@ def foreign(search: Search, base: Candidate) -> list[Foreign]:
     if len(m) < FOREIGN.least_points:
         return []
     smooth = smooth_reference(m)
-    finders: list[Callable[[Search], Foreign | None]] = [partial(_of_family, base, f) for f in _families(m, base)]
+    finders: list[Finder] = [partial(_of_family, base, f) for f in _families(m, base)]
     finders.append(partial(_clipped, base))
     found = [_with_its_own_noise(search, smooth, find) for find in finders]
     return [f for f in (*found, _unnamed(search, base)) if f is not None]
 
 
-def _with_its_own_noise(search: Search, smooth: Array, find: Callable[[Search], Foreign | None]) -> Foreign | None:
+Finder = Callable[[Search, Foreign | None], Foreign | None]
+"""Looks for one thing under the noise of a search; given what was found of it under another noise."""
+
+
+def _with_its_own_noise(search: Search, smooth: Array, find: Finder) -> Foreign | None:
     """What is found under the noise as it is, or under the one that is left beside what was found, if that is likelier.
 
     What is foreign looks like noise, and like noise with a memory: it hides in the one that is inferred without it.
     Both models are weighed under both noises, each of which is as likely as it makes the readings.
     """
-    found = find(search)
+    found = find(search, None)
     if found is None or found.trace is None or found.gain - found.chance < FOREIGN.promise:
         return found
     base = found.base
     noise = own_noise(search.measurement, np.column_stack([smooth, base.slopes, found.trace]))
     other = replace(search, noise=noise)
-    again = find(other)
+    again = find(other, found)
     if again is None:
         return found
     apart = _plain_evidence(other, base) - _plain_evidence(search, base)
@@ -129,7 +135,7 @@ def _plain_evidence(search: Search, base: Candidate) -> float:
     return weighed(search.linear(base), base.theta).log_evidence - search.noise.log_root
 
 
-def _of_family(base: Candidate, family: _Family, search: Search) -> Foreign:
+def _of_family(base: Candidate, family: _Family, search: Search, _before: Foreign | None) -> Foreign:
     """The most probable member of a family beside ``base``, and the evidence of them all."""
     model = search.linear(base)
     # Beside noise and form error as they are expected: what is foreign has driven the fitted ones up.
@@ -277,14 +283,22 @@ def _unnamed(search: Search, base: Candidate) -> Foreign | None:
     return Foreign(UNNAMED, base, gain, size=float(np.exp(z.theta[-1])), relative=True, share=share, trace=trace)
 
 
-def _clipped(base: Candidate, search: Search) -> Foreign | None:
+def _clipped(base: Candidate, search: Search, before: Foreign | None) -> Foreign | None:
     """A load cell at its limit."""
-    found = limit_of(search, base)
+    found = limit_of(search, base, None if before is None else before.limit)
     if found is None:
         return None
     share = _share(search, base, found.trace)
     return Foreign(
-        CLIPPED, base, found.gain, size=found.force, place=found.first, share=share, trace=found.trace, soft=found.width
+        CLIPPED,
+        base,
+        found.gain,
+        size=found.force,
+        place=found.first,
+        share=share,
+        trace=found.trace,
+        soft=found.width,
+        limit=found,
     )
 
 

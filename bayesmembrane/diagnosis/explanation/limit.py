@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import weighed
 from bayesmembrane.diagnosis.candidates.search import Search
-from bayesmembrane.diagnosis.explanation.saturation import saturated
+from bayesmembrane.diagnosis.explanation.saturation import Saturated, saturated
 from bayesmembrane.diagnosis.left.shape import plateau_of
 from bayesmembrane.diagnosis.thresholds import FOREIGN
 from bayesmembrane.ground.parameters import Array
@@ -30,6 +30,7 @@ class Limit:
     first : number of the first reading there
     trace : (N,) N, what the model with it says otherwise than that without
     width : of the force, over what part of the limit the reading yields; 0 where it is met at once
+    law : of the reading, with its film, where readings scatter about the limit
     """
 
     force: float
@@ -37,14 +38,15 @@ class Limit:
     first: int
     trace: Array
     width: float = 0.0
+    law: Saturated | None = None
 
 
-def limit_of(search: Search, base: Candidate) -> Limit | None:
-    """The limit that the readings show, if any."""
+def limit_of(search: Search, base: Candidate, before: Limit | None = None) -> Limit | None:
+    """The limit that the readings show, if any; looked for near the one that was found ``before``, if there is one."""
     m = search.measurement
     flat = plateau_of(m.force)
     if flat is None or not flat.largest or flat.readings < FOREIGN.plateau:
-        return _before_the_converter(search, base)
+        return _before_the_converter(search, base, before)
     at = m.force >= flat.force - 1e-9 * abs(flat.force)
     # Each is within rounding of the limit.
     constant = -(flat.readings - 1) * float(np.log(max(flat.step, 1e-6 * flat.force)))
@@ -52,9 +54,9 @@ def limit_of(search: Search, base: Candidate) -> Limit | None:
     return None if found is None else _with_evidence(search, base, found, at, flat.force, constant)
 
 
-def _before_the_converter(search: Search, base: Candidate) -> Limit | None:
+def _before_the_converter(search: Search, base: Candidate, before: Limit | None) -> Limit | None:
     """A limit that readings scatter about."""
-    found = saturated(search, base)
+    found = saturated(search, base, None if before is None else before.law)
     if found is None:
         return None
     m = search.measurement
@@ -62,7 +64,7 @@ def _before_the_converter(search: Search, base: Candidate) -> Limit | None:
     reached = np.flatnonzero(found.reached)
     first = int(reached[0] if reached.size else np.argmax(m.force))
     trace = found.reading - (m.force - base.residual)
-    return Limit(found.law.limit, gain, first, trace, 1 / found.law.sharpness)
+    return Limit(found.law.limit, gain, first, trace, 1 / found.law.sharpness, found)
 
 
 def _beside(search: Search, base: Candidate, at: NDArray[np.bool_]) -> Candidate | None:

@@ -65,22 +65,28 @@ class Saturated:
     """A film behind a load cell that yields.
 
     law : of the reading
+    film : without it
     log_evidence : of both, up to what all hypotheses under one noise share
     reading : (N,) N, what the load cell shows
     reached : (N,) True where the film alone would show the limit or more
     """
 
     law: Saturation
+    film: Candidate
     log_evidence: float
     reading: Array
     reached: NDArray[np.bool_]
 
 
-def saturated(search: Search, base: Candidate) -> Saturated | None:
-    """The most probable film and limit, from films fitted to the lower readings; None where nothing looks like one."""
+def saturated(search: Search, base: Candidate, before: Saturated | None = None) -> Saturated | None:
+    """The most probable film and limit; None where nothing looks like one.
+
+    From films fitted to the lower readings, or from where one was found ``before``, under another noise.
+    """
     if not _promises(search, base):
         return None
-    found = [_settled(_Point(search, film, law)) for film, law in _starts(search, base)]
+    starts = _starts(search, base) if before is None else _again(search, before)
+    found = [_settled(_Point(search, film, law)) for film, law in starts]
     return max(found, key=lambda s: s.log_evidence, default=None)
 
 
@@ -97,6 +103,12 @@ def _promises(search: Search, base: Candidate) -> bool:
     freed = model.freed(np.minimum(base.theta, model.priors[:, 0]), white)
     along, square = freed.T @ model.data, np.sum(white * freed, axis=0)
     return bool(np.any((along > 0) & (along**2 > SATURATION.promise * square)))
+
+
+def _again(search: Search, before: Saturated) -> Iterator[tuple[Candidate, Saturation]]:
+    film = search.at(before.film.hypothesis, before.film.x)
+    if film is not None:
+        yield film, before.law
 
 
 def _starts(search: Search, base: Candidate) -> Iterator[tuple[Candidate, Saturation]]:
@@ -191,7 +203,7 @@ def _settled(point: _Point) -> Saturated:
         if gained < SATURATION.tolerance:
             break
     found = weighed(point.model, theta).log_evidence
-    return Saturated(point.law, found, point.law.reading(point.force), point.force >= point.law.limit)
+    return Saturated(point.law, point.film, found, point.law.reading(point.force), point.force >= point.law.limit)
 
 
 def _better(point: _Point, theta: Array) -> _Point | None:

@@ -75,7 +75,7 @@ def test_a_wave_that_was_taken_for_noise_with_a_memory_is_weighed_by_the_noise_b
     search, base = searched(m, 1.5 * SD * np.sin(2 * np.pi * m.time / 9.0), 4402)
     assert search.noise.rho > 0.3
     found = kind(foreign(search, base), WAVE)
-    monkeypatch.setattr(foreign_module, "_with_its_own_noise", lambda search, _, find: find(search))
+    monkeypatch.setattr(foreign_module, "_with_its_own_noise", lambda search, _, find: find(search, None))
     before = kind(foreign(search, base), WAVE)
     assert found.gain > before.gain + 10.0
     assert found.period == pytest.approx(9.0, rel=0.03)

@@ -63,6 +63,10 @@ def test_a_limit_of_another_law_is_found_with_its_softness(width: float) -> None
     left = search.measurement.force - found.reading
     assert np.sqrt(np.mean(left**2)) < 1.15 * SD
     assert 0.05 * width < 1 / found.law.sharpness < width
+    again = saturated(search, base, found)  # from where it was found
+    assert again is not None
+    assert again.law.limit == pytest.approx(found.law.limit, rel=1e-3)
+    assert again.log_evidence == pytest.approx(found.log_evidence, abs=0.2)
 
 
 @pytest.mark.parametrize("seed", range(4310, 4316))
