@@ -73,6 +73,7 @@ def test_sampling_and_comparing(run: Run, short_walks: None) -> None:
     assert answer["sentences"]
     code, out, err = run("report", answer["stored"], "--out", "page")
     assert code == 0, err
+    assert "Stability limits" in (Path("page") / "index.html").read_text()
 
 
 @pytest.mark.parametrize(
