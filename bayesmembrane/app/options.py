@@ -133,7 +133,7 @@ class TestsOptions(OptionGroup):
     curve: Annotated[
         Path,
         typer.Argument(
-            help="The measured curve (CSV whose header names carry units), or a project (TOML with [[test]] tables).",
+            help="The measured curve (CSV whose header names carry units), or a project (TOML with tables named test).",
             metavar="CURVE",
         ),
     ]
@@ -165,6 +165,8 @@ class TestsOptions(OptionGroup):
         """The whole measurement, where there is one alone; what was left aside while reading is said on stderr."""
         if self.specimen is None:
             raise typer.BadParameter("the curve needs a specimen file", param_hint="'--specimen'")
+        if self.curve.suffix.lower() == ".toml":
+            raise SettingsError("a project lists the specimens itself", "--specimen", "leave it out")
         return CurveOptions(self.curve, self.specimen, self.then, self.rest_s).read()
 
     def listed(self, used: RangeOption) -> list[Listed]:

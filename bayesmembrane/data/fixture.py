@@ -30,6 +30,7 @@ class Fixture(ABC):
     homogeneous : the film is stretched alike everywhere
     has_path : readings are stations of one test, which a film may remember; else each is a state of its own
     presses : the specimen gets shorter under a force that pushes
+    thickest : m, what is thicker is a wrong unit
     axes : what readers see along and up, in one word each, and the first one at rest: ("stretch", 1.0, "stress")
     ``check`` : what its lengths must satisfy among themselves
     """
@@ -42,6 +43,7 @@ class Fixture(ABC):
     homogeneous: ClassVar[bool] = False
     has_path: ClassVar[bool] = True
     presses: ClassVar[bool] = False
+    thickest: ClassVar[float] = 5e-3
     axes: ClassVar[tuple[str, float, str]] = ("deflection", 0.0, "force")
 
     def __post_init__(self) -> None:

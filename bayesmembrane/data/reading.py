@@ -23,7 +23,7 @@ from bayesmembrane.ground.registry import components
 from bayesmembrane.ground.units import FORCE, LENGTH, RATIO, TIME
 
 # What lies beyond these is a wrong unit, not a film.
-THICKNESSES = (1e-8, 5e-3)  # m
+THINNEST = 1e-8  # m
 RIG_SIZES = (1e-6, 1.0)  # m
 LARGEST_LIFT = 20.0  # largest deflection relative to the size of the rig
 LEAST_SD = 1e-12  # N
@@ -97,8 +97,8 @@ def _specimen(section: TomlSection, rig: Fixture, default_name: str) -> Specimen
     thickness = section.measure("thickness", LENGTH, "thickness_um")
     section.finish()
     specimen = _at(section.where, Specimen, name, thickness)
-    if not THICKNESSES[0] <= specimen.thickness <= THICKNESSES[1]:
-        fault = f"a film {1e3 * specimen.thickness:g} mm thick looks like a wrong unit"
+    if not THINNEST <= specimen.thickness <= rig.thickest:
+        fault = f"a specimen {1e3 * specimen.thickness:g} mm thick looks like a wrong unit"
         raise DataError(fault, section.where, "check the unit in the name of the key")
     return specimen
 

@@ -73,6 +73,7 @@ def test_sampling_and_comparing(run: Run, short_walks: None) -> None:
     assert answer["sentences"]
     code, out, err = run("report", answer["stored"], "--out", "page")
     assert code == 0, err
+    assert "Stability limits" in (Path("page") / "index.html").read_text()
 
 
 @pytest.mark.parametrize(
@@ -87,6 +88,7 @@ def test_sampling_and_comparing(run: Run, short_walks: None) -> None:
         (("fit", "project.toml", "--material", "gent", "--effects", "zero_offset@disc"), 1, '"disc"'),
         (("fit", "project.toml", "--material", "gent", "--effects", "off_centre_disc"), 1, "no test can show it"),
         (("fit", "project.toml", "--material", "gent", "--then", "strip.csv"), 1, "lists its tests itself"),
+        (("fit", "project.toml", "--material", "gent", "--specimen", "strip.toml"), 1, "lists the specimens itself"),
         (("sample", "project.toml", "--material", "gent", "--fork", "o"), 1, "begins on its own"),
         (("compare", "project.toml", "--materials", "gent", "--ranges-mm", "3"), 1, "no ranges in common"),
         (("compare", "project.toml", "--materials", "gent,gent"), 1, "there twice"),

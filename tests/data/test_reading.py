@@ -221,7 +221,7 @@ def test_missing_files_and_folders(files: Files) -> None:
     ("old", "new", "said"),
     [
         ("50.0", "-50.0", "[specimen]: the thickness must be positive, and -50 um is not"),
-        ("50.0", "50000.0", "[specimen]: a film 50 mm thick looks like a wrong unit"),
+        ("50.0", "50000.0", "[specimen]: a specimen 50 mm thick looks like a wrong unit"),
         ("50.0", '"50"', "thickness_um must be a finite number, and it is '50'"),
         ("50.0", "true", "thickness_um must be a finite number, and it is True"),
         ("50.0", "nan", "thickness_um must be a finite number"),

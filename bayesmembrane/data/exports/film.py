@@ -60,7 +60,7 @@ def film_of(facts: Sequence[Fact], hints: Hints, name: str, telling: Telling, gr
 
 def _unlike_a_film(thickness: float | None, width: float | None) -> str:
     """What is said of sizes that no film has; "" of others."""
-    if thickness and width and thickness >= width:
+    if thickness and width and thickness > width:
         return f"the specimen would be {1e3 * thickness:.6g} mm thick and only {1e3 * width:.6g} mm wide"
     for what, size, most in (("thick", thickness, THICKEST), ("wide", width, WIDEST)):
         if size and size > most:

@@ -28,6 +28,7 @@ class Pressed(Homogeneous, ABC):
 
     columns: ClassVar[Mapping[str, str]] = {"stretch": RATIO, "nominal_stress": STRESS}
     presses: ClassVar[bool] = True
+    thickest: ClassVar[float] = 0.1
     axes: ClassVar[tuple[str, float, str]] = ("compression", 0.0, "stress")
 
     @staticmethod

@@ -34,6 +34,7 @@ class Shear(Homogeneous):
     title: ClassVar[str] = "simple shear between plates"
     columns: ClassVar[Mapping[str, str]] = {"shear": RATIO, "shear_stress": STRESS}
     noise: ClassVar[Mapping[str, str]] = {"force_sd": FORCE, "shear_stress_sd": STRESS}
+    thickest: ClassVar[float] = 0.1
     axes: ClassVar[tuple[str, float, str]] = ("shear", 0.0, "stress")
 
     # ---- mechanics -------------------------------------------------------------------------------------------------

@@ -52,7 +52,7 @@ def phases_sentence(phases: Phases, how: Seen) -> str:
     cycles = int(phases.cycle.max())
     found = f"{len(phases.parts)} phases in {cycles} cycle{'s' if cycles > 1 else ''}"
     guessed = [name for name in ("direction", "cycle") if name not in phases.said]
-    small = f"{how.travel_scale[0] * phases.jitter:.3g} {how.travel_scale[1]}".strip()
+    small = f"{how.travel_scale[0] * phases.jitter:.3g} {how.travel_scale[1]}".rstrip(" -")
     parts = [f"{phases.name} went through {found}."]
     if phases.said:
         parts.append(f"The columns of the curve say {listed(phases.said)}.")

@@ -191,7 +191,12 @@ def test_every_guess_is_said() -> None:
 
 @pytest.mark.parametrize(
     ("thickness", "width", "said"),
-    [("0.5", "10", ""), ("18.2", "10", "18.2 mm thick and only 10 mm wide"), ("0.5", "10000", "larger than any")],
+    [
+        ("0.5", "10", ""),
+        ("10", "10", ""),
+        ("18.2", "10", "18.2 mm thick and only 10 mm wide"),
+        ("0.5", "10000", "larger than any"),
+    ],
 )
 def test_sizes_that_no_film_has_are_told(thickness: str, width: str, said: str) -> None:
     text = f"Thickness\t{thickness}\tmm\nWidth\t{width}\tmm\nGauge length\t50\tmm\nExtension (mm)\tForce (N)\n"

@@ -200,3 +200,16 @@ def test_exports_of_a_press_are_read_with_either_sign() -> None:
         assert np.abs(one.columns["nominal_stress"]) == pytest.approx(force / 1e-4, rel=1e-6)
     with pytest.raises(BayesmembraneError, match="bring shear and shear_stress as CSV"):
         imported(lines("Time (s),Extension (mm),Load (N)", np.arange(25.0), travel, force).encode(), rig="shear")
+
+
+@pytest.mark.parametrize("kind", ["compression", "shear"])
+def test_a_block_may_be_thicker_than_any_film(tmp_path: Path, kind: str) -> None:
+    names = {"compression": "stretch,nominal_stress_MPa", "shear": "shear,shear_stress_MPa"}[kind]
+    rows = {"compression": "0.9,-0.1\n0.8,-0.25\n", "shear": "0.1,0.04\n0.2,0.08\n"}[kind]
+    curve, film = tmp_path / "c.csv", tmp_path / "c.toml"
+    curve.write_text(f"{names}\n{rows}")
+    film.write_text(f'[specimen]\nthickness_mm = 29\n[rig]\nkind = "{kind}"\nlength_mm = 12.5\nwidth_mm = 29\n')
+    assert read_measurement(curve, film).specimen.thickness == pytest.approx(0.029)
+    film.write_text(film.read_text().replace("thickness_mm = 29", "thickness_mm = 290"))
+    with pytest.raises(DataError, match="290 mm thick looks like a wrong unit"):
+        read_measurement(curve, film)

@@ -7,6 +7,7 @@ import numpy as np
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.phases import Phases, phases_of
 from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.report.blocks import Figure, Table, Text
 from bayesmembrane.report.sections.phases import PhasesSection
 
@@ -33,6 +34,12 @@ def test_a_test_is_shown_once_with_its_guesses() -> None:
     assert "1 mm" not in table.caption
     assert [c.key for c in table.columns] == ["cycle", "phase", "from", "to", "seconds", "speed"]
     assert figure.picture.data
+
+
+def test_a_reversal_of_a_strip_is_a_stretch_without_a_unit() -> None:
+    m = Measurement(D, 30 * D, Uniaxial(length=0.05, width=0.01), Specimen("strip", 1e-3))
+    (text, *_) = PhasesSection().blocks([phases_of(m)])
+    assert "a reversal counts beyond 0.0025. Columns" in str(text)
 
 
 def test_what_columns_said_is_no_guess() -> None:
