@@ -62,6 +62,17 @@ def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
         _ = bm.fitt  # type: ignore[attr-defined]
 
 
+def test_the_name_of_an_energy_is_a_hypothesis() -> None:
+    """Of one test and of several; a wrong one is refused in a sentence that lists all."""
+    folder = data_folder()
+    one, other = (bm.read(folder / f"meunier_{n}.csv", folder / f"meunier_{n}.toml") for n in ("uniaxial", "planar"))
+    for tests in (one, [one, other]):
+        named, built = bm.fit(tests, "neo_hookean"), bm.fit(tests, bm.hypothesis("neo_hookean"))
+        assert bm.as_dict(named)["parameters"] == bm.as_dict(built)["parameters"]
+        with pytest.raises(bm.SettingsError, match="neo_hookean"):
+            bm.fit(tests, "neohookean")
+
+
 def test_the_import_is_cheap_and_silent(tmp_path: Path) -> None:
     """Not a third party is loaded that a user would wait for, and no warning passes."""
     done = run("-W", "error", "-c", "import bayesmembrane, sys; print(*sys.modules)", home=tmp_path)

@@ -42,7 +42,9 @@ from bayesmembrane.valleys.result import Valleys
 
 Folder = str | Path
 Tests = Mapping[str, Measurement] | Sequence[Measurement]
-Claims = Hypothesis | Mapping[str, Hypothesis]
+Claim = Hypothesis | str
+"""A hypothesis, or the name of an energy without effects, with white noise."""
+Claims = Claim | Mapping[str, Hypothesis]
 
 
 def read(curve: Folder, specimen: Folder, then: Sequence[Folder] = (), rest_s: float = 0.0) -> Measurement:
@@ -81,12 +83,12 @@ def joint(measurements: Mapping[str, Measurement] | Sequence[Measurement], hypot
     ``hypothesis`` is claimed of all of them, or is one for each label: effects and noise may differ, the energy may
     not. Raises `SettingsError` where they do not go together.
     """
-    return joint_of(measurements, hypothesis)
+    return joint_of(measurements, _named(hypothesis))
 
 
 @overload
 def fit(
-    measurement: Measurement, hypothesis: Hypothesis, *, loss: str = ..., seed: int = ..., out: Folder | None = ...
+    measurement: Measurement, hypothesis: Claim, *, loss: str = ..., seed: int = ..., out: Folder | None = ...
 ) -> Fit: ...
 
 
@@ -110,7 +112,7 @@ def fit(
     noise that it states, or else by its own residual; ``loss`` plays no part.
     """
     if not isinstance(measurement, Measurement):
-        return analyses.fit_joint(joint_of(measurement, hypothesis), _work(seed, out)).result
+        return analyses.fit_joint(joint_of(measurement, _named(hypothesis)), _work(seed, out)).result
     hypothesis = _single(hypothesis)
     return analyses.fit(measurement, hypothesis, _work(seed, out), loss=loss).result
 
@@ -118,7 +120,7 @@ def fit(
 @overload
 def sample(
     measurement: Measurement,
-    hypothesis: Hypothesis,
+    hypothesis: Claim,
     *,
     ess: float = ...,
     seed: int = ...,
@@ -152,7 +154,7 @@ def sample(
     each test has its own effects and noise; ``whole`` plays no part.
     """
     if not isinstance(measurement, Measurement):
-        return analyses.sample_joint(joint_of(measurement, hypothesis), _work(seed, out, ess)).result
+        return analyses.sample_joint(joint_of(measurement, _named(hypothesis)), _work(seed, out, ess)).result
     hypothesis = _single(hypothesis)
     return analyses.sample(measurement, hypothesis, _work(seed, out, ess), whole=whole).result
 
@@ -160,7 +162,7 @@ def sample(
 @one_thread
 def compare(
     measurement: Measurement | Tests,
-    hypotheses: Sequence[Hypothesis],
+    hypotheses: Sequence[Claim],
     *,
     ess: float = 1000.0,
     seed: int = 0,
@@ -173,11 +175,13 @@ def compare(
     Of several measurements of one material the joint evidence, hypothesis after hypothesis.
     """
     if not isinstance(measurement, Measurement):
-        claims = [joint_of(measurement, h) for h in hypotheses]
+        claims = [joint_of(measurement, _named(h)) for h in hypotheses]
         (both,) = analyses.compare_joint(claims, _work(seed, out, ess)).result.values()
         return both
     ranges = {f"up to {1e3 * float(measurement.deflection.max()):.4g} mm": Range(measurement)}
-    (found,) = analyses.compare(ranges, hypotheses, _work(seed, out, ess), workers=workers).result.values()
+    (found,) = analyses.compare(
+        ranges, [_single(h) for h in hypotheses], _work(seed, out, ess), workers=workers
+    ).result.values()
     return found
 
 
@@ -196,7 +200,7 @@ def population(
 @one_thread
 def valleys(
     measurement: Measurement,
-    hypothesis: Hypothesis,
+    hypothesis: Claim,
     ranges_mm: Sequence[float] = (),
     *,
     loss_rise: float = 0.1,
@@ -208,12 +212,12 @@ def valleys(
     With effects also what it is without them (`Beside`).
     """
     ends = [1e-3 * end for end in ranges_mm]
-    return analyses.valleys(measurement, hypothesis, _work(seed, out), ends=ends, rise=loss_rise).result
+    return analyses.valleys(measurement, _single(hypothesis), _work(seed, out), ends=ends, rise=loss_rise).result
 
 
 @overload
 def diagnose(
-    measurement: Measurement, hypothesis: Hypothesis | None = ..., *, seed: int = ..., out: Folder | None = ...
+    measurement: Measurement, hypothesis: Claim | None = ..., *, seed: int = ..., out: Folder | None = ...
 ) -> Diagnosis: ...
 
 
@@ -237,7 +241,7 @@ def diagnose(
     """
     if not isinstance(measurement, Measurement):
         claim = _asked(None).hypothesis if hypothesis is None else hypothesis
-        both = joint_of(measurement, claim)
+        both = joint_of(measurement, _named(claim))
         return analyses.diagnose_joint(both, _work(seed, out), declared=hypothesis is not None).result
     hypothesis = None if hypothesis is None else _single(hypothesis)
     return analyses.diagnose(measurement, _asked(hypothesis), _work(seed, out)).result
@@ -246,7 +250,7 @@ def diagnose(
 @one_thread
 def loop(
     measurement: Measurement,
-    hypothesis: Hypothesis | None = None,
+    hypothesis: Claim | None = None,
     *,
     ess: float = 1000.0,
     seed: int = 0,
@@ -260,7 +264,9 @@ def loop(
     are hypotheses that `sample` takes.
     """
     how = LoopSettings(adapt_noise=adapt_noise)
-    return analyses.loop(measurement, _asked(hypothesis), _work(seed, out, ess), how).result
+    return analyses.loop(
+        measurement, _asked(None if hypothesis is None else _single(hypothesis)), _work(seed, out, ess), how
+    ).result
 
 
 @one_thread
@@ -324,8 +330,14 @@ def _predicted(result: Any) -> Any:
     return read_run(result, predictions_of(result)) if isinstance(result, Run) else result
 
 
-def _single(hypothesis: Claims) -> Hypothesis:
+def _named(claims: Claims) -> Hypothesis | Mapping[str, Hypothesis]:
+    """Claims, of which a name is that of an energy; raises `SettingsError` for one that nobody declared."""
+    return hypotheses.hypothesis(claims) if isinstance(claims, str) else claims
+
+
+def _single(claims: Claims) -> Hypothesis:
     """The claim about one measurement."""
+    hypothesis = _named(claims)
     if not isinstance(hypothesis, Hypothesis):
         raise SettingsError(
             "one measurement has one hypothesis", remedy="give the measurements as a dict by label, too"

@@ -1,6 +1,7 @@
 """Several tests of one material at the command line."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -74,6 +75,16 @@ def test_sampling_and_comparing(run: Run, short_walks: None) -> None:
     code, out, err = run("report", answer["stored"], "--out", "page")
     assert code == 0, err
     assert "Stability limits" in (Path("page") / "index.html").read_text()
+    code, out, err = run("sample", "project.toml", "--material", "neo_hookean", "--ess", "50", "--out", "o")
+    assert code == 0, err
+    assert re.search(r"c1 .* N/m ", out)  # the same run again, in words: every number with its unit
+    assert re.search(r"strip.noise.sd .* N ", out)
+    pair = ("strip.csv", "--specimen", "strip.toml", "--with", "sheet.csv:sheet.toml")
+    code, out, err = run("compare", *pair, "--materials", "neo_hookean", "--ess", "50", "--json", "--out", "o")
+    assert code == 0, err
+    (row,) = json.loads(out)["table"]
+    assert row["hypothesis"] == "neo_hookean"
+    assert row["log_evidence"]["bridge"] == pytest.approx(row["log_evidence"]["nested"], abs=0.5)
 
 
 @pytest.mark.parametrize(

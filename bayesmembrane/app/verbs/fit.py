@@ -53,8 +53,11 @@ def show_jointly(found: JointFit) -> None:
     """Parameters, and how well every test is fitted, on the terminal."""
     from bayesmembrane.words.joint import fit_sentence
 
-    rows = [[n, f"{v:.6g}", "-" if sd is None else f"{sd:.2g}"] for n, (v, sd) in found.parameters.items()]
-    table(f"{found.joint.material.title} on {len(found.parts)} tests", ["parameter", "value", "sd"], rows)
+    units = {p.name.removeprefix(f"{found.joint.material.name}."): p.unit for p in found.joint.natural_parameters}
+    rows = [
+        [n, f"{v:.6g}", "-" if sd is None else f"{sd:.2g}", units.get(n, "")] for n, (v, sd) in found.parameters.items()
+    ]
+    table(f"{found.joint.material.title} on {len(found.parts)} tests", ["parameter", "value", "sd", "unit"], rows)
     say(f"Membrane parameters are those of the thinnest film, {1e6 * found.joint.thickness:.4g} um.")
     say(fit_sentence(found))
     say(f"The energy is {'' if found.convex else 'not '}convex where the films go.")

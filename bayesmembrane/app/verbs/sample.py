@@ -19,7 +19,9 @@ from bayesmembrane.app.terminal import INTERRUPTED, answer, bars, command, note,
 from bayesmembrane.ground.errors import SettingsError
 
 if TYPE_CHECKING:
+    from bayesmembrane.calibration.joint.claim import Joint
     from bayesmembrane.data.project import Listed
+    from bayesmembrane.physics.hypothesis import Hypothesis
 
 place = 6
 
@@ -49,7 +51,7 @@ def verb(
         note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")
         raise typer.Exit(INTERRUPTED)
     title = f"{claim.material.title} on {curve.shown}"
-    answer(found.document, output.as_json, lambda: show(found.document, title))
+    answer(found.document, output.as_json, lambda: show(found.document, title, claim))
 
 
 def jointly(
@@ -74,16 +76,17 @@ def jointly(
         note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")
         raise typer.Exit(INTERRUPTED)
     title = f"{claim.material.title} on {len(claim.parts)} tests, thinnest film {1e6 * claim.thickness:.4g} um"
-    answer(found.document, output.as_json, lambda: show(found.document, title))
+    answer(found.document, output.as_json, lambda: show(found.document, title, claim))
 
 
-def show(run: dict[str, Any], title: str) -> None:
+def show(run: dict[str, Any], title: str, claim: Hypothesis | Joint) -> None:
     """Parameters, and how well they were sampled, on the terminal."""
+    both = zip(claim.natural_parameters, run["posterior"].items(), strict=True)
     rows = [
-        [name, f"{v['mean']:.5g}", f"{v['sd']:.2g}", f"{v['hdi_94'][0]:.5g} to {v['hdi_94'][1]:.5g}"]
-        for name, v in run["posterior"].items()
+        [name, f"{v['mean']:.5g}", f"{v['sd']:.2g}", f"{v['hdi_94'][0]:.5g} to {v['hdi_94'][1]:.5g}", p.unit]
+        for p, (name, v) in both
     ]
-    table(title, ["parameter", "mean", "sd", "94 % interval"], rows)
+    table(title, ["parameter", "mean", "sd", "94 % interval", "unit"], rows)
     say(f"ESS {run['ess_bulk']:.0f}, R-hat {run['r_hat']:.3f}, {run['evaluations']} curves, {run['seconds']:.1f} s.")
     if (found := run.get("importance")) is not None:
         say(f"ln Z {found['log_evidence']:.2f} +- {found['log_evidence_sd']:.2f}, from the weights of all proposals.")
