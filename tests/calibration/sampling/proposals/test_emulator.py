@@ -1,5 +1,7 @@
 """The emulator: exact where curves are polynomial, and a walk on it that keeps its own density."""
 
+from itertools import combinations_with_replacement
+
 import numpy as np
 import pytest
 
@@ -61,6 +63,22 @@ def test_monomials_are_products() -> None:
     z = np.array([[2.0, 3.0]])
     terms = np.array([[0, 0], [0, 1], [1, 2], [2, 2]])
     assert monomials(z, terms).tolist() == [[4.0, 6.0, 3.0, 1.0]]
+
+
+@pytest.mark.parametrize(("count", "degree"), [(1, 1), (5, 2), (16, 3), (333, 4)])
+def test_monomials_are_products_to_the_last_bit(count: int, degree: int) -> None:
+    """From left to right as numpy multiplies, and laid out alike, so that sums of them are the same, too."""
+    z = np.random.default_rng(degree).standard_normal((count, 3))
+    z[0, 0] = np.nan
+    terms = np.array(list(combinations_with_replacement(range(4), degree)))
+    wide = np.concatenate([z, np.ones((count, 1))], axis=1)
+    expected = wide[:, terms[:, 0]]
+    for column in terms.T[1:]:
+        expected = expected * wide[:, column]
+    found = monomials(z, terms)
+    assert np.array_equal(found, expected, equal_nan=True)
+    assert found.flags.f_contiguous
+    assert found.shape == (count, len(terms))
 
 
 def test_along_the_axes_of_its_curves_a_posterior_is_the_same() -> None:
