@@ -1,12 +1,14 @@
 """The emulator: exact where curves are polynomial, and a walk on it that keeps its own density."""
 
+from dataclasses import fields, replace
 from itertools import combinations_with_replacement
+from typing import cast
 
 import numpy as np
 import pytest
 
 from bayesmembrane.calibration.posterior import Evaluation, Outcome, Posterior
-from bayesmembrane.calibration.sampling.proposals.emulator import DOUBT, emulate, monomials
+from bayesmembrane.calibration.sampling.proposals.emulator import DOUBT, Emulator, Lookup, emulate, monomials
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
@@ -53,6 +55,33 @@ def test_a_walk_keeps_the_emulated_density() -> None:
         before, after = start**power, end**power
         assert np.all(np.abs(after.mean(0) - before.mean(0)) < 5 * before.std(0) * np.sqrt(2 / 4000))
     assert factor == pytest.approx(found.log_density(start) - found.log_density(end))
+
+
+def test_what_is_refused_anyway_is_not_looked_up() -> None:
+    """A cut prior is asked for fewer proposals than are made, and the walk is the same as if it were for all."""
+    rng = np.random.default_rng(2)
+    found = emulate(Cubic(), draws(0, 400), rng)
+    assert found is not None
+    asked: list[int] = []
+
+    def lookup(z: np.ndarray) -> np.ndarray:
+        asked.append(len(z))
+        return np.asarray(z[:, 0] < 0.5)
+
+    cut = replace(found, lookup=cast(Lookup, lookup))
+    start, steps = draws(3, 200), 50
+    end, factor = cut.walk(start, np.random.default_rng(4), steps)
+    few, asked[:] = sum(asked), []
+
+    class Whole(Emulator):
+        def log_density(self, x: np.ndarray, least: np.ndarray | float = -np.inf) -> np.ndarray:
+            return super().log_density(x)
+
+    whole = Whole(**{f.name: getattr(cut, f.name) for f in fields(cut)})
+    same_end, same_factor = whole.walk(start, np.random.default_rng(4), steps)
+    assert np.array_equal(end, same_end)
+    assert np.array_equal(factor, same_factor)
+    assert few < 0.8 * sum(asked)
 
 
 def test_too_few_possible_draws_teach_nothing() -> None:
