@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from bayesmembrane.calibration.posterior import Evaluates, Posterior
+from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array
 
 LEARN_FROM, LEARN_FORCES, LEAST_DRAWS, HELD_OUT = 4000, 6_000_000, 60, 0.25
@@ -24,6 +25,7 @@ NEAR = 3.0  # standard deviations of the draws, in every direction, within which
 CUT = 0.1  # part of the points there that must be cut away to make that worth its time
 INNER = 100  # steps of a walk on the emulator
 FAR = 0.1  # part of them that jump the whole difference between two draws
+ROUND_OFF = 1e-6  # of ln q: less than what would be accepted by more than this is surely refused
 SHORT, FAINT = 0.5, 1e-8  # axes that must do for so many readings, and directions of curves that are left out
 
 
@@ -98,15 +100,16 @@ class Emulator:
     archive: Array
     lookup: Lookup | None = None
 
-    def log_density(self, x: Array) -> Array:
-        """ln q of x (B, k), shape (B,)."""
+    def log_density(self, x: Array, least: Array | float = -np.inf) -> Array:
+        """ln q of x (B, k), shape (B,); what is less than ``least`` (B,) may be any value that is less, too."""
         z = (x - self.centre) @ self.inverse.T
         with np.errstate(all="ignore"):
             near = self.posterior.given(monomials(z, self.terms) @ self.coefficients, x)
         wide = self.level + _log_t(z)
         if self.lookup is not None:
-            # Looking up takes longer than all else, and matters only where the wide density is not more anyway.
-            some = np.flatnonzero(near > wide)
+            # Looking up takes longer than all else, and matters only where the wide density is not more anyway, and
+            # where the sum may be enough.
+            some = np.flatnonzero((near > wide) & (np.logaddexp(near, wide) >= least))
             near[some[~self.lookup(z[some])]] = -np.inf
         return np.asarray(np.logaddexp(np.where(np.isnan(near), -np.inf, near), wide))
 
@@ -123,8 +126,9 @@ class Emulator:
             a, b = self.archive[rng.integers(len(self.archive), size=(2, n))]
             scale = np.where(rng.random((n, 1)) < FAR, 1.0, 2.38 / np.sqrt(2 * k) * rng.gamma(4.0, 0.25, (n, 1)))
             y = x + scale * (a - b)
-            there = self.log_density(y)
-            accept = np.log(rng.random(n)) < there - now
+            chance = np.log(rng.random(n))
+            there = self.log_density(y, now + chance - ROUND_OFF)
+            accept = chance < there - now
             x, now = np.where(accept[:, None], y, x), np.where(accept, there, now)
         return x, start - now
 
@@ -170,11 +174,25 @@ def _shortened(posterior: Emulated, coefficients: Array) -> tuple[Given, Array]:
 
 def monomials(z: Array, terms: NDArray[np.intp]) -> Array:
     """Products of the columns of z (B, k) named in ``terms`` (T, degree), shape (B, T)."""
-    wide = np.concatenate([z, np.ones((len(z), 1))], axis=1)
-    out = wide[:, terms[:, 0]]
-    for column in terms.T[1:]:
-        out = out * wide[:, column]
-    return np.asarray(out)
+    factors = np.ones((z.shape[1] + 1, len(z)))
+    factors[:-1] = z.T
+    return np.asarray(_products(factors, terms).T)
+
+
+@compiled()
+def _products(factors: Array, terms: NDArray[np.intp]) -> Array:
+    """(T, B) products of those rows of ``factors`` (k + 1, B) that are named in ``terms`` (T, degree).
+
+    A walk on an emulator does little else; draws lie side by side so that one instruction takes several.
+    """
+    count, degree = terms.shape
+    out = np.empty((count, factors.shape[1]))
+    for t in range(count):
+        row = out[t]
+        row[:] = factors[terms[t, 0]]
+        for d in range(1, degree):
+            row *= factors[terms[t, d]]
+    return out
 
 
 def _best(z: Array, force: Array, score: Callable[[Array, NDArray[np.bool_]], float]) -> tuple[NDArray[np.intp], Array]:

@@ -1,10 +1,14 @@
 """The emulator: exact where curves are polynomial, and a walk on it that keeps its own density."""
 
+from dataclasses import fields, replace
+from itertools import combinations_with_replacement
+from typing import cast
+
 import numpy as np
 import pytest
 
 from bayesmembrane.calibration.posterior import Evaluation, Outcome, Posterior
-from bayesmembrane.calibration.sampling.proposals.emulator import DOUBT, emulate, monomials
+from bayesmembrane.calibration.sampling.proposals.emulator import DOUBT, Emulator, Lookup, emulate, monomials
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
@@ -53,6 +57,33 @@ def test_a_walk_keeps_the_emulated_density() -> None:
     assert factor == pytest.approx(found.log_density(start) - found.log_density(end))
 
 
+def test_what_is_refused_anyway_is_not_looked_up() -> None:
+    """A cut prior is asked for fewer proposals than are made, and the walk is the same as if it were for all."""
+    rng = np.random.default_rng(2)
+    found = emulate(Cubic(), draws(0, 400), rng)
+    assert found is not None
+    asked: list[int] = []
+
+    def lookup(z: np.ndarray) -> np.ndarray:
+        asked.append(len(z))
+        return np.asarray(z[:, 0] < 0.5)
+
+    cut = replace(found, lookup=cast(Lookup, lookup))
+    start, steps = draws(3, 200), 50
+    end, factor = cut.walk(start, np.random.default_rng(4), steps)
+    few, asked[:] = sum(asked), []
+
+    class Whole(Emulator):
+        def log_density(self, x: np.ndarray, least: np.ndarray | float = -np.inf) -> np.ndarray:
+            return super().log_density(x)
+
+    whole = Whole(**{f.name: getattr(cut, f.name) for f in fields(cut)})
+    same_end, same_factor = whole.walk(start, np.random.default_rng(4), steps)
+    assert np.array_equal(end, same_end)
+    assert np.array_equal(factor, same_factor)
+    assert few < 0.8 * sum(asked)
+
+
 def test_too_few_possible_draws_teach_nothing() -> None:
     assert emulate(Cubic(), draws(0, 20), np.random.default_rng(0)) is None
 
@@ -61,6 +92,22 @@ def test_monomials_are_products() -> None:
     z = np.array([[2.0, 3.0]])
     terms = np.array([[0, 0], [0, 1], [1, 2], [2, 2]])
     assert monomials(z, terms).tolist() == [[4.0, 6.0, 3.0, 1.0]]
+
+
+@pytest.mark.parametrize(("count", "degree"), [(1, 1), (5, 2), (16, 3), (333, 4)])
+def test_monomials_are_products_to_the_last_bit(count: int, degree: int) -> None:
+    """From left to right as numpy multiplies, and laid out alike, so that sums of them are the same, too."""
+    z = np.random.default_rng(degree).standard_normal((count, 3))
+    z[0, 0] = np.nan
+    terms = np.array(list(combinations_with_replacement(range(4), degree)))
+    wide = np.concatenate([z, np.ones((count, 1))], axis=1)
+    expected = wide[:, terms[:, 0]]
+    for column in terms.T[1:]:
+        expected = expected * wide[:, column]
+    found = monomials(z, terms)
+    assert np.array_equal(found, expected, equal_nan=True)
+    assert found.flags.f_contiguous
+    assert found.shape == (count, len(terms))
 
 
 def test_along_the_axes_of_its_curves_a_posterior_is_the_same() -> None:
