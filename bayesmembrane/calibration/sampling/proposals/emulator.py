@@ -186,12 +186,16 @@ def _products(factors: Array, terms: NDArray[np.intp]) -> Array:
     A walk on an emulator does little else; draws lie side by side so that one instruction takes several.
     """
     count, degree = terms.shape
-    out = np.empty((count, factors.shape[1]))
+    draws = factors.shape[1]
+    out = np.empty((count, draws))
     for t in range(count):
-        row = out[t]
-        row[:] = factors[terms[t, 0]]
+        first = terms[t, 0]
+        for b in range(draws):
+            out[t, b] = factors[first, b]
         for d in range(1, degree):
-            row *= factors[terms[t, d]]
+            row = terms[t, d]
+            for b in range(draws):
+                out[t, b] *= factors[row, b]
     return out
 
 
