@@ -245,6 +245,10 @@ class GrowthThresholds:
     """ln of the Bayes factor behind the best of all, beyond which they are not, nor searched on."""
     less_gain: float = 3.0
     """ln of the Bayes factor that such a start may be behind what was found of it before, and be searched on."""
+    exchanges: int = 2
+    """Times that effects of the most probable set are exchanged for others, at most."""
+    exchanged: int = 2
+    """Effects that each of them is exchanged for."""
     worth: float = 1e-3
     """Of the probability of all smaller sets: below it, larger sets are not looked at."""
     round_off: float = 3e-6

@@ -103,6 +103,7 @@ def grown(case: DiagnosisCase) -> Grown:
     _with_less(out)
     if _grow(out):
         _with_less(out)
+    _with_exchanged(out)
     _with_twins(out)
     _checked(out)
     return out
@@ -176,6 +177,35 @@ def _lessened(out: Grown, size: int, best: float) -> Iterator[Candidate]:
         for name in [n for n in c.names if n not in given]:
             if best - c.log_evidence < GROWTH.less_reach and (less := out.search.at(*without_effect(c, name))):
                 yield less
+
+
+def _with_exchanged(out: Grown) -> None:
+    """The most probable set of several effects with each of them exchanged for those that promise most beside the rest.
+
+    What was added first may stand for what is there, and the rest of it be no set that anything grew from. Where that
+    led to a better set, it is done once more with that one.
+    """
+    for _ in range(GROWTH.exchanges):
+        best = max(out.found.values(), key=lambda c: c.log_evidence)
+        own = [n for n in best.names if n not in out.case.null.names]
+        for name in own if len(own) > 1 else []:
+            _exchanged(out, best, name)
+        if best is max(out.found.values(), key=lambda c: c.log_evidence):
+            break
+
+
+def _exchanged(out: Grown, best: Candidate, name: str) -> None:
+    """``best`` with one of its effects exchanged for others, from where its other effects are."""
+    energy, rest = best.hypothesis.material.name, frozenset(best.names) - {name}
+    less = out.found.get((energy, rest)) or out.search.at(*without_effect(best, name))
+    tried = {names for _, names in out.found}
+    others = [e for e in out.case.visible if e.name not in best.names and rest | {e.name} not in tried]
+    if less is None:
+        return
+    gains = {e.name: first_order(out.search, less, e) for e in others}
+    others.sort(key=lambda e: -gains[e.name])
+    for effect in others[: GROWTH.exchanged]:
+        out.add(_added(out, less, effect))
 
 
 def _with_twins(out: Grown) -> None:

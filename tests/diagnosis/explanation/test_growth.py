@@ -8,8 +8,9 @@ import pytest
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.explanation import growth
 from bayesmembrane.diagnosis.explanation.case import OpenCase
-from bayesmembrane.diagnosis.explanation.growth import Grown, _with_less
+from bayesmembrane.diagnosis.explanation.growth import Grown, _with_exchanged, _with_less
 from bayesmembrane.diagnosis.thresholds import GROWTH
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
@@ -91,3 +92,42 @@ def test_the_other_coordinates_are_where_they_were() -> None:
     assert sorted(len(x) for x in left) == sorted(sizes)
     for kept in (first, second):
         assert any(np.array_equal(x, kept) for x in left)
+
+
+def exchanged(
+    monkeypatch: pytest.MonkeyPatch, promised: dict[str, float], end: dict[frozenset[str], float]
+) -> list[Any]:
+    """Sets that are fitted by exchanging effects of {friction, tearing}, the best so far, with ln Z of ``end``."""
+    asked: list[Any] = []
+
+    def added(_: Grown, base: Candidate, effect: Any) -> Candidate:
+        names = frozenset((*base.names, effect.name))
+        asked.append(names)
+        return candidate(with_effects(base.hypothesis, [effect]), end.get(names, -60.0))
+
+    monkeypatch.setattr(growth, "first_order", lambda _, base, effect: promised[effect.name])
+    monkeypatch.setattr(growth, "_added", added)
+    visible = [components("effects")[n]() for n in ("friction", "tearing", *promised)]
+    case = SimpleNamespace(null=candidate(claim(), 0.0), visible=visible)
+    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, SimpleNamespace(at=lambda *_: None))))
+    for names, z in ((("friction",), -40.0), (("tearing",), -50.0), (("friction", "tearing"), -10.0)):
+        grown.add(candidate(claim(*names), z))
+    _with_exchanged(grown)
+    return asked
+
+
+PROMISED = {"mullins": 30.0, "viscoelastic": 5.0, "clamp_slip": 1.0}
+
+
+def test_effects_of_the_best_set_are_exchanged_for_what_promises_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = exchanged(monkeypatch, PROMISED, {})
+    pairs = [("tearing", "mullins"), ("tearing", "viscoelastic"), ("friction", "mullins"), ("friction", "viscoelastic")]
+    assert asked == [frozenset(p) for p in pairs]
+
+
+def test_a_better_set_that_is_found_by_that_is_gone_on_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is fitted twice."""
+    better = frozenset({"tearing", "mullins"})
+    asked = exchanged(monkeypatch, PROMISED, {better: -2.0})
+    assert len(asked) == len(set(asked))
+    assert frozenset({"tearing", "clamp_slip"}) in asked  # beside what is left of it
