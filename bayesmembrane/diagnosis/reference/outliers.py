@@ -65,15 +65,51 @@ def without_outliers(measurement: Measurement) -> tuple[Measurement, SetAside | 
 def _off(m: Measurement) -> Array:
     """(N,) robust standard deviations by which readings lie off the reference, 0 unless they do so alone.
 
-    Also 0 where the reference follows them anyway: one just after a turn may be the start of a relaxation.
+    Where the reference follows them anyway, one just after a turn may be the start of a relaxation; not one that goes
+    against the way and comes back at once.
     """
     profile = np.ones(len(m)) if m.force_sd is None else m.force_sd
     q = orthonormal(smooth_reference(m) / profile[:, None])
     y = m.force / profile
     spare = 1.0 - np.sum(q**2, axis=1)
     seen = spare > OUTLIERS.least_spare
-    rest = np.where(seen, y - q @ (q.T @ y), 0.0) / np.sqrt(np.where(seen, spare, 1.0))
-    return np.asarray(_alone(rest) / _scale(rest, 0.0 if m.force_sd is None else 1.0))
+    raw = np.where(seen, y - q @ (q.T @ y), 0.0)
+    root, stated = np.sqrt(np.where(seen, spare, 1.0)), 0.0 if m.force_sd is None else 1.0
+    off = np.maximum(_alone(raw / root), _against(y, m.deflection, ~seen) / np.sqrt(2.0)) / _scale(raw / root, stated)
+    for end, inwards in ((0, 1), (len(m) - 1, -1)):
+        if seen[end]:
+            without = np.where(seen, raw + q @ q[end] * raw[end] / spare[end], 0.0)  # of a reference without it
+            others = np.delete(without / root, end)
+            off[end] = _at_end(without, end, inwards) * root[end] / _scale(others, stated)[min(end, others.size - 1)]
+    return np.asarray(off)
+
+
+def _at_end(rest: Array, end: int, inwards: int) -> float:
+    """How far the reading at one end lies off a reference that does not know it, of which ``rest`` (N,) are the
+    residuals; 0 if the next one goes with it, as where a test ends with a tear.
+    """
+    k = OUTLIERS.neighbours
+    if rest.size < 2 * k + 1:
+        return 0.0
+    near = rest[end + inwards * np.arange(1, k + 1)]
+    return float(abs(rest[end])) if np.max(np.abs(near)) < 0.25 * abs(rest[end]) else 0.0
+
+
+def _against(y: Array, d: Array, followed: NDArray[np.bool_]) -> Array:
+    """(N,) how far readings y (N,) lie below the one before and the one after, the less of the two, where the disc went
+    up to d (N,) last, and above both where it went down; else 0. No film, and nothing that relaxes, does that.
+
+    Only of those that the reference follows, for waves do it, too; where the disc stands from there on, of all, and the
+    one after counts alone: what relaxes there goes the other way.
+    """
+    out = np.zeros(y.size)
+    moved = np.diff(d, prepend=d[0])
+    last = np.maximum.accumulate(np.where(moved != 0, np.arange(d.size), 0))
+    way = np.sign(moved[last])[1:-1]
+    before, after = way * (y[:-2] - y[1:-1]), way * (y[2:] - y[1:-1])
+    stands = (moved[1:-1] != 0) & (moved[2:] == 0)
+    out[1:-1] = np.maximum(np.where(stands, after, np.where(followed[1:-1], np.minimum(before, after), 0.0)), 0.0)
+    return out
 
 
 def _scale(rest: Array, stated: float) -> Array:
@@ -87,7 +123,7 @@ def _scale(rest: Array, stated: float) -> Array:
 
 def _alone(rest: Array) -> Array:
     """(N,) how far values ``rest`` (N,) lie off zero, off those before and off those after, the least of the three; 0
-    where these are to different sides, and at either end.
+    where these are to different sides, and near either end.
     """
     k, n = OUTLIERS.neighbours, rest.size
     out = np.zeros(n)

@@ -56,6 +56,51 @@ def test_one_reading_at_a_turn_or_anywhere_is(seed: int) -> None:
         assert np.array_equal(part.path.deflection, m.deflection)
 
 
+def stairs(seed: int) -> Measurement:
+    """Up and down in steps with holds, whose first readings relax within a few."""
+    up = np.concatenate([np.concatenate([np.linspace(a, a + 0.01, 20)[1:], np.full(20, a + 0.01)]) for a in STEPS])
+    down = np.concatenate([np.concatenate([np.linspace(a + 0.01, a, 20)[1:], np.full(20, a)]) for a in STEPS[::-1]])
+    d = np.concatenate([up, down])
+    still = np.diff(d, prepend=0.0) == 0
+    since = np.arange(d.size) - np.maximum.accumulate(np.where(still, 0, np.arange(d.size)))
+    way = np.where(np.arange(d.size) < up.size, 1.0, -1.0)
+    force = 40 * d + 2e4 * d**3 + 0.05 * way * np.exp(-since / 2.0) * (d > 0)
+    noisy = force + SD * np.random.default_rng(seed).standard_normal(d.size)
+    return Measurement(d, noisy, Annulus(0.010, 0.035), Specimen("film", 5e-5), time=np.arange(d.size) + 1.0)
+
+
+STEPS = (0.0, 0.01, 0.02)
+
+
+@seeds
+def test_a_hold_that_begins_against_the_way_is_no_relaxation(seed: int) -> None:
+    """The first reading of a hold is followed by whatever relaxes; none begins below what comes before and after."""
+    m = stairs(seed)
+    assert without_outliers(m)[1] is None
+    first = np.flatnonzero((np.diff(m.deflection, append=np.nan) == 0) & (np.diff(m.deflection, prepend=0.0) != 0))
+    for where, size in ((first[0], -0.1), (first[2], -0.1), (first[3], 0.1)):
+        change = np.zeros(len(m))
+        change[where] = size
+        aside = without_outliers(moved(m, change))[1]
+        assert aside is not None
+        assert aside.numbers == (where + 1,)
+        assert aside.farthest > 6
+
+
+@seeds
+def test_so_is_the_first_or_the_last_one_and_not_what_the_test_ends_with(seed: int) -> None:
+    for where in (0, 299):
+        change = np.zeros(300)
+        change[where] = -0.3
+        aside = without_outliers(moved(cycles(seed), change))[1]
+        assert aside is not None
+        assert aside.numbers == (where + 1,)
+    for last in (2, 3, 5):  # a tear just before the end
+        change = np.zeros(300)
+        change[-last:] = -0.2
+        assert without_outliers(moved(cycles(seed), change))[1] is None
+
+
 @seeds
 def test_doing_it_again_changes_nothing(seed: int) -> None:
     change = np.zeros(300)
