@@ -208,7 +208,7 @@ def _ambiguous(course: Course) -> str:
     d = course.telling
     sure = _certain(d)
     which = f"only {sure} is certain" if sure else "this curve cannot tell which"
-    return f"{which}; the first explains {_explained(d)} of what is missed{_beside(d)}"
+    return f"{which}; the first explains {_explained(d)} of it{_beside(d)}"
 
 
 def _unknown(course: Course) -> str:

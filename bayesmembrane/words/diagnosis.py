@@ -221,8 +221,9 @@ def foreign_sentence(f: Foreign, shown: Units) -> str:
         )
     if f.kind == CLIPPED:
         softly = f" and yields within about {100 * f.soft:.1g} % of it" if f.soft >= WORDS.soft_limit else ""
+        limit = f"{f.size:.4g} N" if unit.endswith("N") else f"{factor * f.size:.4g} {unit}"
         return (
-            f"The load cell is at its limit of {f.size:.4g} N from reading {f.place + 1} on{softly}: leave these "
+            f"The load cell is at its limit of {limit} from reading {f.place + 1} on{softly}: leave these "
             "readings out."
         )
     assert f.kind == UNNAMED
