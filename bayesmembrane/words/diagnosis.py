@@ -223,8 +223,7 @@ def foreign_sentence(f: Foreign, shown: Units) -> str:
         softly = f" and yields within about {100 * f.soft:.1g} % of it" if f.soft >= WORDS.soft_limit else ""
         limit = f"{f.size:.4g} N" if unit.endswith("N") else f"{factor * f.size:.4g} {unit}"
         return (
-            f"The load cell is at its limit of {limit} from reading {f.place + 1} on{softly}: leave these "
-            "readings out."
+            f"The load cell is at its limit of {limit} from reading {f.place + 1} on{softly}: leave these readings out."
         )
     assert f.kind == UNNAMED
     return (
