@@ -47,6 +47,11 @@ class Grown:
             self.found[key] = candidate
 
     @property
+    def best(self) -> Candidate:
+        """The most probable by the data alone."""
+        return max(self.found.values(), key=lambda c: c.log_evidence)
+
+    @property
     def counts(self) -> float:
         """What part of every ln Bayes factor counts, with the gain of the best so far."""
         best = max(c.log_evidence for c in self.found.values())
@@ -82,7 +87,7 @@ class Grown:
 
     def renew(self) -> None:
         """Noise from the best candidate, and all of them weighed under it."""
-        best = max(self.found.values(), key=lambda c: c.log_evidence)
+        best = self.best
         self.search = self.case.renewed(self.search, best)
         self.found = {key: self.search.weighed_anew(c) for key, c in self.found.items()}
 
@@ -186,11 +191,11 @@ def _with_exchanged(out: Grown) -> None:
     led to a better set, it is done once more with that one.
     """
     for _ in range(GROWTH.exchanges):
-        best = max(out.found.values(), key=lambda c: c.log_evidence)
+        best = out.best
         own = [n for n in best.names if n not in out.case.null.names]
         for name in own if len(own) > 1 else []:
             _exchanged(out, best, name)
-        if best is max(out.found.values(), key=lambda c: c.log_evidence):
+        if best is out.best:
             break
 
 
@@ -210,7 +215,7 @@ def _exchanged(out: Grown, best: Candidate, name: str) -> None:
 
 def _with_twins(out: Grown) -> None:
     """The most probable set with each of its effects that this test cannot tell from another as that other."""
-    best = max(out.found.values(), key=lambda c: c.log_evidence)
+    best = out.best
     energy, known = best.hypothesis.material.name, {e.name: e for e in out.case.effects}
     unseen = [
         (old, new)

@@ -208,9 +208,7 @@ def _foreign(grown: Grown, every: Sequence[Candidate], given: Sequence[str]) -> 
     """What is foreign beside the best energy of the first few sets, and beside the plain model; a limit beside every
     plain energy.
     """
-    bases: dict[str, Candidate] = {}
-    for c in every:
-        bases.setdefault(set_name(c, given), c)
+    bases = {set_name(c, given): c for c in _leaders(every)}
     chosen = dict(list(bases.items())[: FOREIGN.bases])
     chosen.setdefault(NOTHING, bases[NOTHING])
     grown.case.tell("looking for what no effect describes")

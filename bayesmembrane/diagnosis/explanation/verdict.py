@@ -120,12 +120,13 @@ def _first_order(case: DiagnosisCase, found: Sequence[Foreign]) -> Probabilities
     odds = [e.odds for e in case.visible]
     none = float(np.logaddexp.reduce(list(plain.values())))
     near = [n for n, c in case.plain.items() if best - c.log_evidence < GROWTH.energy_reach]
-    sets, energies = {NOTHING: none + BELIEFS.log_set((), odds)}, {n: [w] for n, w in plain.items()}
+    nothing = BELIEFS.log_set((), odds)
+    sets, energies = {NOTHING: none + nothing}, {n: [w] for n, w in plain.items()}
     for e in case.visible:
         beside = {n: plain[n] + first_order(case.search, case.plain[n], e) for n in near}
         together, prior = float(np.logaddexp.reduce(list(beside.values()))), BELIEFS.log_set((e.odds,), odds)
         for n, w in beside.items():
-            energies[n].append(w + prior - BELIEFS.log_set((), odds))
+            energies[n].append(w + prior - nothing)
         weight = together + prior
         if together - none <= BELIEFS.supported:  # neither seen nor excluded
             sets[NOTHING] = float(np.logaddexp(sets[NOTHING], weight + np.log(BELIEFS.unseen)))
