@@ -12,7 +12,7 @@ from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
 from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, Tell, opened
 from bayesmembrane.diagnosis.explanation.growth import grown
-from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, summed
+from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, set_name, summed
 from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, decided
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
 from bayesmembrane.diagnosis.left.remaining import remaining
@@ -100,7 +100,7 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
         after=misfit_of(best.residual, sd, best.x.size, search.noise.white(best.residual)),
         shape=residual_shape(case.measurement, null.residual),
         validation=validation,
-        experiments=_experiments(search, found),
+        experiments=_experiments(search, found, null),
     )
 
 
@@ -145,9 +145,10 @@ def _validated(case: OpenCase, search: Search, found: Verdict) -> HeldOut | None
     return validate(search, null, found.members[0].candidate, rivals)
 
 
-def _experiments(search: Search, found: Verdict) -> tuple[Experiment, ...]:
+def _experiments(search: Search, found: Verdict, null: Candidate) -> tuple[Experiment, ...]:
     """What to measure next, where rivals are left."""
     if found.verdict != "ambiguous" or len(found.members) < 2:
         return ()
-    rivals = [j.candidate for j in found.members[: VERDICT.most_members]]
-    return tuple(experiments(search.measurement, rivals, search.noise.sd, search.quick))
+    given, p = null.names, found.probabilities
+    told = found.members[: VERDICT.most_members]
+    return tuple(experiments(search, [(j.candidate, p.effects[set_name(j.candidate, given)]) for j in told]))

@@ -3,53 +3,103 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
-from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.ground.errors import BayesmembraneError
-from bayesmembrane.next_test.further import FurtherTest, Kind, Simulation, other_motions
-from bayesmembrane.next_test.gain import separation
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.next_test.further import FurtherTest, Kind, OnFilm, other_motions
+from bayesmembrane.next_test.gain import confused
 from bayesmembrane.physics.effects.base import Compliance
-from bayesmembrane.physics.forward import Solve
+from bayesmembrane.physics.form_error import FormFactors, form_columns, form_factors, traces
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.noise.ar1 import gaps_of
+
+Rival = tuple[Candidate, float]
+"""An explanation and its probability."""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A further measurement and how far apart it would put the nearest two rivals.
+    """A further measurement and how far apart it would put the rivals.
 
-    separation : in standard deviations of the noise, after each rival has adapted its parameters; inf: one sees it bare
+    separation : in standard deviations of what two rivals leave open: two that lie so far apart would be taken for each
+        other as often as these are on average, weighed by their probabilities; inf: one sees it bare
     """
 
     test: FurtherTest
     separation: float
 
 
-def experiments(measurement: Measurement, rivals: Sequence[Candidate], sd: float, solve: Solve) -> list[Experiment]:
-    """Further measurements, the one that separates the nearest two rivals best first.
+def experiments(search: Search, rivals: Sequence[Rival]) -> list[Experiment]:
+    """Further measurements, first the one that leaves least doubt which of the rivals it is.
 
-    Rival A makes the curve, and rival B is fitted to old and new points together, to first order: what B cannot follow,
-    over the noise, is the separation. A test that cannot be simulated for some rival is left out.
+    With p_a the probability of a rival, and what it foretells of the readings, N(m_a, S_a), from noise, the form errors
+    that it has shown, and what the measurement leaves open of its parameters, the probability of a wrong choice is at
+    most
+
+        E = sum_(a < b) (p_a p_b)^(1/2) BC_ab,    BC_ab = int (N_a N_b)^(1/2),
+
+    and ``separation`` s is that of two sharp rivals as often confused, exp(-s^2 / 8) = E / sum (p_a p_b)^(1/2).
+    A. Bhattacharyya, Bull. Calcutta Math. Soc. 35 (1943) 99; T. Kailath, IEEE Trans. Commun. Tech. 15 (1967) 52. A test
+    that cannot be simulated for some rival is left out.
     """
     out = []
-    for trial in other_motions(measurement):
+    weight = np.sqrt([a[1] * b[1] for a, b in combinations(rivals, 2)])
+    for trial in other_motions(search.measurement):
         try:
-            distance = min(_separation(trial, a, b, sd, solve) for a, b in combinations(rivals, 2))
+            log_confused = confused(_foretold(trial, search, [c for c, _ in rivals]))
         except (BayesmembraneError, np.linalg.LinAlgError):
             continue
-        if np.isfinite(distance):
-            out.append(Experiment(trial.test, float(distance)))
-    frame = [any(isinstance(e, Compliance) for e in r.hypothesis.effects) for r in rivals]
+        doubt = float(weight @ np.exp(log_confused) / np.sum(weight))
+        out.append(Experiment(trial.test, float(np.sqrt(-8 * np.log(max(doubt, 1e-300))))))
+    frame = [any(isinstance(e, Compliance) for e in c.hypothesis.effects) for c, _ in rivals]
     if any(frame) and not all(frame):
         out.append(Experiment(FurtherTest(Kind.BLANK), np.inf))
     return sorted(out, key=lambda e: -e.separation)
 
 
-def _separation(trial: Simulation, a: Candidate, b: Candidate, sd: float, solve: Solve) -> float:
-    """|(F_A - F_B) of the new points, less what B's slopes on old and new points absorb| / sd."""
-    shown = [trial.signals(c.hypothesis, c.x[None, :], solve) for c in (a, b)]
-    difference = np.concatenate([b.residual - a.residual, shown[0].force[0] - shown[1].force[0]])
-    return separation(difference, np.concatenate([b.slopes, shown[1].slopes[0]]), sd)
+def _foretold(trial: OnFilm, search: Search, rivals: Sequence[Candidate]) -> list[tuple[Array, Array]]:
+    """Of each rival (m (M,), G (M, r)): it says that the readings, freed of noise, are N(m, 1 + G G^T).
+
+    Raises `LinAlgError` where a rival has no film for the whole test.
+    """
+    noise = replace(search.noise, gaps=gaps_of(trial.measurement, search.noise.clock), root=None, profile=np.ones(1))
+    factors: FormFactors | None = None
+    out = []
+    for c in rivals:
+        shown = trial.signals(c.hypothesis, c.x[None, :], search.quick)
+        force, slopes = shown.force[0], shown.slopes[0]
+        if not (np.all(np.isfinite(force)) and np.all(np.isfinite(slopes))):
+            raise np.linalg.LinAlgError("a rival has no film for the whole of a further test")
+        if factors is None:
+            factors = form_factors(replace(trial.measurement, force=force))
+        out.append(_one(c, search, noise, (force, slopes, _forms(trial, c, search, factors, force))))
+    return out
+
+
+def _one(c: Candidate, search: Search, noise: OwnNoise, shown: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+    """Mean and spread of one rival whose film has these force (M,), slopes (M, k) and form errors (M, q) N."""
+    force, slopes, forms = shown
+    k = c.x.size
+    mean, covariance = search.linear(c).coefficients(c.theta)
+    own = slopes * search.steepness(c)
+    value, vector = np.linalg.eigh(covariance[:k, :k])
+    open_yet = own @ (vector * np.sqrt(np.maximum(value, 0.0)))
+    moved = force + own @ (mean[:k] - search.coefficients_at(c))
+    white = noise.white(np.column_stack([moved, open_yet, forms]))
+    return white[:, 0], white[:, 1:]
+
+
+def _forms(trial: OnFilm, c: Candidate, search: Search, factors: FormFactors, force: Array) -> Array:
+    """(M, q) N: what the form errors of a rival, as large as it has shown them, could make of the further test."""
+    forward = Forward(c.hypothesis, trial.measurement, trial.deflection, search.quick)
+    trace = traces(forward, c.x, force[None, :])[0]
+    sizes = iter(np.exp(c.theta[1:]).tolist())
+    columns = form_columns(factors, force, c.hypothesis.effects, trace)
+    return np.column_stack([(1.0 if size is None else next(sizes)) * part for size, part in columns])

@@ -23,6 +23,8 @@ SMALL = 0.3  # of it: where the film is nearly linear
 LEG = 240  # readings of a leg
 PEAKS = (0.5, 0.75, 1.0, 1.0)  # what remembers the past shows on rising peaks, and on the repeated one
 FASTER = 10.0  # a decade shows rate and relaxation
+HELD = 2.0  # times the loading of the same test: as long is waited at the top, and at rest
+WAIT = 120  # readings of a hold
 SAME = 1e-9  # relative: deflections closer than this are one
 
 
@@ -36,6 +38,7 @@ class Kind(Enum):
     UNLOADING = "unloading"
     CYCLES = "cycles"
     FASTER = "faster"
+    HOLD = "hold"
     OTHER_SIZE = "other size"
     BLANK = "blank run"
 
@@ -48,6 +51,7 @@ class FurtherTest:
     start, end : m, between which deflections
     beyond : whether that is further than the film was ever tested
     speed : times the present one
+    hold : s for which the disc stands still at the top, and at rest
     rig : name of another rig, for another specimen of the same film
     stretch : how far that specimen is pulled
     change : what another size of the same rig is, in the words of `Rig.variants`
@@ -58,6 +62,7 @@ class FurtherTest:
     end: float = 0.0
     beyond: bool = False
     speed: float = 1.0
+    hold: float = 0.0
     rig: str = ""
     stretch: float = 1.0
     change: str = ""
@@ -174,6 +179,10 @@ def other_motions(m: Measurement) -> Iterator[OnFilm]:
     again = there_and_back if cyclic else up
     if m.path.time is not None:
         yield _moved(m, FurtherTest(Kind.FASTER, speed=FASTER), again)
+        wait = HELD * top / _speed(m)
+        standing = [np.full(WAIT, at) for at in (top, 0.0)]
+        twice = [up, standing[0], up[::-1], standing[1], up, up[::-1]]
+        yield _moved(m, FurtherTest(Kind.HOLD, hold=wait), np.concatenate(twice))
     for words, rig in rig_of(m).variants():
         test = FurtherTest(Kind.OTHER_SIZE, change=words)
         trial = _test(replace(m, rig=rig), test, again)
@@ -195,8 +204,17 @@ def _moved(m: Measurement, test: FurtherTest, deflection: Array) -> OnFilm:
 
 
 def _test(m: Measurement, test: FurtherTest, deflection: Array) -> Measurement:
-    """Readings at ``deflection``, at the speed of the measurement times that of the test."""
-    speed = test.speed * (NOMINAL_SPEED if m.path.time is None else float(np.median(m.path.speed)))
-    steps = np.maximum(np.abs(np.diff(deflection, prepend=0.0)), 1e-9)
-    time = None if m.path.time is None else np.cumsum(steps) / speed
+    """Readings at ``deflection``, at the speed of the measurement times that of the test; what stands there more than
+    once in a row is waited for.
+    """
+    steps = np.abs(np.diff(deflection, prepend=0.0))
+    time = None
+    if m.path.time is not None:
+        moving = np.maximum(steps, 1e-9) / (test.speed * _speed(m))
+        time = np.cumsum(np.where(steps > 0, moving, np.maximum(moving, test.hold / WAIT)))
     return Measurement(deflection, np.ones(deflection.size), m.rig, m.specimen, time=time, full_range=m.full_range)
+
+
+def _speed(m: Measurement) -> float:
+    """m/s, of the disc."""
+    return NOMINAL_SPEED if m.path.time is None else float(np.median(m.path.speed))

@@ -38,6 +38,8 @@ def spoken_test(test: FurtherTest, present: Fixture | None = None) -> str:
             return "unloading cycles to rising peaks"
         case Kind.FASTER:
             return f"the same test {test.speed:g} times faster"
+        case Kind.HOLD:
+            return f"the same test twice, held for {test.hold:.3g} s at the top and at rest in between"
         case Kind.OTHER_SIZE:
             return f"the same test {test.change}"
         case Kind.BLANK:

@@ -8,7 +8,7 @@ import pytest
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.registry import components
 from bayesmembrane.next_test.further import Kind, other_motions, other_ranges, other_specimens, same_again
-from bayesmembrane.next_test.gain import information, longest_axis, separation
+from bayesmembrane.next_test.gain import confused, information, longest_axis
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -97,8 +97,39 @@ def test_the_longest_axis_shrinks_as_information_grows() -> None:
     assert longest_axis(precision + known, scale) == pytest.approx(1.0)
 
 
-def test_what_a_rival_can_follow_does_not_separate() -> None:
-    slopes = np.array([[1.0], [1.0], [0.0]])
-    assert separation(np.array([2.0, 2.0, 0.0]), slopes, 0.5) == pytest.approx(0.0, abs=1e-12)
-    assert separation(np.array([2.0, 2.0, 3.0]), slopes, 0.5) == pytest.approx(6.0)
-    assert separation(np.array([2.0, np.nan, 3.0]), slopes, 0.5) == np.inf
+def test_confused_is_the_integral_over_both_densities() -> None:
+    """BC = int sqrt(N(m_a, S_a) N(m_b, S_b)), here in two dimensions, by a grid."""
+    rng = np.random.default_rng(5)
+    told = [(rng.normal(0, 1.5, 2), rng.normal(0, 0.8, (2, 3))) for _ in range(3)]
+    at = np.linspace(-25, 25, 2001)
+    points = np.stack(np.meshgrid(at, at), axis=-1)
+
+    def density(told: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        covariance = np.eye(2) + told[1] @ told[1].T
+        d = points - told[0]
+        square = np.einsum("xyi,ij,xyj->xy", d, np.linalg.inv(covariance), d)
+        return np.exp(-0.5 * square) / (2 * np.pi * np.sqrt(np.linalg.det(covariance)))
+
+    cell = (at[1] - at[0]) ** 2
+    pairs = [(told[a], told[b]) for a, b in ((0, 1), (0, 2), (1, 2))]
+    expected = [np.log(np.sum(np.sqrt(density(a) * density(b))) * cell) for a, b in pairs]
+    np.testing.assert_allclose(confused(told), expected, rtol=1e-6)
+
+
+def test_what_a_rival_leaves_open_does_not_separate() -> None:
+    """Sharp predictions d apart: ln BC = -d^2 / 8; along a direction that is wide open next to nothing is told."""
+    apart, sharp, wide = np.array([6.0, 0.0]), np.zeros((2, 1)), np.array([[1e3], [0.0]])
+    assert confused([(apart, sharp), (0 * apart, sharp)]) == pytest.approx([-36 / 8])
+    assert confused([(apart, wide), (0 * apart, wide)]) == pytest.approx([0.0], abs=1e-5)
+
+
+def test_a_hold_is_waited_for_at_the_top_and_at_rest() -> None:
+    timed = {t.test.kind: t for t in other_motions(film(timed=True))}
+    assert Kind.HOLD not in {t.test.kind for t in other_motions(film())}
+    trial = timed[Kind.HOLD]
+    time, at = trial.measurement.time, trial.deflection
+    assert time is not None and np.all(np.diff(time) > 0)
+    held = trial.measurement.holds
+    assert [float(at[h[5]]) for h in held] == [0.03, 0.0]
+    for readings in held:
+        assert np.ptp(time[readings]) == pytest.approx(trial.test.hold, rel=0.05)

@@ -38,9 +38,9 @@ from tests.studies.results import stored
 RESULTS = Path(__file__).parents[2] / "reports" / "study-sequential" / "results.jsonl"
 GROUPS = ("single", "pair", "triple")
 TESTS = 2
-READINGS = 240
+READINGS = 480
 """Of a further test, at most: evenly among those that it was simulated with."""
-SAME_RIG = (Kind.UNLOADING, Kind.CYCLES, Kind.FASTER)
+SAME_RIG = (Kind.UNLOADING, Kind.CYCLES, Kind.FASTER, Kind.HOLD)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +83,13 @@ class Film:
         where, when = new[0], new[1][done.time.size :]
         keep = _kept(where, when)
         where, when = where[keep], when[keep] - float(motion.time[done.time.size - 1]) + float(done.time[-1])  # type: ignore[index]
-        up = np.diff(where, prepend=done.deflection[-1]) >= 0
+        steps = np.diff(where, prepend=done.deflection[-1])
+        last = np.maximum.accumulate(np.where(steps != 0, np.arange(steps.size), -1))
+        # Where the disc stands still it belongs to the leg before, and has its speed.
+        up = np.where(last >= 0, steps[last] > 0, done.leg[-1] % 2 == 0)
         leg = int(done.leg[-1]) + np.cumsum(np.diff(up, prepend=bool(done.leg[-1] % 2 == 0)))
-        speed = np.abs(np.diff(where, prepend=done.deflection[-1])) / np.diff(when, prepend=done.time[-1])
-        speed[speed == 0.0] = np.median(speed)  # a turning point is read twice, and the drive stood at no time
+        speed = np.abs(steps) / np.diff(when, prepend=done.time[-1])
+        speed = np.where(last >= 0, speed[last], done.speed[-1])
         peak = np.array([max(np.max(where[leg == n]), where[leg == n][0]) for n in leg])
         joined = [np.concatenate(pair) for pair in zip(_arrays(done), (when, where, leg, speed, peak), strict=True)]
         return Film(self.data, Way(*joined))
