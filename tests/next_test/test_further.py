@@ -128,7 +128,8 @@ def test_a_hold_is_waited_for_at_the_top_and_at_rest() -> None:
     assert Kind.HOLD not in {t.test.kind for t in other_motions(film())}
     trial = timed[Kind.HOLD]
     time, at = trial.measurement.time, trial.deflection
-    assert time is not None and np.all(np.diff(time) > 0)
+    assert time is not None
+    assert np.all(np.diff(time) > 0)
     held = trial.measurement.holds
     assert [float(at[h[5]]) for h in held] == [0.03, 0.0]
     for readings in held:
