@@ -11,7 +11,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-sequential study-fuzz study-import study-scale study-kill study-overnight study-damage study-foretold study-seeds study-sbc study-modes study-beside study-growth clean
+.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-sequential study-fuzz study-import study-scale study-kill study-overnight study-damage study-foretold study-seeds study-sbc study-modes study-beside study-growth study-long clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -34,6 +34,7 @@ help:
 	@echo "make study-sbc  simulation-based calibration of every material, hours; goes on where it was; SBC='--only gent --limit 20' asks for less"
 	@echo "make study-modes four rubbers in several modes each, half an hour or so; goes on where it was; MODES='--evidence-on none' asks for less"
 	@echo "make study-beside  other samplers and FElupe beside this package, in an environment of their own, an hour or so; goes on where it was; BESIDE='--materials gent' asks for less"
+	@echo "make study-long  an export of 200 000 rows through every verb: seconds of a processor, and memory; some minutes"
 	@echo "make study-growth  CPU seconds against readings, walkers, parameters, specimens, a quarter of an hour or so; goes on where it was; GROWTH='--only readings' asks for less"
 	@echo "make install  the set-up alone, into $(VENV)"
 	@echo "make lint     style, types and floors alone"
@@ -128,6 +129,9 @@ $(SIDE)/.installed: tests/studies/side_by_side.txt constraints.txt pyproject.tom
 
 study-beside: $(SIDE)/.installed
 	$(SIDE)/bin/python -m tests.studies.side_by_side --table docs/studies/side_by_side.md $(BESIDE)
+
+study-long: $(STAMP)
+	$(PY) -m tests.studies.long_files --table docs/studies/long_files.md
 
 study-growth: $(STAMP)
 	$(PY) -m tests.studies.growth --table docs/studies/growth.md $(GROWTH)
