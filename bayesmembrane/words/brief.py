@@ -35,7 +35,7 @@ MOST_TOLD = 3
 """Explanations whose probability is told."""
 MOST_SIZES = 3
 """Effects whose size is told with it; what is not told on the first screen is below."""
-FAR_APART = 100.0
+FAR_APART = 10.0
 """Times the noise from which it is not told by how much a test would tell two explanations apart."""
 ANSWERED = ("named", "material", "ambiguous")
 """Verdicts that rest on another model than the one that was given."""
@@ -126,7 +126,7 @@ def _brief(course: Course, following: str) -> Brief:
 
 
 def tested(d: Diagnosis) -> str:
-    """``film (reconstructed): 700 readings, 3 cycles up to 30 mm, against Yeoh.``"""
+    """``film (reconstructed): 700 readings, 3 cycles to 30 mm, against Yeoh.``"""
     m, how = d.measurement, seen(d.measurement)
     origin = "" if how.origin == MEASURED else f" ({how.origin}, not measured)"
     what = "readings" if how.origin == MEASURED else "points"
@@ -134,7 +134,7 @@ def tested(d: Diagnosis) -> str:
     of = f" in {cycles} cycles" if cycles > 1 else " of a loop" if np.any(m.leg < 0) else ""
     of = of if m.rig.has_path else ""
     aside = "" if d.set_aside is None else f" ({len(d.set_aside.numbers)} set aside)"
-    readings = f"{len(m)} {what}{aside}{of} up to {how.place(float(np.max(m.deflection)))}"
+    readings = f"{len(m)} {what}{aside}{of} to {how.place(float(np.max(m.deflection)))}"
     model = "" if d.declared else ", the nearest of all energies"
     return f"{m.specimen.name}{origin}: {readings}, against {spoken(d.null.hypothesis)}{model}."
 
@@ -208,7 +208,7 @@ def _ambiguous(course: Course) -> str:
     d = course.telling
     sure = _certain(d)
     which = f"only {sure} is certain" if sure else "this curve cannot tell which"
-    return f"{which}; the first explains {_explained(d)} of it{_beside(d)}"
+    return f"{which}; the first explains {_explained(d)}{_beside(d)}"
 
 
 def _unknown(course: Course) -> str:
@@ -376,8 +376,10 @@ def _when_unknown(d: Diagnosis) -> str:
 
 def _tell_apart(d: Diagnosis) -> str:
     best = next(iter(d.experiments), None)
-    if best is None or best.separation < NEXT_TEST.clear:
+    if best is None or best.separation < NEXT_TEST.helps:
         return "No further test that was simulated tells them apart: rely on what holds for each of them."
+    if best.separation < NEXT_TEST.clear:
+        return f"What helps most: {spoken_test(best.test, d.rig)}."
     apart = f" ({best.separation:.2g} times the noise apart)" if best.separation < FAR_APART else ""
     return f"To tell them apart: {spoken_test(best.test, d.rig)}{apart}."
 

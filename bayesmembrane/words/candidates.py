@@ -39,13 +39,15 @@ def rivals(d: Diagnosis) -> list[str]:
         size = ", ".join(sizes(j.candidate, d))
         told.append(f"{candidate_title(j.candidate, d.null)}{f' ({size})' if size else ''}: {percent(p)}.")
     clear = [e for e in d.experiments if e.separation >= NEXT_TEST.clear]
-    dim = [e for e in d.experiments if e.separation < NEXT_TEST.clear]
-    rest = [f"{spoken_test(e.test, d.rig)} ({e.separation:.1f} standard deviations)" for e in dim]
+    helps = [e for e in d.experiments if NEXT_TEST.helps <= e.separation < NEXT_TEST.clear]
+    rest = [e for e in d.experiments if e.separation < NEXT_TEST.helps]
     told += [f"To tell them apart: {experiment_sentence(e, d.rig)}." for e in clear]
     if not clear:
-        told.append("None of the further tests that were simulated would tell them apart.")
-    if rest:
-        told.append(f"What would not settle it: {listed(rest)}.")
+        told.append("None of the further tests that were simulated is sure to tell them apart.")
+    for words, dim in (("What helps, and may not decide", helps), ("What would not settle it", rest)):
+        if dim:
+            shown = [f"{spoken_test(e.test, d.rig)} ({e.separation:.1f} standard deviations)" for e in dim]
+            told.append(f"{words}: {listed(shown)}.")
     return told
 
 

@@ -39,7 +39,7 @@ def spoken_test(test: FurtherTest, present: Fixture | None = None) -> str:
         case Kind.FASTER:
             return f"the same test {test.speed:g} times faster"
         case Kind.HOLD:
-            return f"the same test twice, held for {test.hold:.3g} s at the top and at rest in between"
+            return f"the same twice, holding {test.hold:.3g} s at both ends"
         case Kind.OTHER_SIZE:
             return f"the same test {test.change}"
         case Kind.BLANK:
