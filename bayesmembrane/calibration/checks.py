@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.data.thinning import MOST
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.noise.base import Noise, NoiseLikelihood
 
@@ -49,11 +50,22 @@ def alike(
     below any p at most twice as often as p (X.-L. Meng, Ann. Stat. 22 (1994) 1142).
     """
     some = residual[np.linspace(0, len(residual) - 1, min(len(residual), CURVES)).astype(int)]
-    known = np.linalg.svd(some - np.mean(some, axis=0), full_matrices=False)[2][: min(free, residual.shape[1] - 1)]
+    known = directions(some - np.mean(some, axis=0), min(free, residual.shape[1] - 1))
     sd = bound.sd(x)
     found, drawn = (lag_1((r - r @ known.T @ known) / sd) for r in (residual, bound.draw(x, rng)))
     p = (1 + np.count_nonzero(drawn >= found)) / (1 + len(found))
     return Alike(noise.name, float(np.mean(found)), float(np.mean(drawn)), float(p))
+
+
+def directions(rows: Array, count: int) -> Array:
+    """(m, N) orthonormal, at most ``count``: the first principal directions of ``rows`` (B, N).
+
+    Of long rows A from the eigenvectors U of A A^T: A^T U is orthogonal but for round-off, which a QR takes away.
+    """
+    if rows.shape[1] <= MOST:
+        return np.asarray(np.linalg.svd(rows, full_matrices=False)[2][:count])
+    _, u = np.linalg.eigh(rows @ rows.T)
+    return np.asarray(np.linalg.qr(rows.T @ u[:, ::-1][:, :count])[0].T)
 
 
 def lag_1(z: Array) -> Array:

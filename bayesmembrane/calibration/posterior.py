@@ -21,6 +21,7 @@ from bayesmembrane.physics.forward import AT_ONCE, Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.solution import Status
+from bayesmembrane.physics.nodes import Nodes, nodes_of
 from bayesmembrane.physics.noise.base import NoiseLikelihood
 
 
@@ -131,6 +132,11 @@ class Posterior:
         return Forward(self.hypothesis, self.measurement, self.measurement.deflection, self.solve)
 
     @cached_property
+    def nodes(self) -> Nodes | None:
+        """From which the forces at all readings of a long curve follow, if they do."""
+        return nodes_of(self.forward)
+
+    @cached_property
     def noise(self) -> NoiseLikelihood:
         return self.hypothesis.noise.bind(self.measurement)
 
@@ -144,11 +150,16 @@ class Posterior:
         """N"""
         return len(self.measurement)
 
+    @property
+    def measured(self) -> Array:
+        """(N,) N: the measured curve, in the way in which `evaluate` tells forces."""
+        return self.measurement.force
+
     def evaluate(self, x: ArrayLike) -> Evaluation:
         """Prior, likelihood, force and outcome of x (B, k), from one batched solution."""
         x = np.atleast_2d(np.asarray(x, dtype=float))
         mode = self.hypothesis.convexity
-        prediction = self.forward(x, reached=mode.looks_beyond, spare=mode.spare)
+        prediction = (self.nodes or self.forward)(x, reached=mode.looks_beyond, spare=mode.spare)
         inside = self.prior.inside(prediction)
         ok = prediction.ok
         log_likelihood, every = np.full(len(x), -np.inf), None
@@ -162,7 +173,7 @@ class Posterior:
                 every = np.full((len(x), *shown.shape[1:]), np.nan)
                 every[ok] = shown
         log_prior = np.where(inside, self.prior.log_density(x), -np.inf)
-        return Evaluation(log_prior, log_likelihood, _outcome(prediction.status, inside), prediction.force, every)
+        return Evaluation(log_prior, log_likelihood, outcome_of(prediction.status, inside), prediction.force, every)
 
     def log_prior(self, x: ArrayLike) -> Array:
         """ln p0(x) where the convexity prior holds, -inf elsewhere; (B,)."""
@@ -213,11 +224,14 @@ class Along:
 
     def given(self, curves: Array, x: Array) -> Array:
         """As `Posterior.given` of the curves with the coordinates ``curves`` (B, R)."""
-        noise = self.posterior.hypothesis.noise_coordinates(x)
-        return self.posterior.prior.log_density(x) + self.noise.log_likelihood(self.force - curves, noise)
+        return self.posterior.prior.log_density(x) + self.log_likelihood(curves, x)
+
+    def log_likelihood(self, curves: Array, x: Array) -> Array:
+        """ln p(y | x), (B,), of the same."""
+        return self.noise.log_likelihood(self.force - curves, self.posterior.hypothesis.noise_coordinates(x))
 
 
-def _outcome(status: NDArray[np.int8], inside: NDArray[np.bool_]) -> NDArray[np.int8]:
+def outcome_of(status: NDArray[np.int8], inside: NDArray[np.bool_]) -> NDArray[np.int8]:
     """(B,) from statuses (B, N): what physics or the prior rules out is no failure of the numbers."""
     outcome = np.where(inside, Outcome.OK, Outcome.NOT_CONVEX).astype(np.int8)
     bad = status != Status.OK

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.thinning import MOST
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.ground.sobol import scrambled_sobol
-from bayesmembrane.physics.convexity import MODES, ConvexityMode
-from bayesmembrane.physics.forward import AT_ONCE, Forward, Prediction, Solve
+from bayesmembrane.physics.convexity import MODES, ConvexityMode, States
+from bayesmembrane.physics.forward import AT_ONCE, Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 
@@ -77,10 +78,10 @@ class JointPrior:
         columns = [p.prior.quantile(u[..., i]) for i, p in enumerate(self.hypothesis.parameters)]
         return np.stack(columns, axis=-1)
 
-    def inside(self, prediction: Prediction, mode: ConvexityMode | None = None) -> NDArray[np.bool_]:
+    def inside(self, states: States, mode: ConvexityMode | None = None) -> NDArray[np.bool_]:
         """(B,) True where the convexity prior holds, or another mode."""
         mode = mode or self.hypothesis.convexity
-        return mode.holds(mode.margin(prediction, self.hypothesis.material))
+        return mode.holds(mode.margin(states, self.hypothesis.material))
 
     def scrambled(self, seed: int) -> list[Scrambled]:
         """`SCRAMBLES` independent sequences of points that fill p0 evenly; others for another hypothesis."""
@@ -114,12 +115,12 @@ class JointPrior:
         each = 1 << int(np.ceil(np.log2(max(1, draws / SCRAMBLES))))
         x = np.concatenate([s.draw(each) for s in self.scrambled(seed)])
         forward = Forward(self.hypothesis, measurement, measurement.deflection, solve)
-        rows = max(1, AT_ONCE // len(measurement))
+        rows = max(1, AT_ONCE // min(len(measurement), MOST))
         inside = {n: np.empty(len(x), bool) for n in MODES}
         for part in [slice(i, i + rows) for i in range(0, len(x), rows)]:
-            prediction = forward(x[part])  # with margins at every reading: of a long curve not for all films at once
+            states = forward.margins(x[part])  # of some curves at every reading: not for all films at once
             for n, mode in MODES.items():
-                inside[n][part] = self.inside(prediction, mode)
+                inside[n][part] = self.inside(states, mode)
         masses = {n: _mass(np.sum(i.reshape(SCRAMBLES, each), axis=1), each) for n, i in inside.items()}
         order = np.random.default_rng([seed, 2]).permutation(len(x))
         return masses, x[order][inside[self.hypothesis.convexity.name][order]]

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.calibration.few import weighing
 from bayesmembrane.calibration.layout import measurement_of
 from bayesmembrane.calibration.outcome import outcome
 from bayesmembrane.calibration.posterior import Posterior
@@ -230,6 +231,11 @@ class _Work:
     progress: Callback | None
     stop: Stop
 
+    @cached_property
+    def weighed(self) -> Posterior:
+        """The posterior as the walk asks for it: of a long curve at few deflections."""
+        return weighing(self.posterior)
+
     def done(self, name: str, segments: Segments | None) -> Run:
         """The run, with what was walked already in ``segments``, and stored there (None: nowhere)."""
         counted = _tally(self.posterior.solve)
@@ -248,7 +254,7 @@ class _Work:
             begin, beside = self._at_the_end_of_another(), Meanwhile(stop=self.stop)
         else:
             begin, beside = self._continued(segments), Meanwhile(segments.write, self.stop)
-        return run_ensembles(self.posterior, settings, seed, self.progress, begin, beside)
+        return run_ensembles(self.weighed, settings, seed, self.progress, begin, beside)
 
     def _continued(self, segments: Segments) -> Chains | None:
         """The walk to go on with: what lies there, or a shorter one that lies beside it, or the end of another."""
@@ -256,15 +262,15 @@ class _Work:
         if beside is not None and segments.steps < Segments(beside).steps:
             found = Segments(beside).read()
             if found is not None:
-                check_same(self.posterior, found, beside)
+                check_same(self.weighed, found, beside)
             segments.take(Segments(beside))  # one by one: who is killed here goes on with what lacks
         stored = segments.read()
         if stored is not None:
-            check_same(self.posterior, stored, segments.run)
+            check_same(self.weighed, stored, segments.run)
             return stored
         begin = self._at_the_end_of_another()
         if begin is not None:
-            check_same(self.posterior, begin, segments.run)
+            check_same(self.weighed, begin, segments.run)
             segments.write(begin)
         return begin
 
@@ -272,8 +278,8 @@ class _Work:
         if self.origin is None:
             return None
         settings, seed = self.how.sampling, self.how.seed
-        wanted = settings.ensembles, walkers_of(self.posterior, settings)
-        return begun(self.posterior, ends(self.posterior, self.origin.chains, wanted, seed), seed)
+        wanted = settings.ensembles, walkers_of(self.weighed, settings)
+        return begun(self.weighed, ends(self.weighed, self.origin.chains, wanted, seed), seed)
 
 
 def load_run(path: str | Path) -> Run:

@@ -68,6 +68,17 @@ class Prediction:
         return np.asarray(np.all(self.status == Status.OK, axis=1))
 
 
+@dataclass(frozen=True)
+class Margins:
+    """How far B films are convex: the fields of `Prediction` that are called the same."""
+
+    films: Array
+    convexity: Array
+    ellipticity: Array
+    convexity_at: Array
+    ellipticity_at: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Forward:
     """F(delta; x) of one hypothesis on the rig of one measurement, at ``deflection`` (N,) m.
@@ -123,6 +134,15 @@ class Forward:
         margins = *whole, curves.convexity, curves.ellipticity
         return Prediction(self.deflection, curves.force[:, :n], curves.status[:, :n], films, chained, *margins)
 
+    def margins(self, x: Array) -> Prediction | Margins:
+        """What a call with x (B, k) says of convexity; effects and interpolation say nothing of it, and are spared."""
+        if not self.composes:
+            return self(x)
+        films = self.hypothesis.films(x)
+        theta = x[:, self.hypothesis.material_size : self.hypothesis.curve_size]
+        at = self.law(films, theta, reached=True)[1]
+        return Margins(films, *_least(at), *at)
+
     # ---- film and effects ------------------------------------------------------------------------------------------
 
     @cached_property
@@ -160,7 +180,8 @@ class Forward:
         return Composition(self.hypothesis.effects, self.path)
 
     @cached_property
-    def _beyond(self) -> Array:
+    def looked_at(self) -> Array:
+        """Deflections beyond and between those asked for at which convexity is asked for, too."""
         return beyond(self.deflection, self.measurement.full_range)
 
     def _composed(self, x: Array, sensitivities: bool, reached: bool, spare: Spared) -> Prediction:
@@ -189,8 +210,7 @@ class Forward:
             force, status = self.composition(law, theta)
         here = self._here
         slopes = None if slopes is None else slopes[:, here]
-        least = (np.fmin.reduce(at[0], axis=1), np.fmin.reduce(at[1], axis=1))
-        return Prediction(self.deflection, force[:, here], status[:, here], films, slopes, *least, *at)
+        return Prediction(self.deflection, force[:, here], status[:, here], films, slopes, *_least(at), *at)
 
     def law(
         self,
@@ -209,7 +229,7 @@ class Forward:
             self.path,
             self.composition.prestretch(theta),
             self.composition.end(theta),
-            self._beyond if reached else np.empty(0),
+            self.looked_at if reached else np.empty(0),
         )
         return self.rig.law(self._films(films, sensitivities, "ritz", spare), trial)
 
@@ -259,6 +279,12 @@ class Forward:
         f = self.hypothesis.films(moved.reshape(-1, x.shape[1])).reshape(5, m, len(x), -1)
         out[:, :, :m] = np.moveaxis((8 * (f[3] - f[1]) - (f[4] - f[0])) / (12 * STEP), 0, 2)
         return out
+
+
+def _least(margins: tuple[Array, Array]) -> tuple[Array, Array]:
+    """(B,) each, of margins (B, M)."""
+    convexity, ellipticity = (np.fmin.reduce(m, axis=1) for m in margins)
+    return convexity, ellipticity
 
 
 def _scaled(unit: Curves, films: Array) -> Curves:

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from bayesmembrane.calibration.checks import alike, lag_1
+from bayesmembrane.calibration.checks import alike, directions, lag_1
 from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.thinning import MOST
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.noise.ar1 import AR1
 from bayesmembrane.physics.noise.white import White
@@ -58,3 +59,12 @@ def test_noise_that_remembers_explains_neighbours_that_are_alike() -> None:
     assert remembers[0].expected > 0.4 > 0.1 > forgets[0].expected
     assert abs(np.mean([f.p_value for f in remembers]) - 0.5) < 0.28
     assert np.mean([f.p_value for f in forgets]) < 0.05
+
+
+def test_principal_directions_of_long_rows_are_those_of_the_decomposition() -> None:
+    rng = np.random.default_rng(6)
+    rows = (rng.standard_normal((30, 4)) * [9.0, 4.0, 2.0, 1.0]) @ rng.standard_normal((4, MOST + 700))
+    rows += 1e-3 * rng.standard_normal(rows.shape)
+    found, expected = directions(rows, 4), np.linalg.svd(rows, full_matrices=False)[2][:4]
+    np.testing.assert_allclose(found @ found.T, np.eye(4), atol=1e-12)
+    np.testing.assert_allclose(np.abs(np.sum(found * expected, axis=1)), 1.0, atol=1e-9)

@@ -91,8 +91,9 @@ def table(costs: dict[str, Cost], rows: int, size: float) -> str:
         "# Long files",
         "",
         f"`python -m tests.studies.long_files --rows {rows}`: an export of {rows} rows ({size:.1f} MB; three triangles "
-        "of a strip, a preamble, decimal commas) through every verb, each a process of its own. Seconds of a processor, "
-        "on a machine that others used as well, with reading the file and starting; memory is the largest resident set.",
+        "of a strip, a preamble, decimal commas) through every verb, each a process of its own. Seconds of a "
+        "processor, on a machine that others used as well, with reading the file and starting; memory is the largest "
+        "resident set.",
         "",
         "Of a file 20 000 readings at most are used, turning points and holds among them; diagnosis, valleys and "
         "comparison take 1500 of these. Each answer says so.",

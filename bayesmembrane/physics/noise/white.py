@@ -59,14 +59,17 @@ class WhiteLikelihood(NoiseLikelihood):
     def __init__(self, measurement: Measurement, extra: bool) -> None:
         self.scale, self.extra = force_scale(measurement), extra
         self.axes: Array | None = None
-        self.variance = np.zeros(len(measurement))
+        self.size = len(measurement)
+        self.variance = np.zeros(self.size)
         if measurement.covariance is not None:
             self.variance, self.axes = np.linalg.eigh(measurement.covariance)
         elif measurement.force_sd is not None:
             self.variance = measurement.force_sd**2
+        if self.axes is None and np.ptp(self.variance) == 0:
+            self.variance = self.variance[:1]  # one number is that of all readings
 
     def along(self, axes: Array) -> NoiseLikelihood | None:
-        if self.axes is not None or np.ptp(self.variance) > 0:
+        if self.axes is not None or self.variance.size > 1:
             return None
         return _Alike(self)
 
@@ -76,7 +79,7 @@ class WhiteLikelihood(NoiseLikelihood):
         return np.asarray(-0.5 * np.sum(r * r / variance + np.log(2 * np.pi * variance), axis=1))
 
     def covariance(self, x: Array) -> Array:
-        variance = self._total(x[None, :])[0]
+        variance = np.broadcast_to(self._total(x[None, :])[0], self.size)
         return np.diag(variance) if self.axes is None else (self.axes * variance) @ self.axes.T
 
     def pointwise(self, residual: Array, x: Array) -> Array:
@@ -87,15 +90,17 @@ class WhiteLikelihood(NoiseLikelihood):
         return conditional(pull, 1 / variance @ (self.axes**2).T)
 
     def draw(self, x: Array, rng: np.random.Generator) -> Array:
-        z = rng.standard_normal((len(x), self.variance.size)) * np.sqrt(self._total(x))
+        z = rng.standard_normal((len(x), self.size)) * np.sqrt(self._total(x))
         return z if self.axes is None else np.asarray(z @ self.axes.T)
 
     def sd(self, x: Array) -> Array:
         variance = self._total(x)
-        return np.sqrt(variance if self.axes is None else variance @ (self.axes**2).T)
+        if self.axes is None:
+            return np.broadcast_to(np.sqrt(variance), (len(x), self.size))
+        return np.sqrt(variance @ (self.axes**2).T)
 
     def _total(self, x: Array) -> Array:
-        """Variances (B, N) along the axes; never below what a double can hold."""
+        """Variances (B, N) along the axes, or (B, 1) of all readings; never below what a double can hold."""
         tau = np.exp(x[:, :1]) * self.scale if self.extra else np.zeros((len(x), 1))
         return np.maximum(self.variance + tau * tau, 1e-300)
 
@@ -109,10 +114,10 @@ class _Alike(NoiseLikelihood):
     def log_likelihood(self, residual: Array, x: Array) -> Array:
         variance = self._variance(x)
         square = np.einsum("br,br->b", residual, residual)
-        return np.asarray(-0.5 * (square / variance + self.whole.variance.size * np.log(2 * np.pi * variance)))
+        return np.asarray(-0.5 * (square / variance + self.whole.size * np.log(2 * np.pi * variance)))
 
     def covariance(self, x: Array) -> Array:
-        return np.asarray(self._variance(x[None, :])[0] * np.eye(self.whole.variance.size))
+        return np.asarray(self._variance(x[None, :])[0] * np.eye(self.whole.size))
 
     def _variance(self, x: Array) -> Array:
         tau = np.exp(x[:, 0]) * self.whole.scale if self.whole.extra else np.zeros(len(x))

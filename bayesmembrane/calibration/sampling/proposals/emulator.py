@@ -166,7 +166,7 @@ def _shortened(posterior: Emulated, coefficients: Array) -> tuple[Given, Array]:
     """
     if not isinstance(posterior, Posterior) or posterior.noise.traced:  # traces stand behind the forces
         return posterior, coefficients
-    _, size, axes = np.linalg.svd(np.vstack([coefficients, posterior.measurement.force]), full_matrices=False)
+    _, size, axes = np.linalg.svd(np.vstack([coefficients, posterior.measured]), full_matrices=False)
     axes = axes[size > FAINT * size[0]]
     along = posterior.along(axes) if len(axes) <= SHORT * coefficients.shape[1] else None
     return (posterior, coefficients) if along is None else (along, coefficients @ axes.T)

@@ -1,0 +1,80 @@
+"""Forces of long curves from those at a few nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.thinning import MOST
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.nodes import NODES, nodes_of
+from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+
+FILMS = {
+    "neo_hookean": [[2.0], [3.1]],
+    "gent": [[2.0, 4.0], [2.0, 2.5]],
+    "yeoh": [[2.0, -0.02, 0.002], [1.0, 0.05, 0.0]],
+    "mooney_rivlin": [[2.0, 0.1], [2.0, 0.0]],
+    "ogden": [[2.0, -3.0, -3.0, 0.4, 1.2, 0.7]],
+}
+
+
+def long_curve(count: int = MOST + 500, end: float = 0.035) -> Measurement:
+    """There and back, as a machine reads it."""
+    up = np.linspace(0.0, end, count // 2 + 1)
+    at = np.concatenate([up, up[-2::-1]])
+    time = np.arange(1.0, at.size + 1.0)
+    return Measurement(at, np.ones(at.size), Annulus(0.010, 0.035), Specimen("film", 5e-5), time=time)
+
+
+def forward_of(material: str, m: Measurement) -> Forward:
+    return Forward(hypothesis(material), m, m.deflection)
+
+
+@pytest.mark.parametrize("material", FILMS)
+def test_forces_from_the_nodes_are_those_of_the_film_at_every_reading(material: str) -> None:
+    forward = forward_of(material, long_curve())
+    nodes = nodes_of(forward)
+    assert nodes is not None
+    x: Array = np.array(FILMS[material])
+    whole, few = forward(x), nodes(x)
+    assert np.all(whole.ok)
+    np.testing.assert_allclose(few.force, whole.force, rtol=0, atol=1e-7 * np.max(whole.force))
+    assert np.array_equal(few.status, whole.status)
+    assert np.array_equal(few.convexity >= 0, whole.convexity >= 0)
+
+
+def test_a_film_that_lacks_a_node_is_asked_at_every_reading() -> None:
+    """A Gent film that locks on the way: no force beyond, and all of them before."""
+    forward = forward_of("gent", long_curve())
+    nodes = nodes_of(forward)
+    assert nodes is not None
+    x: Array = np.array([[2.0, -1.5], [2.0, 4.0]])
+    whole, few = forward(x), nodes(x)
+    assert whole.ok.tolist() == few.ok.tolist() == [False, True]
+    assert np.array_equal(few.status[0], whole.status[0])
+    np.testing.assert_array_equal(few.force[0], whole.force[0])
+
+
+def test_few_readings_effects_and_closed_forms_have_no_nodes() -> None:
+    m = long_curve()
+    assert nodes_of(forward_of("gent", long_curve(MOST - 100))) is None
+    assert nodes_of(Forward(hypothesis("gent", ["permanent_set"]), m, m.deflection)) is None
+    strip = Measurement(m.deflection, m.force, Uniaxial(0.05, 0.01), m.specimen, time=m.time)
+    assert nodes_of(forward_of("gent", strip)) is None
+    assert nodes_of(forward_of("gent", m)).spline.shape == (len(m), NODES)  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(("material", "effects"), [("gent", ()), ("yeoh", ("permanent_set",)), ("mooney_rivlin", ())])
+def test_margins_are_those_of_the_whole_curve(material: str, effects: tuple[str, ...]) -> None:
+    m = long_curve(300)
+    forward = Forward(hypothesis(material, effects), m, m.deflection)
+    rng = np.random.default_rng(3)
+    x = np.stack([p.prior.quantile(rng.uniform(size=20)) for p in forward.hypothesis.parameters], axis=1)
+    whole, alone = forward(x), forward.margins(x)
+    np.testing.assert_array_equal(alone.convexity, whole.convexity)
+    np.testing.assert_array_equal(alone.ellipticity, whole.ellipticity)
