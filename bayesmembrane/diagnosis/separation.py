@@ -77,7 +77,7 @@ def _foretold(trial: OnFilm, search: Search, rivals: Sequence[Candidate]) -> lis
         force, slopes = shown.force[0], shown.slopes[0]
         if not (np.all(np.isfinite(force)) and np.all(np.isfinite(slopes))):
             raise np.linalg.LinAlgError("a rival has no film for the whole of a further test")
-        if factors is None:
+        if factors is None:  # the most probable rival says where the film goes slack
             factors = form_factors(replace(trial.measurement, force=force))
         out.append(_one(c, search, noise, (force, slopes, _forms(trial, c, search, factors, force))))
     return out

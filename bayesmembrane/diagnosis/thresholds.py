@@ -425,7 +425,7 @@ class NextTestThresholds:
     """What further measurements that are simulated must show; see `next_test`."""
 
     clear: float = 5.0
-    """Standard deviations between rivals: beyond it, that test settles it (a wrong choice in 4 % at most)."""
+    """Standard deviations between rivals: beyond it, that test settles it: a twentieth of the doubt stays."""
     helps: float = 2.0
     """Beyond it, the test is worth making: of the doubt that there is, two fifths at least go."""
 

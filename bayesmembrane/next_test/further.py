@@ -51,7 +51,7 @@ class FurtherTest:
     start, end : m, between which deflections
     beyond : whether that is further than the film was ever tested
     speed : times the present one
-    hold : s for which the disc stands still at the top, and at rest
+    hold : s for which the disc stands still at the top, and then at rest, before all is done again without holds
     rig : name of another rig, for another specimen of the same film
     stretch : how far that specimen is pulled
     change : what another size of the same rig is, in the words of `Rig.variants`

@@ -36,7 +36,7 @@ MOST_TOLD = 3
 MOST_SIZES = 3
 """Effects whose size is told with it; what is not told on the first screen is below."""
 FAR_APART = 10.0
-"""Times the noise from which it is not told by how much a test would tell two explanations apart."""
+"""Standard deviations from which it is not told by how much a test would tell explanations apart."""
 ANSWERED = ("named", "material", "ambiguous")
 """Verdicts that rest on another model than the one that was given."""
 
@@ -380,7 +380,7 @@ def _tell_apart(d: Diagnosis) -> str:
         return "No further test that was simulated tells them apart: rely on what holds for each of them."
     if best.separation < NEXT_TEST.clear:
         return f"What helps most: {spoken_test(best.test, d.rig)}."
-    apart = f" ({best.separation:.2g} times the noise apart)" if best.separation < FAR_APART else ""
+    apart = f" ({best.separation:.2g} standard deviations apart)" if best.separation < FAR_APART else ""
     return f"To tell them apart: {spoken_test(best.test, d.rig)}{apart}."
 
 

@@ -39,7 +39,7 @@ def spoken_test(test: FurtherTest, present: Fixture | None = None) -> str:
         case Kind.FASTER:
             return f"the same test {test.speed:g} times faster"
         case Kind.HOLD:
-            return f"the same twice, holding {test.hold:.3g} s at both ends"
+            return f"the same test with {test.hold:.3g} s holds, then again"
         case Kind.OTHER_SIZE:
             return f"the same test {test.change}"
         case Kind.BLANK:

@@ -26,13 +26,13 @@ MU, LIMIT = 0.4, 40.0  # MPa and the limit of I1 - 3
 PEAKS = (1.5, 2.0, 2.5)  # stretches
 NOISE = 2e-3
 GIB = 2**30
-VERBS: tuple[tuple[str, ...], ...] = (
-    ("fit", "--material", "gent"),
-    ("sample", "--material", "gent", "--out", "chains"),
-    ("valleys", "--material", "gent", "--out", "valleys"),
-    ("compare", "--materials", "neo_hookean,gent", "--out", "comparison"),
-    ("diagnose", "--out", "diagnosis"),
-    ("loop", "--out", "loop", "--report", "page"),
+VERBS = (
+    "fit --material gent",
+    "sample --material gent",
+    "valleys --material gent",
+    "compare --materials neo_hookean,gent",
+    "diagnose",
+    "loop",
 )
 
 
@@ -118,20 +118,13 @@ def main() -> int:
         folder = Path(name)
         export(folder / "machine.txt", asked.rows)
         size = (folder / "machine.txt").stat().st_size / 1e6
-        sizes = (
-            "--gauge-length-mm",
-            f"{LENGTH:g}",
-            "--width-mm",
-            f"{WIDTH:g}",
-            "--thickness-um",
-            f"{1e3 * THICKNESS:g}",
-        )
-        taken = ("import", "machine.txt", "--rig", "uniaxial", *sizes, "--out", "curve.csv")
-        costs["import"] = spent(taken, folder)
-        for verb, *options in VERBS:
-            costs[" ".join([verb, *options[: options.index("--out") if "--out" in options else None]])] = spent(
-                (verb, "curve.csv", "--specimen", "curve.toml", *options), folder
-            )
+        sizes = f"--gauge-length-mm {LENGTH:g} --width-mm {WIDTH:g} --thickness-um {1e3 * THICKNESS:g}"
+        taken = f"import machine.txt --rig uniaxial {sizes} --out curve.csv"
+        costs["import"] = spent(tuple(taken.split()), folder)
+        for command in VERBS:
+            verb, *options = command.split()
+            # Where nothing is said, answers and pages go into folders of their own beside the curve.
+            costs[command] = spent((verb, "curve.csv", "--specimen", "curve.toml", *options), folder)
             print(table(costs, asked.rows, size), flush=True)
     if asked.table is not None:
         asked.table.write_text(table(costs, asked.rows, size), encoding="utf-8")
