@@ -22,6 +22,8 @@ from bayesmembrane.physics.noise.ar1 import gaps_of
 
 Rival = tuple[Candidate, float]
 """An explanation and its probability."""
+SMALLEST = -600.0
+"""ln of the smallest BC: a simulated test leaves some doubt, however little."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class Experiment:
     """A further measurement and how far apart it would put the rivals.
 
     separation : in standard deviations of what two rivals leave open: two that lie so far apart would be taken for each
-        other as often as these are on average, weighed by their probabilities; inf: one sees it bare
+        other as often as these are on average, weighed by their probabilities; inf: no doubt is left
     """
 
     test: FurtherTest
@@ -47,7 +49,8 @@ def experiments(search: Search, rivals: Sequence[Rival]) -> list[Experiment]:
 
     and ``separation`` s is that of two sharp rivals as often confused, exp(-s^2 / 8) = E / sum (p_a p_b)^(1/2).
     A. Bhattacharyya, Bull. Calcutta Math. Soc. 35 (1943) 99; T. Kailath, IEEE Trans. Commun. Tech. 15 (1967) 52. A test
-    that cannot be simulated for some rival is left out.
+    that cannot be simulated for some rival is left out. A blank run has BC = 0 where one of two
+    lets the frame yield, else 1.
     """
     out = []
     weight = np.sqrt([a[1] * b[1] for a, b in combinations(rivals, 2)])
@@ -56,12 +59,21 @@ def experiments(search: Search, rivals: Sequence[Rival]) -> list[Experiment]:
             log_confused = confused(_foretold(trial, search, [c for c, _ in rivals]))
         except (BayesmembraneError, np.linalg.LinAlgError):
             continue
-        doubt = float(weight @ np.exp(log_confused) / np.sum(weight))
-        out.append(Experiment(trial.test, float(np.sqrt(-8 * np.log(max(doubt, 1e-300))))))
+        out.append(Experiment(trial.test, apart(weight, np.exp(np.maximum(log_confused, SMALLEST)))))
     frame = [any(isinstance(e, Compliance) for e in c.hypothesis.effects) for c, _ in rivals]
-    if any(frame) and not all(frame):
-        out.append(Experiment(FurtherTest(Kind.BLANK), np.inf))
+    if any(frame) and not all(frame):  # it tells those that yield from those that do not, and leaves the rest
+        alike = np.array([a == b for a, b in combinations(frame, 2)], dtype=float)
+        out.append(Experiment(FurtherTest(Kind.BLANK), apart(weight, alike)))
     return sorted(out, key=lambda e: -e.separation)
+
+
+def apart(weight: Array, confused_still: Array) -> float:
+    """s with exp(-s^2 / 8) = the mean of BC (P,), ``confused_still``, of all pairs, by their ``weight`` (P,).
+
+    inf where no pair is confused at all.
+    """
+    doubt = min(float(weight @ confused_still / np.sum(weight)), 1.0)
+    return float(np.sqrt(-8 * np.log(doubt))) if doubt > 0 else float("inf")
 
 
 def _foretold(trial: OnFilm, search: Search, rivals: Sequence[Candidate]) -> list[tuple[Array, Array]]:
