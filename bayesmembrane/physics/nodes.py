@@ -1,8 +1,8 @@
 """Forces at many readings from few: F(delta_i) = sum_j B_ij F(node_j), with a matrix that no draw changes.
 
-A film without effects is one smooth function of the deflection, however many readings it is asked at. Its law is known
-to 1e-6 (`mechanics.film_law`), and its pieces are three to five times as long as the gaps between the nodes: a quintic
-spline through these adds less than a hundredth of that error.
+A film without effects is one smooth function of the deflection, however many readings it is asked at. The law of a
+ring is known to 1e-6 (`mechanics.film_law`), and its pieces are three to five times as long as the gaps between the
+nodes: a quintic spline through these adds less than a hundredth of that error, and no more to a strip's closed form.
 """
 
 from __future__ import annotations
@@ -58,7 +58,8 @@ class Nodes:
 def nodes_of(forward: Forward) -> Nodes | None:
     """The nodes of a long curve; None where it is short, or not one smooth function of the deflection."""
     rig, m = forward.rig, forward.measurement
-    if forward.deflection.size <= MOST or forward.hypothesis.effects or rig.closed_form or m.across is not None:
+    smooth = not forward.hypothesis.effects and m.across is None and rig.slack_below_rest(m)
+    if forward.deflection.size <= MOST or not smooth:
         return None
     pulled, length = forward.deflection[forward.deflection > 0], _length(forward)
     low, high = float(np.min(pulled)), float(np.max(pulled))

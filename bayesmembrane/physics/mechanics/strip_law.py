@@ -59,10 +59,11 @@ class StripLaw:
         With ``excess`` e (B, N) the strip is longer by that part: l = (1 + delta / L) / (1 + e).
         """
         longer = 1.0 if excess is None else 1.0 + excess
-        stretch = (1.0 + deflection / self.rig.length) / longer
+        stretch = (1.0 + (_once(deflection) if excess is None else deflection) / self.rig.length) / longer
         pulled, l2, dl2 = self.taut(stretch)
         width = self.rig.width
         with np.errstate(all="ignore"):
+            # Kinematics (1, N) are those of all films; the energies' slopes are (B, N).
             _, p1, _, p11, p12, _ = self.material.derivatives(self.parameters.T[:, :, None], pulled, l2)
             p1 = np.where(np.isfinite(p1), p1, np.nan)  # beyond all numbers there is no force
             slope = width * (p11 + p12 * dl2) / (self.rig.length * longer)
@@ -107,27 +108,52 @@ def strip_curves(law: StripLaw, deflection: Array, sensitivities: bool = False) 
     """Curves of the films of ``law`` at ``deflection`` (N,) m, which all are where ``across`` is, if that is given."""
     d = np.broadcast_to(deflection, (len(law.parameters), deflection.size))
     force, slope = law(d)
-    stretch = np.maximum(1.0 + d / law.rig.length, 1e-3)
-    if law.across is None:
-        state, (l2, _) = stretch, law.rig.lateral(stretch)
-    else:
-        state, l2, _ = law.taut(stretch)
+    stretch = np.maximum(1.0 + deflection[None, :] / law.rig.length, 1e-3)
+    state, l2 = _states(law, stretch)
     p = law.parameters.T[:, :, None]
+    rates = None
     with np.errstate(all="ignore"):
         w, _, _, a, b, c = law.material.derivatives(p, state, l2)
-        rates = np.stack([s[1] + 0.0 * state for s in law.material.sensitivities(p, state, l2)], axis=2)
-        gd = np.abs(np.asarray(law.material.shear_modulus(law.parameters.T)))[:, None]
-    zero = np.zeros(d.shape)
+        if sensitivities:
+            each = [s[1] + np.zeros(d.shape) for s in law.material.sensitivities(p, state, l2)]
+            rates = np.where((force == 0)[:, :, None], 0.0, law.rig.width * np.stack(each, axis=2))
+        convexity, ellipticity = _margins(law, a, b, c)
     return Curves(
         deflection=d,
         force=force,
         status=np.where(np.isfinite(force), Status.OK, Status.LOCKED).astype(np.int8),
-        note=law.note(stretch),
+        note=np.broadcast_to(law.note(stretch), d.shape),
         slope=slope,
-        sensitivity=np.where((force == 0)[:, :, None], 0.0, law.rig.width * rates) if sensitivities else None,
-        variation=zero,
-        max_stretch=np.maximum(state, l2),
-        ellipticity=np.asarray(np.minimum(a, c) / gd),
-        convexity=np.asarray(least_eigenvalue(a, b, c) / gd),
-        energy=w * law.rig.width * law.rig.length + zero,
+        sensitivity=rates,
+        variation=np.zeros(d.shape),
+        max_stretch=np.broadcast_to(np.maximum(state, l2), d.shape),
+        ellipticity=ellipticity,
+        convexity=convexity,
+        energy=w * law.rig.width * law.rig.length + np.zeros(d.shape),
     )
+
+
+def strip_margins(law: StripLaw, deflection: Array) -> tuple[Array, Array]:
+    """((B, N), (B, N)): convexity and ellipticity of `strip_curves`, without what else it tells."""
+    state, l2 = _states(law, np.maximum(1.0 + deflection[None, :] / law.rig.length, 1e-3))
+    with np.errstate(all="ignore"):
+        _, _, _, a, b, c = law.material.derivatives(law.parameters.T[:, :, None], state, l2)
+        return _margins(law, a, b, c)
+
+
+def _states(law: StripLaw, stretch: Array) -> tuple[Array, Array]:
+    """Both stretches (1, N) of all films, whose test has the stretches ``stretch`` (1, N)."""
+    if law.across is None:
+        return stretch, law.rig.lateral(stretch)[0]
+    return law.taut(stretch)[:2]
+
+
+def _margins(law: StripLaw, a: Array, b: Array, c: Array) -> tuple[Array, Array]:
+    """Of Hessians [[a, b], [b, c]] (B, N), relative to G d (B,)."""
+    gd = np.abs(np.asarray(law.material.shear_modulus(law.parameters.T)))[:, None]
+    return np.asarray(least_eigenvalue(a, b, c) / gd), np.asarray(np.minimum(a, c) / gd)
+
+
+def _once(rows: Array) -> Array:
+    """(1, N) of ``rows`` (B, N) that are one row seen B times; else as they are."""
+    return rows[:1] if rows.strides[0] == 0 else rows

@@ -43,6 +43,9 @@ class Annulus(Ring):
 
     # ---- mechanics -------------------------------------------------------------------------------------------------
 
+    def slack_below_rest(self, measurement: Measurement) -> bool:
+        return True
+
     def law(self, films: Films, trial: Trial) -> tuple[FilmLaw, tuple[Array, Array]]:
         """Solved at a few deflections; margins are -inf where the film's energy became indefinite."""
         end = np.maximum(trial.end, 1e-3 * trial.measurement.full_range)

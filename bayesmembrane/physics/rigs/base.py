@@ -20,7 +20,7 @@ from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.request import Spared
 from bayesmembrane.physics.mechanics.solution import Curves
-from bayesmembrane.physics.mechanics.strip_law import StripLaw, strip_curves
+from bayesmembrane.physics.mechanics.strip_law import StripLaw, strip_curves, strip_margins
 
 Law = Any
 """(deflection (B, N), excess (B, N) or None) -> (force (B, N), slope (B, N)), as `FilmLaw` and `StripLaw` are."""
@@ -90,6 +90,10 @@ class Rig(Fixture, ABC):
     @abstractmethod
     def states(self, film: Material, deflection: Array, points: int) -> Array:
         """(4, D, points): place along the film (m), height (m), l1, l2 at each of ``deflection`` (D,) m, or nan."""
+
+    def slack_below_rest(self, measurement: Measurement) -> bool:
+        """True if a specimen without effects carries nothing at deflections of zero and less."""
+        return False
 
     def mean_stretch(self, deflection: float) -> float | None:
         """The stretch along the film, on average, at a deflection (m), if across it is about 1; else None."""
@@ -187,15 +191,18 @@ class Strip(Homogeneous, ABC):
         at = trial.path.deflection
         if law.across is None:
             at = np.unique(np.concatenate([at, trial.extra]))
-            at = at[np.linspace(0, at.size - 1, min(at.size, STATES)).astype(int)]
-        shown = strip_curves(law, at)
-        return law, (shown.convexity, shown.ellipticity)
+            if at.size > STATES:  # what is asked of a long curve does not hang on where its readings lie
+                at = np.linspace(at[0] if law.pushes else 0.0, at[-1], STATES)
+        return law, strip_margins(law, at)
 
     def curves(self, films: Films, measurement: Measurement, deflection: Array, read: int | None = None) -> Curves:
         across = measurement.path.across
         if across is not None and deflection.size == len(measurement):  # the path may hold more points
             across = measurement.across
         return strip_curves(self._law(films, measurement, across), deflection, films.sensitivities)
+
+    def slack_below_rest(self, measurement: Measurement) -> bool:
+        return not _pushes(measurement)
 
     def _law(self, films: Films, measurement: Measurement, across: Array | None) -> StripLaw:
         return StripLaw(films.material, films.parameters, self, _pushes(measurement), across)

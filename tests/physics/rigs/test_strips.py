@@ -1,5 +1,6 @@
 """Homogeneous tests: closed forms against the energy, published data, and files."""
 
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics.solution import Note
-from bayesmembrane.physics.mechanics.strip_law import StripLaw
+from bayesmembrane.physics.mechanics.strip_law import StripLaw, strip_curves, strip_margins
 from bayesmembrane.physics.rigs.base import Strip
 from bayesmembrane.physics.rigs.biaxial import Biaxial
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
@@ -172,6 +173,29 @@ def test_beyond_all_numbers_there_is_no_force_and_no_warning(kind: str) -> None:
     assert np.isfinite(force).tolist() == [[True, True, False]]
     assert np.isfinite(slope).tolist() == [[True, True, False]]
     assert np.isnan(force[0, 2])
+
+
+@pytest.mark.parametrize("kind", [*STRIPS, "biaxial"])
+@pytest.mark.parametrize("material", FILMS)
+def test_many_films_at_once_are_each_of_them(kind: str, material: str) -> None:
+    """Stretches that all films share are computed once; whoever varies them by film gets the same."""
+    rig = components("rigs")[kind]()
+    films = np.array([FILMS[material]]) * np.array([[1.0], [0.8], [1.1]])
+    law = StripLaw(
+        materials()[material], films, rig, across=np.linspace(1.1, 1.3, 7) if rig.name == "biaxial" else None
+    )
+    d = rig.length * (np.linspace(0.98, 1.5, 7) - 1)
+    shared, own = law(np.broadcast_to(d, (3, 7))), law(np.tile(d, (3, 1)))
+    for a, b in zip(shared, own, strict=True):
+        assert a.shape == (3, 7)
+        np.testing.assert_array_equal(a, b)
+    curves = strip_curves(law, d, sensitivities=True)
+    assert {getattr(curves, f.name).shape for f in fields(curves)} == {(3, 7), (3, 7, films.shape[1])}
+    np.testing.assert_array_equal(curves.force, own[0])
+    np.testing.assert_array_equal(strip_margins(law, d), (curves.convexity, curves.ellipticity))
+    alone = strip_curves(replace(law, parameters=films[1:2]), d)
+    np.testing.assert_array_equal(alone.energy[0], curves.energy[1])
+    np.testing.assert_array_equal(alone.max_stretch[0], curves.max_stretch[1])
 
 
 # ---- films held across -----------------------------------------------------------------------------------------------
