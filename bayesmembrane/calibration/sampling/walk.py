@@ -226,7 +226,8 @@ def _start(posterior: Posterior, settings: Settings, seed: int) -> Chains:
 
 def _begun_from_mixture(posterior: Posterior, close: Independent, settings: Settings, seed: int) -> Chains:
     """Ensembles at states of a mixture, to be looked at where they may be worth enough."""
-    walkers = walkers_of(posterior, settings)
+    # Steps that hang on no other walker need no more of them than emcee's ensembles to go on with.
+    walkers = settings.walkers or 16 * -(-2 * posterior.size // 16)
     count = settings.ensembles * walkers
     states = np.resize(close.states, (settings.ensembles, walkers, posterior.size))
     chains = begun(posterior, states, seed)
