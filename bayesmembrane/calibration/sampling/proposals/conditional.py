@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtri
 
-from bayesmembrane.calibration.sampling.proposals.marginal import LEAST, integrated, peaks
+from bayesmembrane.calibration.sampling.proposals.marginal import LEAST, integrated, of_modulus
 from bayesmembrane.ground.parameters import Array, Normal
 
 NODES, FEW_NODES = 32, 16
-"""Of the density of ln_sd, and of its integral alone, which needs fewer."""
+"""Of a density of ln_gd or ln_sd, and of an integral over ln_sd alone, which needs fewer."""
 PRIOR_SHARE = 0.02
 """Weight of each prior beside the conditional that is drawn from: it bounds what is left to be weighed."""
-
-Inverse = Callable[[Array], Array]
-"""u (B,) in (0, 1) -> quantiles (B,)."""
+TINY = 1e-15  # of a probability
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,15 +42,14 @@ class Residuals:
 
     def given(self) -> Given:
         """Modulus and noise given f."""
-        return Given(*self._integrated(NODES)[1:], self)
+        return Given(Linear(*self._integrated(NODES)[1:]), self)
 
-    def modulus_at(self, ln_sd: Array) -> tuple[Array, Array]:
-        """Where ln p(ln_gd | ln_sd, f) is largest, and the standard deviation of the normal that has its bend; (B,)."""
+    def modulus_at(self, ln_sd: Array) -> Linear:
+        """p(ln_gd | ln_sd, f) of each ln_sd (B,)."""
         tau = self.scale * np.exp(ln_sd)
         weight = 1 / np.maximum(self.variance + (tau * tau)[:, None], LEAST)
         pull, stiff = np.sum(self.ya * weight, axis=1), np.sum(self.aa * weight, axis=1)
-        t, bend = peaks(pull, stiff, self.modulus.mean, self.modulus.sd)
-        return t, 1 / np.sqrt(bend)
+        return Linear(*of_modulus(pull, stiff, self.modulus.mean, self.modulus.sd, NODES))
 
     def _integrated(self, nodes: int) -> tuple[Array, Array, Array, Array]:
         priors = np.array([self.modulus.mean, self.modulus.sd, self.noise.mean, self.noise.sd, self.scale])
@@ -64,51 +60,32 @@ class Residuals:
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
-    """q(ln_gd, ln_sd | f) = q(ln_sd | f) q(ln_gd | ln_sd, f) of B curves, close to the conditional posterior.
+class Linear:
+    """B densities of one number each, linear between n equally spaced nodes, and zero beyond them.
 
-    The first is linear between equally spaced nodes, the second a normal around the largest value; both have a part
-    `PRIOR_SHARE` of the prior beside them.
-
-    first, step : (B,) the first node of ln_sd, and how far apart they are
-    density : (B, NODES) at the nodes, normalised
-    residuals : of the curves
+    first, step : (B,) the first node, and how far apart they are
+    density : (B, n) at the nodes, normalised
     """
 
     first: Array
     step: Array
     density: Array
-    residuals: Residuals
 
-    def drawn(self, u: Array) -> tuple[Array, Array]:
-        """(ln_gd, ln_sd) (B,) by inversion of uniform numbers u (B, 2)."""
-        r = self.residuals
-        ln_sd = _beside(r.noise, u[:, 0], self._inverted)
-        centre, sd = r.modulus_at(ln_sd)
-        return _beside(r.modulus, u[:, 1], lambda part: centre + sd * ndtri(part)), ln_sd
-
-    def log_density(self, ln_gd: Array, ln_sd: Array) -> Array:
-        """ln q(ln_gd, ln_sd), (B,)."""
-        r = self.residuals
-        centre, sd = r.modulus_at(ln_sd)
-        z = (ln_gd - centre) / sd
-        with np.errstate(divide="ignore"):
-            noise = _mixed(r.noise, ln_sd, np.log(self._near(ln_sd)))
-        return noise + _mixed(r.modulus, ln_gd, -0.5 * z * z - np.log(sd * np.sqrt(2 * np.pi)))
-
-    def _near(self, ln_sd: Array) -> Array:
-        """(B,) the piecewise linear density at ln_sd."""
-        place = (ln_sd - self.first) / self.step
-        at, rows = np.clip(place.astype(int), 0, NODES - 2), np.arange(len(place))
+    def at(self, x: Array) -> Array:
+        """(B,) the densities at x (B,)."""
+        last = self.density.shape[1] - 1
+        place = (x - self.first) / self.step
+        inside = (place >= 0) & (place <= last)
+        at, rows = np.clip(np.where(inside, place, 0.0).astype(int), 0, last - 1), np.arange(len(place))
         low, high = self.density[rows, at], self.density[rows, at + 1]
-        return np.where((place >= 0) & (place <= NODES - 1), low + (place - at) * (high - low), 0.0)
+        return np.where(inside, low + (place - at) * (high - low), 0.0)
 
-    def _inverted(self, u: Array) -> Array:
-        """Where the piecewise linear density has u (B,) of its mass below."""
+    def quantile(self, u: Array) -> Array:
+        """Where they have u (B,) of their mass below."""
         density, step, rows = self.density, self.step, np.arange(len(u))
         mass = np.cumsum(0.5 * (density[:, 1:] + density[:, :-1]) * step[:, None], axis=1)
         u = u * mass[:, -1]
-        at = np.minimum(np.sum(mass < u[:, None], axis=1), NODES - 2)
+        at = np.minimum(np.sum(mass < u[:, None], axis=1), mass.shape[1] - 1)
         left = u - np.where(at > 0, mass[rows, at - 1], 0.0)
         low = density[rows, at]
         rise = (density[rows, at + 1] - low) / step
@@ -118,14 +95,36 @@ class Given:
         return np.asarray(self.first + step * at + np.clip(s, 0.0, step))
 
 
-def _beside(prior: Normal, u: Array, inverse: Inverse) -> Array:
-    """Quantiles at u (B,) of ``prior`` with the weight `PRIOR_SHARE` and of what has the ``inverse`` with the rest."""
+@dataclass(frozen=True, eq=False)
+class Given:
+    """q(ln_gd, ln_sd | f) = q(ln_sd | f) q(ln_gd | ln_sd, f) of B curves, close to the conditional posterior.
+
+    Both are linear between nodes where the posterior is, and have a part `PRIOR_SHARE` of the prior beside that.
+    """
+
+    noise: Linear
+    residuals: Residuals
+
+    def drawn(self, u: Array) -> tuple[Array, Array]:
+        """(ln_gd, ln_sd) (B,) by inversion of uniform numbers u (B, 2)."""
+        ln_sd = _quantile(self.noise, self.residuals.noise, u[:, 0])
+        return _quantile(self.residuals.modulus_at(ln_sd), self.residuals.modulus, u[:, 1]), ln_sd
+
+    def log_density(self, ln_gd: Array, ln_sd: Array) -> Array:
+        """ln q(ln_gd, ln_sd), (B,)."""
+        noise = _log_density(self.noise, self.residuals.noise, ln_sd)
+        return noise + _log_density(self.residuals.modulus_at(ln_sd), self.residuals.modulus, ln_gd)
+
+
+def _quantile(near: Linear, prior: Normal, u: Array) -> Array:
+    """Quantiles at u (B,) of ``prior``, with the weight `PRIOR_SHARE`, beside ``near``."""
     part = (u - PRIOR_SHARE) / (1 - PRIOR_SHARE)
-    wide = prior.mean + prior.sd * ndtri(np.minimum(u / PRIOR_SHARE, 1 - 1e-16))
-    return np.where(part < 0, wide, inverse(np.clip(part, 1e-16, 1 - 1e-16)))
+    wide = prior.mean + prior.sd * ndtri(np.clip(u / PRIOR_SHARE, TINY, 1 - TINY))
+    return np.where(part < 0, wide, near.quantile(np.clip(part, TINY, 1 - TINY)))
 
 
-def _mixed(prior: Normal, x: Array, log_near: Array) -> Array:
-    """ln of the density whose quantiles are `_beside`, at x (B,)."""
-    wide = np.log(PRIOR_SHARE) + prior.log_density(x)
-    return np.asarray(np.logaddexp(np.log1p(-PRIOR_SHARE) + log_near, wide))
+def _log_density(near: Linear, prior: Normal, x: Array) -> Array:
+    """ln of the density that `_quantile` inverts, at x (B,)."""
+    wide = np.exp(prior.log_density(x))
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log((1 - PRIOR_SHARE) * near.at(x) + PRIOR_SHARE * wide))
