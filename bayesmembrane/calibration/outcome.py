@@ -80,8 +80,7 @@ def _evaluated(posterior: Posterior, x: Array) -> Evaluation:
     distinct, back = np.unique(x, axis=0, return_inverse=True)
     found, back = posterior.evaluate(distinct), back.ravel()
     traces = None if found.traces is None else found.traces[back]
-    parts = found.log_prior, found.log_likelihood, found.outcome, found.force
-    return Evaluation(*(p[back] for p in parts), traces)
+    return Evaluation(found.log_prior[back], found.log_likelihood[back], found.outcome[back], found.force[back], traces)
 
 
 def _count(readings: int) -> int:
