@@ -59,7 +59,7 @@ class Elsewhere:
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
+class NoiseSpectrum:
     """Sigma = Q diag(w + tau^2) Q^T with tau = scale exp(x), x the one coordinate of the noise.
 
     axes : (N, N) Q, None for the identity
@@ -96,7 +96,7 @@ class NoiseLikelihood(ABC):
         return None
 
     @property
-    def spectrum(self) -> Spectrum | None:
+    def spectrum(self) -> NoiseSpectrum | None:
         """Of noise whose one coordinate adds the same variance along every axis; None of any other."""
         return None
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bayesmembrane.calibration.posterior import Evaluation, Posterior
 from bayesmembrane.calibration.sampling.proposals.conditional import Residuals
 from bayesmembrane.ground.parameters import Array, Normal
-from bayesmembrane.physics.noise.base import Spectrum
+from bayesmembrane.physics.noise.base import NoiseSpectrum
 
 GROUPS = 500  # distinct variances of readings, beyond which integrating costs more than it saves
 
@@ -24,7 +24,7 @@ class Collapsed:
     """
 
     posterior: Posterior
-    spectrum: Spectrum
+    spectrum: NoiseSpectrum
 
     @property
     def size(self) -> int:

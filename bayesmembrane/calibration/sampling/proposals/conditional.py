@@ -42,14 +42,14 @@ class Residuals:
 
     def given(self) -> Given:
         """Modulus and noise given f."""
-        return Given(Linear(*self._integrated(NODES)[1:]), self)
+        return Given(PiecewiseLinear(*self._integrated(NODES)[1:]), self)
 
-    def modulus_at(self, ln_sd: Array) -> Linear:
+    def modulus_at(self, ln_sd: Array) -> PiecewiseLinear:
         """p(ln_gd | ln_sd, f) of each ln_sd (B,)."""
         tau = self.scale * np.exp(ln_sd)
         weight = 1 / np.maximum(self.variance + (tau * tau)[:, None], LEAST)
         pull, stiff = np.sum(self.ya * weight, axis=1), np.sum(self.aa * weight, axis=1)
-        return Linear(*of_modulus(pull, stiff, self.modulus.mean, self.modulus.sd, NODES))
+        return PiecewiseLinear(*of_modulus(pull, stiff, self.modulus.mean, self.modulus.sd, NODES))
 
     def _integrated(self, nodes: int) -> tuple[Array, Array, Array, Array]:
         priors = np.array([self.modulus.mean, self.modulus.sd, self.noise.mean, self.noise.sd, self.scale])
@@ -60,7 +60,7 @@ class Residuals:
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
+class PiecewiseLinear:
     """B densities of one number each, linear between n equally spaced nodes, and zero beyond them.
 
     first, step : (B,) the first node, and how far apart they are
@@ -102,7 +102,7 @@ class Given:
     Both are linear between nodes where the posterior is, and have a part `PRIOR_SHARE` of the prior beside that.
     """
 
-    noise: Linear
+    noise: PiecewiseLinear
     residuals: Residuals
 
     def drawn(self, u: Array) -> tuple[Array, Array]:
@@ -116,14 +116,14 @@ class Given:
         return noise + _log_density(self.residuals.modulus_at(ln_sd), self.residuals.modulus, ln_gd)
 
 
-def _quantile(near: Linear, prior: Normal, u: Array) -> Array:
+def _quantile(near: PiecewiseLinear, prior: Normal, u: Array) -> Array:
     """Quantiles at u (B,) of ``prior``, with the weight `PRIOR_SHARE`, beside ``near``."""
     part = (u - PRIOR_SHARE) / (1 - PRIOR_SHARE)
     wide = prior.mean + prior.sd * ndtri(np.clip(u / PRIOR_SHARE, TINY, 1 - TINY))
     return np.where(part < 0, wide, near.quantile(np.clip(part, TINY, 1 - TINY)))
 
 
-def _log_density(near: Linear, prior: Normal, x: Array) -> Array:
+def _log_density(near: PiecewiseLinear, prior: Normal, x: Array) -> Array:
     """ln of the density that `_quantile` inverts, at x (B,)."""
     wide = np.exp(prior.log_density(x))
     with np.errstate(divide="ignore"):
