@@ -40,9 +40,9 @@ class Residuals:
         """(B,) ln p(y | f), modulus and noise integrated out."""
         return self._integrated(FEW_NODES)[0]
 
-    def given(self) -> Given:
+    def given(self) -> GivenShape:
         """Modulus and noise given f."""
-        return Given(PiecewiseLinear(*self._integrated(NODES)[1:]), self)
+        return GivenShape(PiecewiseLinear(*self._integrated(NODES)[1:]), self)
 
     def modulus_at(self, ln_sd: Array) -> PiecewiseLinear:
         """p(ln_gd | ln_sd, f) of each ln_sd (B,)."""
@@ -96,7 +96,7 @@ class PiecewiseLinear:
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class GivenShape:
     """q(ln_gd, ln_sd | f) = q(ln_sd | f) q(ln_gd | ln_sd, f) of B curves, close to the conditional posterior.
 
     Both are linear between nodes where the posterior is, and have a part `PRIOR_SHARE` of the prior beside that.

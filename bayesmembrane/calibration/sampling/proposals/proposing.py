@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesmembrane.calibration.posterior import Evaluates, Posterior, weighed
 from bayesmembrane.calibration.sampling.proposals.collapsed import Collapsed, collapsed
-from bayesmembrane.calibration.sampling.proposals.conditional import Given
+from bayesmembrane.calibration.sampling.proposals.conditional import GivenShape
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.forward import AT_ONCE
@@ -100,7 +100,7 @@ class ShapeFirst:
             weights[ok] = self._weights(x[ok], lp[ok], self.collapsed.residuals(e.force[ok]).given())
         return weights
 
-    def _weights(self, x: Array, log_posterior: Array, given: Given) -> Array:
+    def _weights(self, x: Array, log_posterior: Array, given: GivenShape) -> Array:
         density = self.mixture.log_density(x[:, 1:-1]) + given.log_density(x[:, 0], x[:, -1])
         return np.asarray(log_posterior - density)
 
