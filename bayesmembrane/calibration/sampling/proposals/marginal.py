@@ -60,17 +60,16 @@ def of_modulus(pull: Array, stiff: Array, mean: float, sd: float, nodes: int) ->
     """
     first, step, density = np.empty(pull.size), np.empty(pull.size), np.empty((pull.size, nodes))
     for b in range(pull.size):
-        t, g, bend = peak(pull[b], stiff[b], mean, sd)
+        t, _, bend = peak(pull[b], stiff[b], mean, sd)
         width, value = 1.0 / np.sqrt(bend), density[b]
-        h, top = (
-            (LEFT + RIGHT) * width / (nodes - 1),
-            g * pull[b] - 0.5 * g * g * stiff[b] - 0.5 * ((t - mean) / sd) ** 2,
-        )
+        h = (LEFT + RIGHT) * width / (nodes - 1)
         first[b], step[b] = t - LEFT * width, h
         for j in range(nodes):
             x = first[b] + j * h
             e = np.exp(x)
-            value[j] = np.exp(e * pull[b] - 0.5 * e * e * stiff[b] - 0.5 * ((x - mean) / sd) ** 2 - top)
+            value[j] = e * pull[b] - 0.5 * e * e * stiff[b] - 0.5 * ((x - mean) / sd) ** 2
+        # Not at t, for of a film that is no sensible one the peak was not found.
+        value[:] = np.exp(value - np.max(value))
         value /= h * (np.sum(value) - 0.5 * (value[0] + value[nodes - 1]))
     return first, step, density
 

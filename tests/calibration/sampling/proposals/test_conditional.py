@@ -64,6 +64,18 @@ def test_draws_have_the_density_that_is_told(size: float, stated: float) -> None
     assert judged.log_mean == pytest.approx(quadrature(r), abs=6 * judged.log_mean_sd + 2e-4)
 
 
+def test_curves_that_are_none_have_weights_too() -> None:
+    """Forces of 1e4 to 1e17 N for Gd = 1, as films with senseless exponents have: nothing is left without a number."""
+    force = np.array([1e4, 1e8, 1e17])[:, None] * CURVE
+    y = 7.5 * CURVE
+    one = np.ones((CURVE.size, 1))
+    r = Residuals(np.zeros(1), one.sum(axis=0), (y * y) @ one, (force * y) @ one, (force**2) @ one, 7.5, MODULUS, NOISE)
+    assert np.all(np.isfinite(r.log_likelihood()))
+    for u in (1e-12, 0.01, 0.3, 0.999):
+        t, ln_sd = r.given().drawn(np.full((3, 2), u))
+        assert np.all(np.isfinite([t, ln_sd, r.given().log_density(t, ln_sd)]))
+
+
 def test_quantiles_invert_the_density() -> None:
     """Uniform numbers become draws of the piecewise linear density, whose distribution function is known."""
     rng, n = np.random.default_rng(42), 20_000
