@@ -38,11 +38,17 @@ class Collapsed:
         return self.posterior.readings
 
     def evaluate(self, s: Array) -> Evaluation:
-        """Of shapes s (B, k - 2): prior, likelihood with modulus and noise integrated out, and curves for Gd = 1."""
+        """Of shapes s (B, k - 2): prior, likelihood with modulus and noise integrated out, and curves for Gd = 1.
+
+        Films whose forces are too large to be squared weigh nothing.
+        """
         found = self.posterior.evaluate(self.whole(s))
         ok = np.isfinite(found.log_posterior)
         force, log_likelihood = found.force / np.exp(self.modulus.mean), np.full(len(s), -np.inf)
-        log_likelihood[ok] = self.residuals(force[ok]).log_likelihood()
+        with np.errstate(over="ignore", invalid="ignore"):
+            log_likelihood[ok] = self.residuals(force[ok]).log_likelihood()
+        ok &= np.isfinite(log_likelihood)
+        log_likelihood[~ok] = -np.inf
         return Evaluation(np.where(ok, self.log_prior(s), -np.inf), log_likelihood, found.outcome, force)
 
     def given(self, curves: Array, s: Array) -> Array:

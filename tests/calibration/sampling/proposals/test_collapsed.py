@@ -71,6 +71,17 @@ def test_few_numbers_weigh_as_all_readings() -> None:
     assert b == pytest.approx(a, abs=1e-4)
 
 
+def test_forces_too_large_to_be_squared_weigh_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    shape, s = shapes_of("covariance"), np.array([[3.0], [4.0]])
+    plain = shape.posterior.evaluate(shape.whole(s))
+    assert np.all(np.isfinite(shape.evaluate(s).log_posterior))
+    huge = replace(plain, force=plain.force * np.array([[1.0], [1e200]]))
+    monkeypatch.setattr(Posterior, "evaluate", lambda posterior, x: huge)
+    found = shape.evaluate(s)
+    assert np.isfinite(found.log_posterior[0])
+    assert found.log_prior[1] == found.log_likelihood[1] == -np.inf
+
+
 def mixture(centre: float, sd: float) -> Mixture:
     return Mixture(np.zeros(1), np.array([[centre]]), np.array([[[sd]]]), 5.0)
 
