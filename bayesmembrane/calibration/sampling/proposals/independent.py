@@ -21,8 +21,8 @@ from bayesmembrane.ground.parameters import Array
 
 ROUNDS, EACH = 3, 400
 """Rounds at most, and draws of the mixture that are solved in each."""
-ENOUGH, ENOUGH_SHAPE = 0.5, 0.75
-"""A proposal of this efficiency is good enough; one of shapes of the second."""
+ENOUGH, ENOUGH_SHAPE, ENOUGH_FILLED = 0.5, 0.75, 0.25
+"""A proposal of this efficiency is good enough; one of shapes of the second, and of the third once it is filled."""
 LEAST, LEAST_FILLED = 0.25, 0.08
 """A chain of less than the first is stuck for so long that ensembles are as fast; a mixture that has been filled may be
 worth less, for its weights have no long tail: what holds it up is short, and many films are solved at once."""
@@ -110,17 +110,17 @@ def _filled(search: _Learning, tried: Tried) -> Independent | None:
     with suppress(np.linalg.LinAlgError):
         for _ in range(ROUNDS):
             now, tried = search.round(tried)
-            if now is None:
+            if now is None or now.worth.efficiency < HOPELESS:
                 continue
-            found.append(now)
             if _rank(now) >= (True, ENOUGH_SHAPE):
                 return now
-            if now.worth.efficiency >= HOPELESS:
-                more, tried = search.completed(now, tried)
-                if more is not None and _rank(more) >= (True, LEAST_FILLED):
+            more, tried = search.completed(now, tried)
+            if more is not None:
+                found.append(more)
+                if _rank(more) >= (True, ENOUGH_FILLED):
                     return more
     best = max(found, key=_rank, default=None)
-    return best if best is not None and _rank(best) >= (True, LEAST) else None
+    return best if best is not None and _rank(best) >= (True, LEAST_FILLED) else None
 
 
 def _rank(found: Independent) -> tuple[bool, float]:
