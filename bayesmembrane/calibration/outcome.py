@@ -11,7 +11,7 @@ from bayesmembrane.calibration.checks import alike
 from bayesmembrane.calibration.crosscheck import crosscheck
 from bayesmembrane.calibration.goodness import dominates, goodness
 from bayesmembrane.calibration.layout import inference_data
-from bayesmembrane.calibration.posterior import FAILURES, Posterior
+from bayesmembrane.calibration.posterior import FAILURES, Evaluation, Posterior
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.quality import NOTEWORTHY
 from bayesmembrane.calibration.sampling.chains import Chains
@@ -37,7 +37,7 @@ def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) ->
     hypothesis, measurement = posterior.hypothesis, posterior.measurement
     x, lp = sampled.draws(_count(len(measurement)))
     flat = x.reshape(-1, x.shape[-1])
-    evaluation = posterior.evaluate(flat)
+    evaluation = _evaluated(posterior, flat)
     rng = np.random.default_rng([seed, 1])
     residual, theta = measurement.force - evaluation.force, hypothesis.noise_coordinates(flat)
     noise = posterior.noise.at(evaluation.force, evaluation.traces)
@@ -73,6 +73,14 @@ def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) ->
         "best": _best(hypothesis, measurement, flat[best]),
     }
     return data, status
+
+
+def _evaluated(posterior: Posterior, x: Array) -> Evaluation:
+    """As `Posterior.evaluate` of draws x (B, k), many of them the same since chains stand: each is solved once."""
+    distinct, back = np.unique(x, axis=0, return_inverse=True)
+    found, back = posterior.evaluate(distinct), back.ravel()
+    traces = None if found.traces is None else found.traces[back]
+    return Evaluation(found.log_prior[back], found.log_likelihood[back], found.outcome[back], found.force[back], traces)
 
 
 def _count(readings: int) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -92,6 +92,14 @@ class Evaluates(Protocol):
 
     def evaluate(self, x: Array, /) -> Evaluation:
         """Prior, likelihood, force and outcome of x (B, k), from one batched solution."""
+
+
+@runtime_checkable
+class Partial(Evaluates, Protocol):
+    """A posterior of some of the coordinates of another."""
+
+    def whole(self, x: Array, /) -> Array:
+        """(B, k) all coordinates of films with the coordinates x (B, m)."""
 
 
 def weighed(posterior: Evaluates, x: Array) -> Densities:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesmembrane.calibration.descent import Patience, descend
 from bayesmembrane.calibration.objective import Objective, separated
-from bayesmembrane.calibration.posterior import Outcomes, Posterior, weighed
+from bayesmembrane.calibration.posterior import Evaluates, Evaluation, Outcomes, Partial, Posterior, weighed
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.data.thinning import shortened
 from bayesmembrane.ground.errors import SettingsError
@@ -24,19 +26,36 @@ WIDER = 1.5  # of the Laplace approximation
 DEGREES = 4.0  # of freedom of the t-distribution around a valley
 SPARE = 1.5  # effective number of candidates for each walker
 SCREENED_BY = 500  # readings, which is enough to see where to begin
+KEPT = 500_000  # numbers of curves of one batch
 FINEST = 1e-11  # of the largest force: no noise that is inferred is below, as its bounds say
 
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """Points x (M, k) that were solved, and ``log_posterior`` there (M,), -inf where they are not possible."""
+    """Points x (M, k) that were solved, and ``log_posterior`` there (M,), -inf where they are not possible.
+
+    curves : (M, N) those of an `Evaluation`; None if they are too many numbers to be kept
+    """
 
     x: Array
     log_posterior: Array
+    curves: Array | None = None
 
-    def joined(self, x: Array, log_posterior: Array) -> Tried:
+    @classmethod
+    def of(cls, posterior: Evaluates, x: Array, counts: Outcomes) -> Tried:
+        """The points x (M, k), solved and counted."""
+        few = len(x) * posterior.readings <= KEPT
+        found = posterior.evaluate(x) if few else weighed(posterior, x)
+        counts.note(posterior.whole(x) if isinstance(posterior, Partial) else x, found.outcome)
+        curves = found.curves if few and isinstance(found, Evaluation) else None
+        return cls(x, found.log_posterior, curves)
+
+    def joined(self, more: Tried) -> Tried:
         """These and further ones."""
-        return Tried(np.concatenate([self.x, x]), np.concatenate([self.log_posterior, log_posterior]))
+        x, lp = np.concatenate([self.x, more.x]), np.concatenate([self.log_posterior, more.log_posterior])
+        if self.curves is None or more.curves is None:
+            return Tried(x, lp)
+        return Tried(x, lp, np.concatenate([self.curves, more.curves]))
 
     def starts(self, rng: np.random.Generator, ensembles: int, walkers: int) -> Array:
         """Starting points (E, W, k), all possible and all different, drawn without replacement from p(x | y)^b.
@@ -51,8 +70,11 @@ class Tried:
     @property
     def possible(self) -> Tried:
         """Those that are possible."""
-        good = np.isfinite(self.log_posterior)
-        return Tried(self.x[good], self.log_posterior[good])
+        return self.those(np.isfinite(self.log_posterior))
+
+    def those(self, some: NDArray[Any]) -> Tried:
+        """Some of them."""
+        return Tried(self.x[some], self.log_posterior[some], None if self.curves is None else self.curves[some])
 
 
 def starting_points(
@@ -70,17 +92,16 @@ def try_points(posterior: Posterior, rng: np.random.Generator, wanted: int, coun
 
     Raises `SettingsError` if next to no admissible parameters reach the data.
     """
-    x = _candidates(posterior, rng)
-    lp = _evaluate(posterior, x, counts)
-    for _ in range(max(ROUNDS, int(np.ceil((SPARE * wanted - len(x)) / EACH)))):
-        good = np.isfinite(lp)
-        if np.count_nonzero(good) < 4:
+    tried = Tried.of(posterior, _candidates(posterior, rng), counts)
+    for _ in range(max(ROUNDS, int(np.ceil((SPARE * wanted - len(tried.x)) / EACH)))):
+        good = tried.possible
+        if len(good.x) < 4:
             more = posterior.prior.draw(rng, 2 * EACH)
         else:
-            parents = x[good][tempered(lp[good], EACH / 2, EACH, rng)]
+            parents = good.x[tempered(good.log_posterior, EACH / 2, EACH, rng)]
             more = evolved(parents, rng)
-        x, lp = np.concatenate([x, more]), np.concatenate([lp, _evaluate(posterior, more, counts)])
-    if np.count_nonzero(np.isfinite(lp)) < wanted:
+        tried = tried.joined(Tried.of(posterior, more, counts))
+    if len(tried.possible.x) < wanted:
         mode = posterior.hypothesis.convexity
         limit = "" if not mode.restricts else f' that meet the convexity prior "{mode}"'
         raise SettingsError(
@@ -88,13 +109,7 @@ def try_points(posterior: Posterior, rng: np.random.Generator, wanted: int, coun
             f"{1e3 * np.max(posterior.measurement.deflection):g} mm",
             remedy="use a shorter range, another material or another convexity prior",
         )
-    return Tried(x, lp)
-
-
-def _evaluate(posterior: Posterior, x: Array, counts: Outcomes) -> Array:
-    e = weighed(posterior, x)
-    counts.note(x, e.outcome)
-    return e.log_posterior
+    return tried
 
 
 def _candidates(posterior: Posterior, rng: np.random.Generator) -> Array:

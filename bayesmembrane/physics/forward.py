@@ -137,12 +137,15 @@ class Forward:
         return Prediction(self.deflection, curves.force[:, :n], curves.status[:, :n], films, chained, *margins)
 
     def margins(self, x: Array) -> Prediction | Margins:
-        """What a call with x (B, k) says of convexity; effects and interpolation say nothing of it, and are spared."""
+        """What a call with x (B, k) says of convexity; effects and interpolation say nothing of it, and are spared.
+
+        A film that has lost ellipticity is not convex either: nothing more is asked of it.
+        """
         if not self.composes:
-            return self(x)
+            return self(x, spare=Spared.NOT_ELLIPTIC)
         films = self.hypothesis.films(x)
         theta = x[:, self.hypothesis.material_size : self.hypothesis.curve_size]
-        at = self.law(films, theta, reached=True)[1]
+        at = self.law(films, theta, reached=True, spare=Spared.NOT_ELLIPTIC)[1]
         return Margins(films, *_least(at), *at)
 
     # ---- film and effects ------------------------------------------------------------------------------------------

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.calibration.posterior import Outcomes, Posterior, weighed
+from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.proposals.generator import generator_of
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
+from bayesmembrane.calibration.sampling.proposals.proposing import Proposing, proposing
 from bayesmembrane.calibration.sampling.weights import Worth, worth
 from bayesmembrane.ground.parameters import Array
 
@@ -41,17 +42,16 @@ def leap(posterior: Posterior, mixture: Mixture, standing: Chains, steps: int, c
     """
     x, lp = standing.x[:, -1], standing.log_posterior[:, -1]
     ensembles, walkers, k = x.shape
-    drawn = [_drawn(mixture, state, steps * walkers) for state in standing.random_states]
-    y = np.stack([d[0] for d in drawn])
-    e = weighed(posterior, y.reshape(-1, k))
-    counts.note(y.reshape(-1, k), e.outcome)
+    proposal = proposing(posterior, mixture)
+    drawn = [_drawn(proposal, state, steps * walkers) for state in standing.random_states]
+    e = proposal.solved(np.concatenate([d[0] for d in drawn]))
+    counts.note(e.x, e.outcome)
     shape = (ensembles, steps, walkers)
-    log_y = e.log_posterior.reshape(shape)
-    offered = (e.log_posterior - mixture.log_density(y.reshape(-1, k))).reshape(shape)
+    log_y, offered = e.log_posterior.reshape(shape), e.log_weights.reshape(shape)
     chance = np.stack([d[1] for d in drawn]).reshape(shape)
-    y = y.reshape(*shape, k)
+    y = e.x.reshape(*shape, k)
     made, made_lp = np.empty_like(y), np.empty(shape)
-    now = lp - mixture.log_density(x.reshape(-1, k)).reshape(lp.shape)
+    now = proposal.log_weights(x.reshape(-1, k), lp.ravel()).reshape(lp.shape)
     for step in range(steps):
         taken = chance[:, step] < offered[:, step] - now
         x = np.where(taken[..., None], y[:, step], x)
@@ -65,9 +65,9 @@ def offers(chains: Chains) -> Worth:
     return worth(np.empty(0) if chains.offered is None else chains.offered.ravel())
 
 
-def _drawn(mixture: Mixture, state: Any, count: int) -> tuple[Array, Array, Any]:
-    """Proposals (count, k), ln of uniform draws (count,), and the state of the generator after them."""
+def _drawn(proposal: Proposing, state: Any, count: int) -> tuple[Array, Array, Any]:
+    """What makes proposals (count, m), ln of uniform draws (count,), and the state of the generator after them."""
     random = np.random.RandomState()
     random.set_state(state)
     rng = generator_of(random)
-    return mixture.draw(rng, count), np.log(rng.random(count)), random.get_state()
+    return proposal.drawn(rng, count), np.log(rng.random(count)), random.get_state()

@@ -35,6 +35,8 @@ SURE = 0.02
 MOST_FOR_Z = 10_000
 SLOW = 1000  # steps for `LEAST_TAUS`, from which on emcee's ensembles are as fast as a mixture that holds them up
 DOUBTED = 5000  # draws of a mixture after which it is looked at for the first time
+GIVEN_UP = 2 * DOUBTED
+"""Draws from which on a mixture whose weights are not good is given up; until then no draw of it counts."""
 GROWTH = 1.25  # a look costs little, but nothing is learned from looking at every step
 
 
@@ -169,8 +171,11 @@ def _good(chains: Chains) -> bool:
 
 def _worth_it(chains: Chains, found: Convergence) -> bool:
     """Whether it is still worth while to have a mixture propose, if one does."""
+    if chains.mixture is None or chains.offered is None:
+        return True
     slow = LEAST_TAUS * float(np.max(found.tau)) > SLOW
-    return chains.mixture is None or (not slow and _good(chains))
+    # Few weights that end at a bound, as where the prior is cut, look like a tail: they are given some more.
+    return not slow and (_good(chains) or chains.offered.size < GIVEN_UP)
 
 
 def _next_look(chains: Chains, found: Convergence, settings: Settings) -> int:
@@ -182,7 +187,10 @@ def _next_look(chains: Chains, found: Convergence, settings: Settings) -> int:
     needed = max(LEAST_TAUS * tau, (steps - found.burn) * settings.ess / float(np.min(found.ess)))
     guess = int(np.ceil(needed * 1.02)) + found.burn
     if chains.mixture is not None:
-        for_z = _proposals_for_z(offers(chains)) / chains.log_posterior[:, 0].size
+        judged = offers(chains)
+        if not judged.good:
+            return blocks(2 * steps)
+        for_z = _proposals_for_z(judged) / chains.log_posterior[:, 0].size
         return blocks(min(max(guess, for_z, steps + BLOCK), 2 * steps))
     return int(
         min(max(guess, steps + settings.chunk // 2, int(1.1 * steps)), max(int(GROWTH * steps), 2 * settings.chunk))
@@ -226,7 +234,8 @@ def _start(posterior: Posterior, settings: Settings, seed: int) -> Chains:
 
 def _begun_from_mixture(posterior: Posterior, close: Independent, settings: Settings, seed: int) -> Chains:
     """Ensembles at states of a mixture, to be looked at where they may be worth enough."""
-    walkers = walkers_of(posterior, settings)
+    # Steps that hang on no other walker need no more of them than emcee's ensembles to go on with.
+    walkers = settings.walkers or 16 * -(-2 * posterior.size // 16)
     count = settings.ensembles * walkers
     states = np.resize(close.states, (settings.ensembles, walkers, posterior.size))
     chains = begun(posterior, states, seed)

@@ -58,6 +58,20 @@ class Elsewhere:
     places: NDArray[np.int64] | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class NoiseSpectrum:
+    """Sigma = Q diag(w + tau^2) Q^T with tau = scale exp(x), x the one coordinate of the noise.
+
+    axes : (N, N) Q, None for the identity
+    variance : (N,) w, N^2, or (1,) of all readings
+    scale : N
+    """
+
+    axes: Array | None
+    variance: Array
+    scale: float
+
+
 class NoiseLikelihood(ABC):
     """A noise model bound to one measurement of N points; ``x`` (B, k) are its coordinates, ``residual`` (B, N) y - F.
 
@@ -79,6 +93,11 @@ class NoiseLikelihood(ABC):
 
         None where the noise does not weigh all readings alike and independently.
         """
+        return None
+
+    @property
+    def spectrum(self) -> NoiseSpectrum | None:
+        """Of noise whose one coordinate adds the same variance along every axis; None of any other."""
         return None
 
     @abstractmethod

@@ -10,7 +10,7 @@ import numpy as np
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array, Natural, Parameter
-from bayesmembrane.physics.noise.base import LN_SD, SD, Noise, NoiseLikelihood, conditional, force_scale
+from bayesmembrane.physics.noise.base import LN_SD, SD, Noise, NoiseLikelihood, NoiseSpectrum, conditional, force_scale
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,10 @@ class WhiteLikelihood(NoiseLikelihood):
             self.variance = measurement.force_sd**2
         if self.axes is None and np.ptp(self.variance) == 0:
             self.variance = self.variance[:1]  # one number is that of all readings
+
+    @property
+    def spectrum(self) -> NoiseSpectrum | None:
+        return NoiseSpectrum(self.axes, self.variance, self.scale) if self.extra else None
 
     def along(self, axes: Array) -> NoiseLikelihood | None:
         if self.axes is not None or self.variance.size > 1:

@@ -70,10 +70,12 @@ class Rig(Fixture, ABC):
     """A fixture on which forces can be predicted.
 
     closed_form : its law costs next to nothing; else films are solved at few points, and a law is drawn through them
+    reads_force : what is read grows in proportion to the modulus, as forces and stresses do
     proposal : "" or, in words, the test that could be made on such a rig with another specimen of the same film
     """
 
     closed_form: ClassVar[bool] = False
+    reads_force: ClassVar[bool] = True
     proposal: ClassVar[str] = ""
 
     @abstractmethod

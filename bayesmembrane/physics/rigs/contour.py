@@ -40,6 +40,7 @@ class Contour(Ring):
     columns: ClassVar[Mapping[str, str]] = {"radius": LENGTH, "height": LENGTH}
     noise: ClassVar[Mapping[str, str]] = {"height_sd": LENGTH}
     closed_form: ClassVar[bool] = True  # one state of the film: nothing is drawn through points of a curve
+    reads_force: ClassVar[bool] = False
     has_path: ClassVar[bool] = False
     axes: ClassVar[tuple[str, float, str]] = ("radius", 0.0, "height")
 

@@ -176,3 +176,15 @@ def test_effects_ask_its_properties(kind: type[Rig]) -> None:
     for effect in components("effects").values():
         assert bool(effect().unavailable(rig, path)) == (not effect.occurs_on(kind))
         assert not effect.occurs_on(kind) or kind.has_path
+
+
+@every
+def test_readings_are_proportional_to_the_modulus_where_that_is_said(kind: type[Rig]) -> None:
+    """F(s c) = s F(c) and as convex or not, which is what `reads_force` promises to whoever draws moduli by it."""
+    m, claim = curve_on(kind), hypothesis("mooney_rivlin")
+    x = np.array([[2.0, 0.1, -4.0], [2.0 + np.log(3.0), 0.1, -4.0]])
+    found = Forward(claim, m, m.deflection)(x)
+    assert np.all(found.ok)
+    factor = 3.0 if kind.reads_force else 1.0
+    assert found.force[1] == pytest.approx(factor * found.force[0], rel=1e-9)
+    assert np.array_equal(np.sign(found.convexity[0]), np.sign(found.convexity[1]))

@@ -133,18 +133,36 @@ class Emulator:
         return x, start - now
 
 
-def emulate(posterior: Emulated, x: Array, rng: np.random.Generator, seen: Allowed | None = None) -> Emulator | None:
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """ln p (M,) and the curves (M, N) of points, as an `Evaluation` has them."""
+
+    log_posterior: Array
+    curves: Array
+
+
+def emulate(
+    posterior: Emulated,
+    x: Array,
+    rng: np.random.Generator,
+    seen: Allowed | None = None,
+    solved: Solved | None = None,
+) -> Emulator | None:
     """An emulator learned from draws x (M, k), of the polynomial degree that predicts held-out densities best.
 
-    ``seen`` tells where the prior is cut; without it the cut is left to whoever judges. None where there are too few
-    possible draws to learn from.
+    ``seen`` tells where the prior is cut; without it the cut is left to whoever judges. What is ``solved`` of the draws
+    is not solved again. None where there are too few possible draws to learn from.
     """
-    x = np.unique(x, axis=0)
-    x = x[rng.permutation(len(x))[: min(LEARN_FROM, max(LEARN_FORCES // posterior.readings, 4 * LEAST_DRAWS))]]
-    found = posterior.evaluate(x)
-    curves = found.curves
-    ok = np.isfinite(found.log_posterior) & np.all(np.isfinite(curves), axis=1)
-    x, curves, truth = x[ok], curves[ok], found.log_posterior[ok]
+    x, first = np.unique(x, axis=0, return_index=True)
+    some = rng.permutation(len(x))[: min(LEARN_FROM, max(LEARN_FORCES // posterior.readings, 4 * LEAST_DRAWS))]
+    x = x[some]
+    if solved is None:
+        found = posterior.evaluate(x)
+        curves, truth = found.curves, found.log_posterior
+    else:
+        curves, truth = solved.curves[first[some]], solved.log_posterior[first[some]]
+    ok = np.isfinite(truth) & np.all(np.isfinite(curves), axis=1)
+    x, curves, truth = x[ok], curves[ok], truth[ok]
     if len(x) < LEAST_DRAWS:
         return None
     centre, root = np.mean(x, axis=0), _root(x)

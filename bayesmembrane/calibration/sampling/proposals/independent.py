@@ -3,29 +3,33 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesmembrane.calibration.posterior import Outcomes, Posterior, weighed
-from bayesmembrane.calibration.sampling.proposals.emulator import Allowed, Emulator, emulate
-from bayesmembrane.calibration.sampling.proposals.filling import filled, joined
+from bayesmembrane.calibration.sampling.proposals.collapsed import Collapsed, collapsed
+from bayesmembrane.calibration.sampling.proposals.emulator import Allowed, Emulator, Solved, emulate
+from bayesmembrane.calibration.sampling.proposals.filling import Filled, filled, joined
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture, widened
+from bayesmembrane.calibration.sampling.proposals.proposing import ShapeFirst
 from bayesmembrane.calibration.sampling.weights import Worth, worth
 from bayesmembrane.calibration.starts import Tried, tempered
 from bayesmembrane.ground.parameters import Array
 
 ROUNDS, EACH = 3, 400
 """Rounds at most, and draws of the mixture that are solved in each."""
-ENOUGH = 0.5
-"""A proposal of this efficiency is good enough."""
+ENOUGH, ENOUGH_SHAPE, ENOUGH_FILLED = 0.5, 0.75, 0.25
+"""A proposal of this efficiency is good enough; one of shapes of the second, and of the third once it is filled."""
 LEAST, LEAST_FILLED = 0.25, 0.08
 """A chain of less than the first is stuck for so long that ensembles are as fast; a mixture that has been filled may be
 worth less, for its weights have no long tail: what holds it up is short, and many films are solved at once."""
 FILLINGS, HOPELESS = 2, 0.02
 """A mixture is filled so often at most, and not at all if it is worth less than this."""
 FITTED = 0.6  # weight of what is fitted to draws beside the mixture that is filled
-CHECKED = 2000  # draws that judge it
+CHECKED, CHECKED_SHAPES = 2000, 1000  # draws that judge it
 DEPTH = 6.0
 """An emulator is learned where ln p is less than this, and one for each coordinate, below its largest value: nearly
 all of the posterior is there, and a polynomial that must follow more follows less well."""
@@ -33,6 +37,8 @@ LEARN_FROM, LEARN_MORE = 800, 2000
 WALKERS, BURN, SNAPSHOTS, APART = 80, 100, 6, 25
 """Of the walk on the emulator: its walkers for each coordinate, steps to begin with, and snapshots so many steps apart:
 of what they give a mixture has about two components for each coordinate."""
+SHAPES = 100  # walkers where they stand for shapes
+STATES = 256  # of those that walks may begin at
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,15 +58,34 @@ def independent(posterior: Posterior, tried: Tried, rng: np.random.Generator, co
     Stat. Comput. 18 (2008) 447, with the walk on an emulator instead of reweighting what has been solved. Where no
     round finds one that is good enough the best is `filled`.
     """
-    search = _Learning(posterior, rng, counts)
+    shape = collapsed(posterior)
+    if shape is None:
+        return _learned(_Learning(posterior, rng, counts), tried)
+    close = _filled(_Learning(shape, rng, counts), _shapes(tried, shape))
+    if close is None:
+        return None
+    states = close.states[:STATES]
+    numbers = np.concatenate([states, rng.random((len(states), 2))], axis=1)
+    return replace(close, states=ShapeFirst(shape, close.mixture).solved(numbers).x)
+
+
+def _shapes(tried: Tried, shape: Collapsed) -> Tried:
+    """The shapes of what was tried, with ln p of those."""
+    x, lp, ok = tried.x[:, 1:-1], tried.log_posterior.copy(), np.isfinite(tried.log_posterior)
+    if tried.curves is None:
+        lp[ok] = weighed(shape, x[ok]).log_posterior
+        return Tried(x, lp)
+    curves = tried.curves / np.exp(tried.x[:, :1])
+    lp[ok] = shape.given(curves[ok], x[ok])
+    return Tried(x, lp, curves)
+
+
+def _learned(search: _Learning, tried: Tried) -> Independent | None:
+    """What `independent` finds of all coordinates: what is best of `ROUNDS` is filled, if it has to be."""
     found: list[Independent] = []
     with suppress(np.linalg.LinAlgError):  # what was tried fills no volume
         for _ in range(ROUNDS):
-            # Not the last round's draws by their weights: of a bad mixture one of them may outweigh all others.
-            good, walkers = tried.possible, search.walkers
-            states = good.x[tempered(good.log_posterior, walkers / 2, walkers, rng)]
-            mixture = search.learned(tried, states, LEARN_FROM)
-            now, tried = search.judged(widened(*mixture), tried, EACH)
+            now, tried = search.round(tried)
             if now is not None:
                 found.append(now)
                 if _rank(now) >= (True, ENOUGH):
@@ -77,6 +102,27 @@ def independent(posterior: Posterior, tried: Tried, rng: np.random.Generator, co
     return best if _rank(best) >= (True, LEAST) else None
 
 
+def _filled(search: _Learning, tried: Tried) -> Independent | None:
+    """What `independent` finds of shapes: a few hundred draws do not show the tail of their weights, and a mixture is
+    filled as soon as there is one that is not `ENOUGH_SHAPE`.
+    """
+    found: list[Independent] = []
+    with suppress(np.linalg.LinAlgError):
+        for _ in range(ROUNDS):
+            now, tried = search.round(tried)
+            if now is None or now.worth.efficiency < HOPELESS:
+                continue
+            if _rank(now) >= (True, ENOUGH_SHAPE):
+                return now
+            more, tried = search.completed(now, tried)
+            if more is not None:
+                found.append(more)
+                if _rank(more) >= (True, ENOUGH_FILLED):
+                    return more
+    best = max(found, key=_rank, default=None)
+    return best if best is not None and _rank(best) >= (True, LEAST_FILLED) else None
+
+
 def _rank(found: Independent) -> tuple[bool, float]:
     return found.worth.good, found.worth.efficiency
 
@@ -85,48 +131,62 @@ def _rank(found: Independent) -> tuple[bool, float]:
 class _Learning:
     """What mixtures are learned for."""
 
-    posterior: Posterior
+    posterior: Posterior | Collapsed
     rng: np.random.Generator
     counts: Outcomes
 
     @property
     def walkers(self) -> int:
         """On the emulator."""
-        return WALKERS * self.posterior.size
+        return SHAPES if isinstance(self.posterior, Collapsed) else WALKERS * self.posterior.size
 
-    def log_density(self, x: Array) -> Array:
-        """ln p of x (B, k), solved."""
-        e = weighed(self.posterior, x)
-        self.counts.note(x, e.outcome)
-        return e.log_posterior
+    def round(self, tried: Tried) -> tuple[Independent | None, Tried]:
+        """A mixture learned from what was tried, and what `EACH` draws say of it."""
+        # Not the last round's draws by their weights: of a bad mixture one of them may outweigh all others.
+        good = tried.possible
+        states = good.x[tempered(good.log_posterior, self.walkers / 2, self.walkers, self.rng)]
+        return self.judged(widened(*self.learned(tried, states, LEARN_FROM)), tried, EACH)
 
     def judged(self, mixture: Mixture, tried: Tried, count: int) -> tuple[Independent | None, Tried]:
         """What ``count`` draws say of a mixture, None if none is possible, and they with what was tried."""
         x = mixture.draw(self.rng, count)
-        lp = self.log_density(x)
-        weights = lp - mixture.log_density(x)
+        more = Tried.of(self.posterior, x, self.counts)
+        weights = more.log_posterior - mixture.log_density(x)
         found = worth(weights)
-        tried = tried.joined(x, lp)
+        tried = tried.joined(more)
         if found.efficiency <= 0:
             return None, tried
         return Independent(mixture, _resampled(x, weights, self.walkers, self.rng), found), tried
 
     def filled(self, best: Independent) -> Independent | None:
         """The mixture with what it lacks, beside one that is learned from all that this took to find."""
-        whole = filled(best.mixture, self.log_density, self.rng)
-        tried = Tried(whole.x, whole.log_posterior)
+        whole, tried = self._filled(best)
         states = _resampled(whole.x, whole.log_weights, self.walkers, self.rng)
         fitted, _ = self.learned(tried, states, LEARN_MORE)
         mixture = joined([(fitted, FITTED), (whole.mixture, 1 - FITTED)])
         return self.judged(mixture, tried, CHECKED)[0]
 
+    def completed(self, best: Independent, tried: Tried) -> tuple[Independent | None, Tried]:
+        """The mixture with what it lacks, and what this took to find with what was tried."""
+        whole, more = self._filled(best)
+        return self.judged(whole.mixture, tried.joined(more), CHECKED_SHAPES)
+
+    def _filled(self, best: Independent) -> tuple[Filled, Tried]:
+        solved: list[Tried] = []
+
+        def log_density(x: Array) -> Array:
+            solved.append(Tried.of(self.posterior, x, self.counts))
+            return solved[-1].log_posterior
+
+        return filled(best.mixture, log_density, self.rng), reduce(Tried.joined, solved)
+
     def learned(self, tried: Tried, states: Array, most: int) -> tuple[Mixture, Array]:
         """A mixture for the draws of an emulator, or for the ``states`` where there is none, and those draws."""
         draws = states
         with suppress(np.linalg.LinAlgError):
-            near = _near(tried, most, self.rng)
+            near = tried.those(_near(tried, most, self.rng))
             seen = Allowed.of(tried.x, tried.log_posterior > -np.inf)
-            emulator = emulate(self.posterior, near, self.rng, seen)
+            emulator = emulate(self.posterior, near.x, self.rng, seen, _solved(near))
             if emulator is not None:
                 draws = _walked(emulator, states, self.rng)
         return fit_mixture(_parted(draws, self.rng), self.rng), draws
@@ -138,12 +198,17 @@ def _resampled(x: Array, log_weights: Array, count: int, rng: np.random.Generato
     return np.asarray(x[rng.choice(len(x), size=count, p=share / np.sum(share))])
 
 
-def _near(tried: Tried, most: int, rng: np.random.Generator) -> Array:
-    """Points to learn an emulator from, ``most`` at most."""
+def _solved(tried: Tried) -> Solved | None:
+    """What is known of these points; None if their curves were not kept."""
+    return None if tried.curves is None else Solved(tried.log_posterior, tried.curves)
+
+
+def _near(tried: Tried, most: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Which points to learn an emulator from, ``most`` at most."""
     order = np.argsort(-tried.log_posterior)
     depth = tried.log_posterior[order[0]] - tried.log_posterior[order]
     enough = max(int(np.count_nonzero(depth < DEPTH + tried.x.shape[1])), 12 * tried.x.shape[1])
-    return np.asarray(tried.x[rng.permutation(order[:enough])[:most]])
+    return np.asarray(rng.permutation(order[:enough])[:most])
 
 
 def _walked(emulator: Emulator, states: Array, rng: np.random.Generator) -> Array:
