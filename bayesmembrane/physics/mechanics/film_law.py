@@ -223,14 +223,11 @@ def tangent(found: FilmLaw, force: Array, change: Array) -> Array:
         q = np.where(keep[:, :, None], change / force[:, :, None], 0.0)
     out = np.zeros((*found.pieces.shape, q.shape[2]))
     for last in np.unique(found.last):
-        rows = np.flatnonzero(found.last == last)
         if last < 3:
             continue
-        first, second = _spline_slopes(int(last))
-        part = q[rows, :last]
-        dq, ddq = (np.einsum("ij,bjm->bim", m, part) for m in (first, second))
-        for m in range(q.shape[2]):
-            out[rows, :last, :, m] = _between(part[:, :, m], dq[:, :, m], ddq[:, :, m])
+        rows = np.flatnonzero(found.last == last)
+        pieces = _pieces_of_values(int(last)) @ q[rows, :last]
+        out[rows, :last] = pieces.reshape(rows.size, last, 6, q.shape[2])
     return out
 
 
@@ -258,6 +255,13 @@ def _spline_slopes(count: int) -> tuple[Array, Array]:
     unit = np.eye(count)
     spline = make_interp_spline(both, np.concatenate([unit[::-1], unit]), k=5 if count > 2 else 3)
     return spline(at, 1), spline(at, 2)
+
+
+@cache
+def _pieces_of_values(count: int) -> Array:
+    """(6 count, count) from values at j + 1/2 of an even function to the coefficients of the quintics through them."""
+    first, second = _spline_slopes(count)
+    return np.ascontiguousarray(_between(np.eye(count), first.T, second.T).reshape(count, -1).T)
 
 
 @cache
