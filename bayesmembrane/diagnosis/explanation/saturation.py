@@ -196,25 +196,28 @@ def _settled(point: _Point) -> Saturated:
     theta = None
     for _ in range(SATURATION.steps):
         theta = weighed(point.model, theta).theta
-        here, following = point.density(theta), _better(point, theta)
+        here = point.density(theta)
+        following = _better(point, theta, here)
         if following is None:
             break
-        gained, point = following.density(theta) - here, following
-        if gained < SATURATION.tolerance:
+        point, there = following
+        if there - here < SATURATION.tolerance:
             break
     found = weighed(point.model, theta).log_evidence
     return Saturated(point.law, point.film, found, point.law.reading(point.force), point.force >= point.law.limit)
 
 
-def _better(point: _Point, theta: Array) -> _Point | None:
-    """The first point on the way to the most probable coefficients that is more probable than this one."""
+def _better(point: _Point, theta: Array, here: float) -> tuple[_Point, float] | None:
+    """The first point on the way to the most probable coefficients that is more probable than this one, whose ln p is
+    ``here``, and its ln p.
+    """
     k = point.film.x.size
     mean = point.model.mean(theta)
     goal = np.concatenate([mean[2 : k + 2], mean[:2]])  # the model has the law's columns first
-    here, way = point.coefficients, 1.0
+    begin, way = point.coefficients, 1.0
     for _ in range(SATURATION.halvings):
-        trial = point.moved(here + way * (goal - here))
-        if trial is not None and trial.density(theta) > point.density(theta):
-            return trial
+        trial = point.moved(begin + way * (goal - begin))
+        if trial is not None and (there := trial.density(theta)) > here:
+            return trial, there
         way *= 0.5
     return None
