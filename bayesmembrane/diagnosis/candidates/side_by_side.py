@@ -45,7 +45,7 @@ class Searching:
 
     def __init__(self, hypothesis: Hypothesis, axes: Standard, freeing: Freeing, starts: Array, most: int) -> None:
         self.hypothesis, self.axes, self.freeing = hypothesis, axes, freeing
-        patience = Patience(SEARCH.given_up, SEARCH.slow_below, settled=SEARCH.slow_below)
+        patience = Patience(SEARCH.given_up, SEARCH.slow_below, settled=SEARCH.settled)
         self._descent = Descent(starts, axes.bounds, most, patience=patience)
 
     @property
