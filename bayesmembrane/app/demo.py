@@ -59,12 +59,12 @@ Verbs = dict[str, Verb]
 
 
 def order() -> list[tuple[str, str]]:
-    """Every material on every range: those with the most parameters first, since they take longest, and two materials
-    at a time, so that no solver is compiled twice.
+    """Every material on every range: those with the most parameters first, on the longer range, since they take longest
+    and valleys and comparisons wait for all of them; two materials at a time, so that no solver is compiled twice.
     """
     names = sorted(ordinary_materials(), key=lambda name: -len(ordinary_materials()[name].field_names()))
     pairs = [names[i : i + 2] for i in range(0, len(names), 2)]
-    return [(name, range_name) for pair in pairs for range_name in RANGES for name in pair]
+    return [(name, range_name) for pair in pairs for range_name in reversed(RANGES) for name in pair]
 
 
 def verbs() -> tuple[Verbs, Verbs, Verbs]:

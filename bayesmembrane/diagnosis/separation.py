@@ -99,11 +99,11 @@ def _one(c: Candidate, search: Search, noise: OwnNoise, shown: tuple[Array, Arra
     """Mean and spread of one rival whose film has these force (M,), slopes (M, k) and form errors (M, q) N."""
     force, slopes, forms = shown
     k = c.x.size
-    mean, covariance = search.linear(c).coefficients(c.theta)
+    mean, covariance = search.linear(c).first(c.theta, k)
     own = slopes * search.steepness(c)
-    value, vector = np.linalg.eigh(covariance[:k, :k])
+    value, vector = np.linalg.eigh(covariance)
     open_yet = own @ (vector * np.sqrt(np.maximum(value, 0.0)))
-    moved = force + own @ (mean[:k] - search.coefficients_at(c))
+    moved = force + own @ (mean - search.coefficients_at(c))
     white = noise.white(np.column_stack([moved, open_yet, forms]))
     return white[:, 0], white[:, 1:]
 

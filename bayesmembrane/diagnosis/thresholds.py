@@ -124,6 +124,9 @@ class SearchThresholds:
     """Steps from the best end, once its own form error is known."""
     slow_below: float = 3e-5
     """Of the sum of squares: searches whose steps gain less are near enough, for the linear model knows the rest."""
+    settled: float = 3e-7
+    """Of the sum of squares: a search to which a whole step, undamped, promises less is at its end. With 3e-5 ln Z of
+    Ogden's energy, in its bent valleys, once changed by nine."""
     least_form: float = 1e-2
     """Of the noise: what the form error does below it is nothing."""
     given_up: float = 1.03

@@ -32,6 +32,7 @@ from bayesmembrane.physics.effects.base import Effect
 
 if TYPE_CHECKING:
     from bayesmembrane.physics.forward import Forward
+    from bayesmembrane.physics.hypothesis import Hypothesis
 
 ENERGY = Parameter(
     "ln_eta", "-", "log of the relative error of the energy's form", Normal(float(np.log(3e-4)), 2.5), (-17.0, 0.0)
@@ -239,12 +240,19 @@ def traces(forward: Forward, x: ArrayLike, force: Array) -> Array:
     x = np.atleast_2d(np.asarray(x, dtype=float))
     hypothesis = forward.hypothesis
     out = np.zeros((len(x), len(hypothesis.effects), force.shape[1]))
-    place = hypothesis.material_size
+    for i, without in rows_without(hypothesis, x):
+        out[:, i] = np.nan_to_num(force - forward(without, reached=False).force)
+    return out
+
+
+def rows_without(hypothesis: Hypothesis, x: Array) -> list[tuple[int, Array]]:
+    """(number of an effect, x (B, k) without it) of every effect whose law may be off."""
+    out, place = [], hypothesis.material_size
     for i, effect in enumerate(hypothesis.effects):
         size = len(effect.coordinates)
         if not effect.exact:
             without = np.array(x)
             without[:, place : place + size] = effect.null
-            out[:, i] = np.nan_to_num(force - forward(without, reached=False).force)
+            out.append((i, without))
         place += size
     return out

@@ -203,9 +203,16 @@ class Forward:
         return Prediction(self.deflection, **joined)
 
     def _batch(self, x: Array, sensitivities: bool, reached: bool, spare: Spared) -> Prediction:
-        films = self.hypothesis.films(x)
-        theta = x[:, self.hypothesis.material_size : self.hypothesis.curve_size]
-        law, at = self.law(films, theta, sensitivities, reached, spare)
+        law = self.law(self.hypothesis.films(x), self.effects(x), sensitivities, reached, spare)
+        return self.over(x, law, sensitivities)
+
+    def effects(self, x: Array) -> Array:
+        """(B, m) the parameters of the effects of x (B, k)."""
+        return x[:, self.hypothesis.material_size : self.hypothesis.curve_size]
+
+    def over(self, x: Array, found: tuple[Law, tuple[Array, Array]], sensitivities: bool) -> Prediction:
+        """Curves of x (B, k) over what `law` ``found`` for them, which can vary if sensitivities are asked for."""
+        (law, at), films, theta = found, self.hypothesis.films(x), self.effects(x)
         slopes = None
         if sensitivities:
             jacobian = self.jacobian(x)[:, :, : self.hypothesis.material_size]

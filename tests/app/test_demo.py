@@ -25,6 +25,8 @@ def test_the_verbs_can_be_sent_to_other_processes() -> None:
     assert "reconstruct" in runs
     assert set(ordinary_materials()) == {label.partition(",")[0] for label in runs} - {"reconstruct"}
     assert next(iter(loops)).endswith(demo.LONGEST)
+    largest = max(ordinary_materials().values(), key=lambda kind: len(kind.field_names())).name
+    assert next(iter(runs)) == f"{largest}, {demo.RANGES[-1]}"  # all that is compared waits for it
     assert (len(loops), len(valleys)) == (len(demo.LOOPS), len(demo.VALLEYS))
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from bayesmembrane.calibration.descent import Patience, descend
+from bayesmembrane.calibration.descent import Descent, Patience, descend
 
 LOW, HIGH = np.full(2, -5.0), np.full(2, 5.0)
 
@@ -71,3 +71,39 @@ def test_a_search_that_is_low_enough_asks_for_no_more() -> None:
     asked.clear()
     descend(listening, start[:1], (LOW, HIGH), 200)
     assert enough < len(asked)
+
+
+def flat(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """r that no step makes much less: its first part is constant."""
+    r = np.stack([np.full(len(x), 10.0), 1e-3 * x[:, 0], 1e-3 * x[:, 1]], axis=1)
+    j = np.zeros((len(x), 3, 2))
+    j[:, 1, 0] = j[:, 2, 1] = 1e-3
+    return r, j
+
+
+def test_where_a_whole_step_promises_too_little_none_is_taken() -> None:
+    start = np.array([[2.0, -3.0]])
+    search = Descent(start, (LOW, HIGH), 50, patience=Patience(settled=1e-6))
+    search.told(*flat(search.asked))
+    assert not len(search.asked)
+    assert np.array_equal(search.x, start)
+
+
+def test_a_valley_that_still_promises_is_followed_to_its_end() -> None:
+    """The damped step gains little there, and the whole one much."""
+    x, _ = descend(rosenbrock, np.array([[-3.0, 2.0]]), (LOW, HIGH), 200, patience=Patience(settled=1e-6))
+    assert x[0] == pytest.approx([1.0, 1.0], abs=1e-3)
+
+
+def test_searches_side_by_side_end_where_each_ends_alone() -> None:
+    starts = [np.array([[-3.0, 2.0]]), np.array([[2.0, 2.0], [0.0, -1.0]])]
+    searches = [Descent(s, (LOW, HIGH), 100) for s in starts]
+    while going := [s for s in searches if len(s.asked)]:
+        r, j = rosenbrock(np.concatenate([s.asked for s in going]))
+        ends = np.cumsum([0, *(len(s.asked) for s in going)])
+        for s, a, b in zip(going, ends[:-1], ends[1:], strict=True):
+            s.told(r[a:b], j[a:b])
+    for s, start in zip(searches, starts, strict=True):
+        x, size = descend(rosenbrock, start, (LOW, HIGH), 100)
+        assert s.x == pytest.approx(x, abs=1e-9)
+        assert s.size == pytest.approx(size, abs=1e-9)

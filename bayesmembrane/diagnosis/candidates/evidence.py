@@ -12,20 +12,23 @@ C. K. I. Williams, Gaussian Processes for Machine Learning (2006), 2.7 and 5.4.1
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 from scipy.special import log_ndtr, logsumexp, ndtr, ndtri
 
+from bayesmembrane.diagnosis.candidates.gram import Gram, Inverse
 from bayesmembrane.diagnosis.thresholds import FORM
+from bayesmembrane.ground.lately import Lately
 from bayesmembrane.ground.parameters import Array
 
 LATTICE = np.abs(2 * np.modf(np.arange(1, 402)[:, None] * np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0]))[0] - 1)
 """(M, 6) points that fill the unit cube evenly (R. D. Richtmyer's, folded)."""
+REMEMBERED = 3
+"""Sizes theta at which a linear model remembers what it found: the fit's, the usual ones, and the last trial."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,20 +37,43 @@ class Block:
 
     ln_eta : (mean, sd) of the normal prior of ln eta; None: eta is 1
     most : of ln eta: what is further off is something else
+    turn : (m, m) orthogonal T, if the columns are orthogonal to each other, and other ones times T; those have the
+        coefficients T c
     """
 
     columns: Array
     ln_eta: tuple[float, float] | None = None
     most: float = np.inf
+    turn: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """A linear model at one theta: V^(1/2) (m,), coefficients (m,) in units of their eta, and C^-1."""
+
+    root: Array
+    own: Array
+    inverse: Inverse
 
 
 @dataclass(frozen=True, eq=False)
 class Density:
-    """ln p(d, theta), its slopes (h,) and second derivatives (h, h) in theta."""
+    """ln p(d, theta), and, where they are asked for, its slopes (h,) and second derivatives (h, h) in theta."""
 
     value: float
-    slope: Array
-    bend: Array
+    derivatives: Callable[[], tuple[Array, Array]]
+
+    @cached_property
+    def _both(self) -> tuple[Array, Array]:
+        return self.derivatives()
+
+    @property
+    def slope(self) -> Array:
+        return self._both[0]
+
+    @property
+    def bend(self) -> Array:
+        return self._both[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +91,7 @@ class Linear:
     ln_scale_sd: float
 
     def __post_init__(self) -> None:
-        if not all(np.all(np.isfinite(p)) for p in self._products):
+        if not (self._gram.finite and np.all(np.isfinite(self._along))):
             raise np.linalg.LinAlgError("the data or the columns of a linear model are not all numbers")
 
     @cached_property
@@ -73,9 +99,14 @@ class Linear:
         return np.column_stack([b.columns for b in self.blocks])
 
     @cached_property
-    def _products(self) -> tuple[Array, Array]:
-        """(B^T B, B^T d)."""
-        return self._columns.T @ self._columns, self._columns.T @ self.data
+    def _gram(self) -> Gram:
+        apart = [np.full(b.columns.shape[1], b.turn is not None) for b in self.blocks]
+        return Gram.of(self._columns, np.concatenate(apart))
+
+    @cached_property
+    def _along(self) -> Array:
+        """(m,) B^T d."""
+        return self._columns.T @ self.data
 
     @cached_property
     def priors(self) -> Array:
@@ -107,32 +138,38 @@ class Linear:
         """(m,) of the coefficients."""
         return np.where(self.owner > 0, np.exp(2 * theta[self.owner]), 1.0)
 
-    def _solved(self, theta: Array) -> tuple[Array, Array, Array, float] | None:
-        """(V^(1/2), C^-1, coefficients in units of their eta, ln det C); None where doubles do not hold C."""
-        gram, along = self._products
+    @cached_property
+    def _lately(self) -> Lately[bytes, _Solved | None]:
+        return Lately(REMEMBERED)
+
+    def _solved(self, theta: Array) -> _Solved | None:
+        """C at theta; None where doubles do not hold it."""
+        return self._lately.of(theta.tobytes(), partial(self._solve, theta))
+
+    def _solve(self, theta: Array) -> _Solved | None:
         root = np.sqrt(self.variances(theta))
         scale = root * np.exp(-theta[0])
-        c = gram * scale * scale[:, None]
-        c[np.diag_indices(root.size)] += 1.0
-        if not np.all(np.isfinite(c)):
+        inverse = self._gram.plus_one(scale)
+        if inverse is None:
             return None
-        # LAPACK by itself, without SciPy's checks: this is done thousands of times.
-        factor, fault = lapack.dpotrf(c.T, lower=1)
-        right = scale * np.exp(-theta[0]) * along
-        if fault:  # no eigenvalue is below 1: what is, is round-off
-            value, vector = np.linalg.eigh(c)
-            value = np.maximum(value, 1.0)
-            inverse = (vector / value) @ vector.T
-            return root, inverse, inverse @ right, float(np.sum(np.log(value)))
-        own, _ = lapack.dpotrs(factor, right, lower=1)
-        log_det = 2 * float(np.sum(np.log(np.diag(factor))))
-        half, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
-        inverse = np.tril(half)
-        inverse += np.tril(half, -1).T
-        return root, inverse, own, log_det
+        return _Solved(root, inverse.times(scale * np.exp(-theta[0]) * self._along), inverse)
 
     def log_density(self, theta: Array) -> Density:
-        """ln p(d, theta), without the noise's own determinant, which all hypotheses share.
+        """ln p(d, theta), without the noise's own determinant, which all hypotheses share."""
+        h, n = theta.size, self.data.size
+        found = self._solved(theta)
+        if found is None:  # larger than doubles hold: no size of noise or form error is like that
+            return Density(-1e300, lambda: (np.zeros(h), -np.eye(h)))
+        left = self.data - self._columns @ (found.root * found.own)
+        squares = float(left @ left) * float(np.exp(-2 * theta[0])) + float(found.own @ found.own)
+        mean, sd = self.priors.T
+        z = (theta - mean) / sd
+        value = -0.5 * (squares + found.inverse.log_det + n * (2 * theta[0] + float(np.log(2 * np.pi))))
+        value -= 0.5 * float(z @ z) + float(np.sum(np.log(sd * np.sqrt(2 * np.pi))))
+        return Density(value, partial(self._derivatives, theta, found, squares))
+
+    def _derivatives(self, theta: Array, found: _Solved, squares: float) -> tuple[Array, Array]:
+        """Slopes (h,) and second derivatives (h, h) of ln p(d, theta), whose ``squares`` are d^T S^-1 d.
 
         With phi = theta - theta_0 for the blocks, and -theta_0 for those of fixed size, ln det C and s^2 times the
         squares depend on phi alone; with K = 1 - C^-1 and coefficients c in units of their own eta
@@ -142,17 +179,10 @@ class Linear:
         block by block.
         """
         h, n = theta.size, self.data.size
-        found = self._solved(theta)
-        if found is None:  # larger than doubles hold: no size of noise or form error is like that
-            return Density(-1e300, np.zeros(h), -np.eye(h))
-        root, inverse, own, log_det = found
-        left = self.data - self._columns @ (root * own)
-        squares = float(left @ left) * float(np.exp(-2 * theta[0])) + float(own @ own)
-        value = -0.5 * (squares + log_det + n * (2 * theta[0] + float(np.log(2 * np.pi))))
-        k = -inverse
-        k[np.diag_indices(own.size)] += 1.0
-        inside, wide = self._members, self._members * own
-        trace, pull = inside @ np.diag(k), wide @ own
+        k = -found.inverse.whole
+        k[np.diag_indices(found.own.size)] += 1.0
+        inside, wide = self._members, self._members * found.own
+        trace, pull = inside @ np.diag(k), wide @ found.own
         by_phi = trace - pull
         # Half of the second derivatives of ln det C + q in phi.
         bend_phi = np.diag(2 * by_phi) - 2 * (inside @ (k * k) @ inside.T) + 4 * (wide @ k @ wide.T)
@@ -167,23 +197,44 @@ class Linear:
         bend = -(to.T @ bend_phi @ to) - mixed - mixed.T
         bend[0, 0] -= 2 * squares
         mean, sd = self.priors.T
-        z = (theta - mean) / sd
-        value -= 0.5 * float(z @ z) + float(np.sum(np.log(sd * np.sqrt(2 * np.pi))))
-        return Density(value, slope - z / sd, bend - np.diag(1 / sd**2))
+        return slope - (theta - mean) / sd**2, bend - np.diag(1 / sd**2)
 
     def coefficients(self, theta: Array) -> tuple[Array, Array]:
         """(mean (m,), covariance (m, m)) of all coefficients given d and theta."""
-        root, inverse, own, _ = self._certain(theta)
-        return root * own, inverse * root * root[:, None]
+        _, covariance = self.first(theta, self.owner.size)
+        for rows, turn in self._turns:
+            covariance[rows] = turn @ covariance[rows]
+            covariance[:, rows] = covariance[:, rows] @ turn.T
+        return self.mean(theta), covariance
+
+    def mean(self, theta: Array) -> Array:
+        """(m,) of all coefficients given d and theta."""
+        found = self._certain(theta)
+        mean = found.root * found.own
+        for rows, turn in self._turns:
+            mean[rows] = turn @ mean[rows]
+        return mean
+
+    @property
+    def _turns(self) -> list[tuple[slice, Array]]:
+        """Where the columns of each block stand that was turned, and its turn."""
+        ends = np.cumsum([0, *(b.columns.shape[1] for b in self.blocks)]).tolist()
+        return [(slice(*ends[i : i + 2]), b.turn) for i, b in enumerate(self.blocks) if b.turn is not None]
+
+    def first(self, theta: Array, count: int) -> tuple[Array, Array]:
+        """`coefficients` of the first ``count`` columns, none of them of a block that was turned."""
+        found = self._certain(theta)
+        root = found.root[:count]
+        return root * found.own[:count], found.inverse.whole[:count, :count] * root * root[:, None]
 
     def freed(self, theta: Array, values: Array) -> Array:
         """(s^2 1 + B V B^T)^-1 v of values (N, c)."""
         square = float(np.exp(2 * theta[0]))
-        root, inverse, _, _ = self._certain(theta)
-        scaled = self._columns * root
-        return np.asarray((values - scaled @ (inverse @ (scaled.T @ values)) / square) / square)
+        found = self._certain(theta)
+        scaled = self._columns * found.root
+        return np.asarray((values - scaled @ (found.inverse.whole @ (scaled.T @ values)) / square) / square)
 
-    def _certain(self, theta: Array) -> tuple[Array, Array, Array, float]:
+    def _certain(self, theta: Array) -> _Solved:
         found = self._solved(theta)
         if found is None:
             raise np.linalg.LinAlgError("a linear model is asked for sizes larger than numbers hold")

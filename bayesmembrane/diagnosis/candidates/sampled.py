@@ -140,9 +140,9 @@ class _TruePosterior:
         k = candidate.x.size
         u = self.axes.to_u(candidate.x)
         spread = self.axes.local(u)
-        mean, covariance = model.coefficients(theta)
-        self.fit, self.mean = u, mean[:k] * spread
-        self.covariance = covariance[:k, :k] * np.outer(spread, spread)
+        mean, covariance = model.first(theta, k)
+        self.fit, self.mean = u, mean * spread
+        self.covariance = covariance * np.outer(spread, spread)
         self.rest = Linear(np.zeros(len(model.data)), model.blocks[1:], model.ln_scale_sd)
         self.constant = self.rest.log_density(theta).value
         self.linear = model.log_density(theta).value + search.log_corrected(candidate, model, theta)

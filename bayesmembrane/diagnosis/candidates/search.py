@@ -10,18 +10,24 @@ import numpy as np
 
 from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.candidates.evaluated import Evaluated, together
 from bayesmembrane.diagnosis.candidates.standard import Standard, expected_size, standard
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.thresholds import SEARCH
+from bayesmembrane.ground.lately import Lately
 from bayesmembrane.ground.parameters import Array, Parameter
 from bayesmembrane.physics.effects.base import Effect
-from bayesmembrane.physics.form_error import FormFactors, form_columns, form_factors, traces
+from bayesmembrane.physics.form_error import FormFactors, form_columns, form_factors
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.in_step import traces_in_step
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.request import Request
 from bayesmembrane.physics.mechanics.solution import Curves
+
+MADE = 60
+"""Hypotheses whose objectives are kept: no more are searched for side by side, or they are made anew."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +43,7 @@ class Search(Weighing):
     seed: int = 0
     solve: Solve = api.solve
     known_factors: FormFactors | None = None
-    _made: dict[str, Objective] = field(default_factory=dict, init=False, repr=False)
+    _made: Lately[int, Evaluated] = field(default_factory=lambda: Lately(MADE), init=False, repr=False)
 
     @property
     def force(self) -> Array:
@@ -53,7 +59,10 @@ class Search(Weighing):
         return api.unaided(asked, self.solve)
 
     def batch(self, hypothesis: Hypothesis, x: Array) -> tuple[Array, Array]:
-        return self._objective(hypothesis).batch(x)
+        return self._evaluated(hypothesis).batch(x)
+
+    def batches(self, asked: Sequence[tuple[Hypothesis, Array]]) -> list[tuple[Array, Array]]:
+        return together([(self._evaluated(hypothesis), x) for hypothesis, x in asked])
 
     def misfits(self, hypothesis: Hypothesis, x: Array) -> Array:
         return np.asarray(self._objective(hypothesis).forward(x, reached=False).force - self.force)
@@ -63,7 +72,10 @@ class Search(Weighing):
         return Forward(hypothesis, whole, whole.deflection, self.solve)(x, reached=False).force
 
     def traces(self, hypothesis: Hypothesis, x: Array, force: Array) -> Array:
-        return np.asarray(traces(self._objective(hypothesis).forward, x[None, :], force[None, :])[0])
+        return self.all_traces([(hypothesis, x, force)])[0]
+
+    def all_traces(self, every: Sequence[tuple[Hypothesis, Array, Array]]) -> list[Array]:
+        return traces_in_step([(self._objective(h).forward, x, force) for h, x, force in every])
 
     def forms(self, force: Array, effects: Sequence[Effect], traces: Array) -> list[tuple[Parameter | None, Array]]:
         return form_columns(self.factors, force, effects, traces)
@@ -93,9 +105,11 @@ class Search(Weighing):
         return self.measurement.select(np.sort(order[rows]))
 
     def _objective(self, hypothesis: Hypothesis) -> Objective:
-        """Of the hypothesis that was asked for last: a search asks for one many times."""
-        made = self._made.get("last")
-        if made is None or made.hypothesis is not hypothesis:
-            made = Objective(hypothesis, self.measurement, "euclidean", self.quick)
-            self._made["last"] = made
-        return made
+        return self._evaluated(hypothesis).objective
+
+    def _evaluated(self, hypothesis: Hypothesis) -> Evaluated:
+        """Of one of the hypotheses that were asked for last: a search asks for one many times."""
+        # By identity, for that costs nothing; what is made holds the hypothesis, so that no other one gets its number.
+        return self._made.of(
+            id(hypothesis), lambda: Evaluated(Objective(hypothesis, self.measurement, "euclidean", self.quick))
+        )

@@ -5,37 +5,40 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from itertools import repeat
 
 import numpy as np
 
-from bayesmembrane.calibration.descent import Patience, descend
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, log_inside, weighed
+from bayesmembrane.diagnosis.candidates.side_by_side import Freeing, Searching, run
 from bayesmembrane.diagnosis.candidates.standard import Standard
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.thresholds import FORM, SEARCH, TINY
+from bayesmembrane.ground.lately import Lately
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.physics.effects.base import Effect
-from bayesmembrane.physics.form_error import LARGEST
+from bayesmembrane.physics.form_error import LARGEST, LOCAL
 from bayesmembrane.physics.hypothesis import Hypothesis
+
+ROUND_OFF = 1e-11
+"""Of the largest number of columns: what differs by less is the same."""
+MODELS = 4
+"""Linear models that are kept: what is looked for beside one candidate is looked for piece by piece."""
 
 
 @dataclass(frozen=True, eq=False)
-class Freeing:
-    """W v with W (S + U U^T) W^T = 1: values freed of noise S and of a form error with the columns U.
+class Sought:
+    """A hypothesis, where to look for it from (k,), and the candidate whose form error counts; None: the usual one."""
 
-    With U = Q s V^T freed of noise, W = 1 - Q (1 - 1 / sqrt(1 + s^2)) Q^T after that.
-    """
+    hypothesis: Hypothesis
+    starts: Sequence[Array]
+    parent: Candidate | None = None
 
-    noise: OwnNoise
-    axes: Array
-    shrink: Array
 
-    def __call__(self, values: Array) -> Array:
-        white = self.noise.white(values)
-        along = self.axes.T @ white.reshape(len(white), -1)
-        return white - (self.axes @ (self.shrink[:, None] * along)).reshape(white.shape)
+Point = tuple[Hypothesis, Standard, Array]
+"""A hypothesis, its coordinates, and u (k,)."""
 
 
 class Weighing(ABC):
@@ -67,6 +70,10 @@ class Weighing(ABC):
     def traces(self, hypothesis: Hypothesis, x: Array, force: Array) -> Array:
         """(E, N) N: what each effect changes of the force (N,) at x (k,); zeros for one that is exact."""
 
+    def all_traces(self, every: Sequence[tuple[Hypothesis, Array, Array]]) -> list[Array]:
+        """`traces` of each hypothesis, with its x (k,) and force (N,)."""
+        return [self.traces(hypothesis, x, force) for hypothesis, x, force in every]
+
     @abstractmethod
     def forms(self, force: Array, effects: Sequence[Effect], traces: Array) -> list[tuple[Parameter | None, Array]]:
         """What a form error could look like, `form_columns`."""
@@ -83,42 +90,79 @@ class Weighing(ABC):
     def material_starts(self, hypothesis: Hypothesis) -> list[Array]:
         """Starts (k,) from draws of the material's prior brought to their best modulus, without any effect."""
 
+    def batches(self, asked: Sequence[tuple[Hypothesis, Array]]) -> list[tuple[Array, Array]]:
+        """`batch` of each."""
+        return [self.batch(hypothesis, x) for hypothesis, x in asked]
+
     def fit(self, hypothesis: Hypothesis, starts: Sequence[Array], parent: Candidate | None = None) -> Candidate | None:
         """The best of the searches from ``starts`` (k,); None if no film of this hypothesis reaches the data.
 
         The form error is that of ``parent``, or the usual one of an energy; `polished` takes that of the fit itself.
         """
-        axes = self.axes(hypothesis)
-        u, size = self._descended(hypothesis, axes, self._freeing(parent), axes.to_u(np.array(starts)))
-        if not np.any(np.isfinite(size)):
-            return None
-        return self._candidate(hypothesis, axes, u[int(np.argmin(size))])
+        return self.fits([Sought(hypothesis, starts, parent)])[0]
+
+    def fits(self, every: Sequence[Sought]) -> list[Candidate | None]:
+        """`fit` of each, side by side."""
+        searches = [
+            self._search(s.hypothesis, self._freeing(s.parent), np.array(s.starts), SEARCH.iterations) for s in every
+        ]
+        run(searches, self.batches)
+        reached = [s for s in searches if np.any(np.isfinite(s.size))]
+        found = self._candidates([(s.hypothesis, s.axes, s.u[int(np.argmin(s.size))]) for s in reached])
+        by_search = dict(zip(reached, found, strict=True))
+        return [by_search.get(s) for s in searches]
 
     def at(self, hypothesis: Hypothesis, x: Array) -> Candidate | None:
         """The hypothesis weighed at the coordinates x (k,), without a search; None if no film gets there."""
-        if not np.all(np.isfinite(self.batch(hypothesis, x[None, :])[0])):
-            return None
+        return self.placed([(hypothesis, x)])[0]
+
+    def placed(self, every: Sequence[tuple[Hypothesis, Array]]) -> list[Candidate | None]:
+        """`at` of each."""
+        axes = [self.axes(h) for h, _ in every]
+        points = [(h, a, a.to_u(x)) for a, (h, x) in zip(axes, every, strict=True)]
+        found = self.batches([(h, a.to_x(u)[None, :]) for h, a, u in points])
+        reached = [bool(np.all(np.isfinite(r))) for r, _ in found]
+        there = iter(self._candidates([p for p, good in zip(points, reached, strict=True) if good]))
+        return [next(there) if good else None for good in reached]
+
+    def unweighed(self, hypothesis: Hypothesis, x: Array) -> Candidate | None:
+        """`at`, without its evidence and the sizes of noise and form error, for whoever has their own."""
         axes = self.axes(hypothesis)
-        return self._candidate(hypothesis, axes, axes.to_u(x))
+        u = axes.to_u(x)
+        reached = np.all(np.isfinite(self.batch(hypothesis, axes.to_x(u)[None, :])[0]))
+        return self._drawn([(hypothesis, axes, u)])[0] if reached else None
 
     def polished(self, found: Candidate) -> Candidate:
         """The same hypothesis, searched on from where it is with the form error that it shows.
 
         The end counts even if its evidence is less: that of the start rests on a linear model far from where it holds.
         """
-        axes = self.axes(found.hypothesis)
-        u, size = self._descended(
-            found.hypothesis, axes, self._freeing(found, False), axes.to_u(found.x)[None, :], SEARCH.last_iterations
-        )
-        return self._candidate(found.hypothesis, axes, u[0]) if np.isfinite(size[0]) else found
+        return self.all_polished([found])[0]
+
+    def all_polished(self, every: Sequence[Candidate]) -> list[Candidate]:
+        """`polished` of each, side by side."""
+        searches = [
+            self._search(c.hypothesis, self._freeing(c, False), c.x[None, :], SEARCH.last_iterations) for c in every
+        ]
+        run(searches, self.batches)
+        reached = [s for s in searches if np.isfinite(s.size[0])]
+        found = dict(zip(reached, self._candidates([(s.hypothesis, s.axes, s.u[0]) for s in reached]), strict=True))
+        return [found.get(s, c) for c, s in zip(every, searches, strict=True)]
 
     def weighed_anew(self, candidate: Candidate) -> Candidate:
         """The same fit under the present noise: its evidence moves with it, and the linear model says how."""
         axes = self.axes(candidate.hypothesis)
         return self._weighed(candidate, axes, axes.to_u(candidate.x))
 
+    @cached_property
+    def _models(self) -> Lately[Candidate, Linear]:
+        return Lately(MODELS)
+
     def linear(self, candidate: Candidate) -> Linear:
         """The linear model of a candidate in the coordinates of `standard`, each over the sd of its local prior."""
+        return self._models.of(candidate, partial(self._linear, candidate))
+
+    def _linear(self, candidate: Candidate) -> Linear:
         axes = self.axes(candidate.hypothesis)
         u = axes.to_u(candidate.x)
         spread = axes.local(u)
@@ -158,9 +202,9 @@ class Weighing(ABC):
 
     def covariance(self, candidate: Candidate) -> Array:
         """(k, k) of the coordinates about a fit of this search, its form error included."""
-        _, covariance = self.linear(candidate).coefficients(candidate.theta)
-        steep, k = self.steepness(candidate), candidate.x.size
-        return np.asarray(steep[:, None] * covariance[:k, :k] * steep)
+        _, covariance = self.linear(candidate).first(candidate.theta, candidate.x.size)
+        steep = self.steepness(candidate)
+        return np.asarray(steep[:, None] * covariance * steep)
 
     # ---- form error ----------------------------------------------------------------------------------------------
 
@@ -170,12 +214,49 @@ class Weighing(ABC):
 
     def _forms(self, candidate: Candidate) -> list[Block]:
         """The same freed of noise, with the priors of their relative sizes."""
-        return [_form(size, self.noise.white(columns)) for size, columns in self._columns(candidate)]
+        return [self._form(size, columns) for size, columns in self._columns(candidate)]
+
+    def _form(self, size: Parameter | None, columns: Array) -> Block:
+        if size is None:
+            return Block(self.noise.white(columns))
+        prior, most = _moments(size), float(np.log(LARGEST[size.name]))
+        if size is not LOCAL or not columns.size:
+            return Block(self.noise.white(columns), prior, most)
+        columns, turn = self._turned(columns)
+        return Block(columns, prior, most, turn)
+
+    @cached_property
+    def _turns(self) -> Lately[int, tuple[Array, Array, Array]]:
+        return Lately(1)
+
+    def _turned(self, columns: Array) -> tuple[Array, Array]:
+        """(orthogonal columns (N, m), the turn to them) of single readings N, freed of noise.
+
+        Noise that remembers makes neighbours among them alike. Of all candidates of one test they are the same, times
+        a number.
+        """
+        first, turned, turn = self._turns.of(columns.shape[1], lambda: (columns, *self._apart(columns)))
+        before, now = float(np.max(first)), float(np.max(columns))
+        if before > 0 and np.max(np.abs(columns - now / before * first)) <= ROUND_OFF * now:
+            return now / before * turned, turn
+        return self._apart(columns)
+
+    def _apart(self, columns: Array) -> tuple[Array, Array]:
+        white = self.noise.white(columns)
+        turn = np.linalg.eigh(white.T @ white)[1]
+        return white @ turn, turn
+
+    @cached_property
+    def _freeings(self) -> Lately[tuple[Candidate | None, bool], Freeing]:
+        return Lately(MODELS)
 
     def _freeing(self, parent: Candidate | None, capped: bool = True) -> Freeing:
+        return self._freeings.of((parent, capped), partial(self._freed_of, parent, capped))
+
+    def _freed_of(self, parent: Candidate | None, capped: bool) -> Freeing:
         if parent is None:
             force, nothing = np.abs(self.force), np.empty((0, self.force.size))
-            forms = [_form(size, self.noise.white(c)) for size, c in self.forms(force, (), nothing)]
+            forms = [self._form(size, c) for size, c in self.forms(force, (), nothing)]
         else:
             forms = self._forms(parent)
         found: Iterator[float] = repeat(np.inf) if parent is None else iter(parent.theta[1:].tolist())
@@ -189,67 +270,52 @@ class Weighing(ABC):
 
     # ---- one fit -------------------------------------------------------------------------------------------------
 
-    def _descended(
-        self, hypothesis: Hypothesis, axes: Standard, freeing: Freeing, starts: Array, most: int = SEARCH.iterations
-    ) -> tuple[Array, Array]:
-        """Where searches from u (B, k) end, and the roots of their sums of squares (B,), the prior's included."""
+    def _search(self, hypothesis: Hypothesis, freeing: Freeing, x: Array, most: int) -> Searching:
+        axes = self.axes(hypothesis)
+        return Searching(hypothesis, axes, freeing, axes.to_u(x), most)
 
-        def residuals(u: Array) -> tuple[Array, Array]:
-            r, j = _freed(freeing, *self.batch(hypothesis, axes.to_x(u)))
-            pull, steep = axes.pull(u)
-            diagonal = steep[:, :, None] * np.eye(u.shape[1])
-            return (
-                np.concatenate([r, pull], axis=1),
-                np.concatenate([j * axes.slope(u)[:, None, :], diagonal], axis=1),
-            )
+    def _candidates(self, points: Sequence[Point]) -> list[Candidate]:
+        """The hypotheses at their points."""
+        return [self._weighed(found, axes, u) for found, (_, axes, u) in zip(self._drawn(points), points, strict=True)]
 
-        patience = Patience(SEARCH.given_up, SEARCH.slow_below)
-        return descend(residuals, starts, axes.bounds, most, patience=patience)
-
-    def _candidate(self, hypothesis: Hypothesis, axes: Standard, u: Array) -> Candidate:
-        x = axes.to_x(u)
-        r, j = self.batch(hypothesis, x[None, :])
-        slopes = np.where(np.isfinite(j[0]), j[0], 0.0)
-        trace = self.traces(hypothesis, x, r[0] + self.force)
-        nothing = np.zeros(r.shape[1])
-        found = Candidate(
-            hypothesis, x, -r[0], slopes, -np.inf, _at_bound(hypothesis, axes, u), trace, np.empty(0), nothing
+    def _drawn(self, points: Sequence[Point]) -> list[Candidate]:
+        """The same, not weighed."""
+        x = [axes.to_x(u) for _, axes, u in points]
+        found = self.batches([(h, v[None, :]) for (h, _, _), v in zip(points, x, strict=True)])
+        traces = self.all_traces(
+            [(h, v, r[0] + self.force) for (h, _, _), v, (r, _) in zip(points, x, found, strict=True)]
         )
-        return self._weighed(found, axes, u)
+        nothing, out = np.zeros(self.force.size), []
+        for (h, axes, u), v, (r, j), trace in zip(points, x, found, traces, strict=True):
+            slopes, bounds = np.where(np.isfinite(j[0]), j[0], 0.0), _at_bound(h, axes, u)
+            out.append(Candidate(h, v, -r[0], slopes, -np.inf, bounds, trace, np.empty(0), nothing))
+        return out
 
     def _weighed(self, found: Candidate, axes: Standard, u: Array) -> Candidate:
         model = self.linear(found)
         z = weighed(model, found.theta)
-        mean, _ = model.coefficients(z.theta)
+        mean = model.mean(z.theta)
         form = np.column_stack([c for _, c in self._columns(found)]) @ mean[u.size :]
-        return replace(
+        out = replace(
             found, log_evidence=z.log_evidence + self.log_corrected(found, model, z.theta), theta=z.theta, form=form
         )
+        self._models.keep(out, model)  # it knows nothing of theta, nor of the evidence
+        return out
 
     def log_corrected(self, found: Candidate, model: Linear, theta: Array) -> float:
         """ln Z under the true priors within their bounds less ln Z of the linear ``model`` with its normal ones."""
         axes = self.axes(found.hypothesis)
         u = axes.to_u(found.x)
         spread, k = axes.local(u), u.size
-        mean, covariance = model.coefficients(theta)
+        mean, covariance = model.first(theta, k)
         low, high = axes.ends
-        inside = log_inside(mean[:k], covariance[:k, :k], low / spread, high / spread)
-        return inside + axes.log_replaced(u, mean[:k] * spread, np.diag(covariance)[:k] * spread**2)
+        inside = log_inside(mean, covariance, low / spread, high / spread)
+        return inside + axes.log_replaced(u, mean * spread, np.diag(covariance) * spread**2)
 
 
 def beyond_noise(white: Array, candidate: Candidate) -> float:
     """Squares of residuals (N,), freed of noise, beyond those that noise leaves beside a fit; 0 or more."""
     return max(float(white @ white) - (white.size - candidate.x.size), 0.0)
-
-
-def _freed(freeing: Freeing, r: Array, j: Array) -> tuple[Array, Array]:
-    """Residuals (B, N) and slopes (B, N, k) freed; a start without a curve is nan, and only that one."""
-    wide = np.moveaxis(np.concatenate([r[:, :, None], j], axis=2), 1, 0)
-    out = np.full(wide.shape, np.nan)
-    good = np.all(np.isfinite(wide), axis=(0, 2))
-    out[:, good] = freeing(wide[:, good])
-    out = np.moveaxis(out, 0, 1)
-    return out[:, :, 0], out[:, :, 1:]
 
 
 def starts_with(bases: Sequence[Array], effect: Effect, expected: Array) -> list[Array]:
@@ -273,12 +339,6 @@ def starts_with(bases: Sequence[Array], effect: Effect, expected: Array) -> list
 def _eta(usual: float, found: float, capped: bool) -> float:
     """Of two ln eta; capped, for a poor parent's is large, and would take what the coordinates are to explain."""
     return float(np.exp(min(usual, found) if capped else found))
-
-
-def _form(size: Parameter | None, columns: Array) -> Block:
-    if size is None:
-        return Block(columns)
-    return Block(columns, _moments(size), float(np.log(LARGEST[size.name])))
 
 
 def _moments(p: Parameter) -> tuple[float, float]:

@@ -148,7 +148,7 @@ def _of_family(base: Candidate, family: _Family, search: Search, _before: Foreig
     spread = float(np.logaddexp.reduce(gains) - np.log(gains.size) - gains[best])
     wider = extended(model, [Block(white[:, members])])
     z = weighed(wider, base.theta)
-    mean, _ = wider.coefficients(z.theta)
+    mean = wider.mean(z.theta)
     own = mean[-family.width :]
     trace = family.traces[:, members] @ own
     gain = z.log_evidence - weighed(model, base.theta).log_evidence + spread
@@ -276,7 +276,7 @@ def _unnamed(search: Search, base: Candidate) -> Foreign | None:
     model = search.linear(base)
     wider = extended(model, [Block(columns, FOREIGN.ln_unnamed)])
     z = weighed(wider)
-    mean, _ = wider.coefficients(z.theta)
+    mean = wider.mean(z.theta)
     trace = fitted * (search.factors.progress @ mean[-columns.shape[1] :])
     gain = z.log_evidence - weighed(model, base.theta).log_evidence
     share = _share(search, base, trace)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.evidence import Linear
 from bayesmembrane.diagnosis.candidates.sampled import checked
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
-from bayesmembrane.diagnosis.candidates.weighing import Weighing, starts_with
+from bayesmembrane.diagnosis.candidates.weighing import Sought, Weighing, starts_with
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.twins import swapped
@@ -81,9 +81,8 @@ class Grown:
     def polish(self, size: int) -> None:
         """The best of each set of this size searched on with its own form error: all that may matter."""
         every = self.best_of_each_set(size)[: GROWTH.polished]
-        for c in every:
-            if every[0].log_evidence - c.log_evidence < GROWTH.polish_reach:
-                self.found[_key(c)] = self.search.polished(c)
+        near = [c for c in every if every[0].log_evidence - c.log_evidence < GROWTH.polish_reach]
+        self.found |= {_key(c): c for c in self.search.all_polished(near)}
 
     def renew(self) -> None:
         """Noise from the best candidate, and all of them weighed under it."""
@@ -142,8 +141,7 @@ def _grow(out: Grown) -> bool:
         bases = [c for c in beam if frozenset(c.names) not in out.followed]
         for base in bases:
             out.followed.add(frozenset(base.names))
-            for effect in _promising(out, base, size):
-                out.add(_added(out, base, effect))
+            _add(out, [(base, effect) for effect in _promising(out, base, size)])
         if not out.of_size(size):
             break
         if bases:
@@ -169,19 +167,23 @@ def _with_less(out: Grown) -> None:
             key = _key(start)
             if key not in starts or start.log_evidence > starts[key].log_evidence:
                 starts[key] = start
-        for key, start in starts.items():
-            before = out.found[key].log_evidence if key in out.found else -np.inf
-            if start.log_evidence > max(best - GROWTH.less_reach, before - GROWTH.less_gain):
-                out.add(out.search.polished(start))
+        near = [start for key, start in starts.items() if _worth_a_search(out, key, start, best)]
+        for c in out.search.all_polished(near):
+            out.add(c)
 
 
-def _lessened(out: Grown, size: int, best: float) -> Iterator[Candidate]:
+def _worth_a_search(out: Grown, key: Key, start: Candidate, best: float) -> bool:
+    """True for a start that is not far behind the ``best`` of all, nor behind what was found of it before."""
+    before = out.found[key].log_evidence if key in out.found else -np.inf
+    return start.log_evidence > max(best - GROWTH.less_reach, before - GROWTH.less_gain)
+
+
+def _lessened(out: Grown, size: int, best: float) -> list[Candidate]:
     """The first hypotheses of this size without one of their effects, the others as they are."""
     given = out.case.null.names
-    for c in out.of_size(size)[: GROWTH.lessened]:
-        for name in [n for n in c.names if n not in given]:
-            if best - c.log_evidence < GROWTH.less_reach and (less := out.search.at(*without_effect(c, name))):
-                yield less
+    near = [c for c in out.of_size(size)[: GROWTH.lessened] if best - c.log_evidence < GROWTH.less_reach]
+    less = out.search.placed([without_effect(c, name) for c in near for name in c.names if name not in given])
+    return [c for c in less if c is not None]
 
 
 def _with_exchanged(out: Grown) -> None:
@@ -193,24 +195,22 @@ def _with_exchanged(out: Grown) -> None:
     for _ in range(GROWTH.exchanges):
         best = out.best
         own = [n for n in best.names if n not in out.case.null.names]
-        for name in own if len(own) > 1 else []:
-            _exchanged(out, best, name)
+        _add(out, [pair for name in own for pair in _exchanges(out, best, name)] if len(own) > 1 else [])
         if best is out.best:
             break
 
 
-def _exchanged(out: Grown, best: Candidate, name: str) -> None:
-    """``best`` with one of its effects exchanged for others, from where its other effects are."""
+def _exchanges(out: Grown, best: Candidate, name: str) -> list[tuple[Candidate, Effect]]:
+    """``best`` without one of its effects, from where the others are, and those to exchange it for."""
     energy, rest = best.hypothesis.material.name, frozenset(best.names) - {name}
     less = out.found.get((energy, rest)) or out.search.at(*without_effect(best, name))
     tried = {names for _, names in out.found}
     others = [e for e in out.case.visible if e.name not in best.names and rest | {e.name} not in tried]
     if less is None:
-        return
+        return []
     gains = {e.name: first_order(out.search, less, e) for e in others}
     others.sort(key=lambda e: -gains[e.name])
-    for effect in others[: GROWTH.exchanged]:
-        out.add(_added(out, less, effect))
+    return [(less, effect) for effect in others[: GROWTH.exchanged]]
 
 
 def _with_twins(out: Grown) -> None:
@@ -222,10 +222,8 @@ def _with_twins(out: Grown) -> None:
         for old, new, names in swapped(frozenset(best.names), out.case.twins())
         if (energy, names) not in out.found and new in known
     ]
-    for old, new in unseen[: TWINS.added]:
-        base = out.found.get((energy, frozenset(best.names) - {old}))
-        if base is not None:
-            out.add(_added(out, base, known[new]))
+    pairs = [(out.found.get((energy, frozenset(best.names) - {old})), known[new]) for old, new in unseen]
+    _add(out, [(base, effect) for base, effect in pairs[: TWINS.added] if base is not None])
 
 
 def _beam(out: Grown, size: int) -> list[Candidate]:
@@ -288,12 +286,16 @@ def _gain(model: Linear, theta: Array, white: Array, sides: Array) -> float:
     return float(np.max(0.5 * along**2 / (square + 1) * allowed - 0.5 * np.log1p(square)))
 
 
-def _added(out: Grown, base: Candidate, effect: Effect) -> Candidate | None:
-    """``base`` with one more effect."""
-    names = [e.title for e in base.hypothesis.effects if e.name not in out.case.null.names]
-    out.case.tell(f"refitting with {' and '.join([*names, effect.title])}")
-    hypothesis = with_effects(base.hypothesis, [effect])
-    return out.search.fit(hypothesis, starts_with(_bases(out, base), effect, out.search.expected_sizes(effect)), base)
+def _add(out: Grown, pairs: Sequence[tuple[Candidate, Effect]]) -> None:
+    """Each of these candidates with one more effect."""
+    sought = []
+    for base, effect in pairs:
+        names = [e.title for e in base.hypothesis.effects if e.name not in out.case.null.names]
+        out.case.tell(f"refitting with {' and '.join([*names, effect.title])}")
+        starts = starts_with(_bases(out, base), effect, out.search.expected_sizes(effect))
+        sought.append(Sought(with_effects(base.hypothesis, [effect]), starts, base))
+    for c in out.search.fits(sought):
+        out.add(c)
 
 
 def _bases(out: Grown, base: Candidate) -> list[Array]:
@@ -315,14 +317,26 @@ def _with_other_energies(out: Grown, size: int) -> None:
     tried = [c for c in out.best_of_each_set(size) if size == 1 or _gains(out, c)]
     # An energy that is not the true one may bend until it hides an effect, which is seen beside another one at once.
     near = [c for c in tried if size == 1 and tried[0].log_evidence - c.log_evidence < GROWTH.singles_reach]
-    for best in near if len(near) > GROWTH.with_other_energies else tried[: GROWTH.with_other_energies]:
+    chosen = near if len(near) > GROWTH.with_other_energies else tried[: GROWTH.with_other_energies]
+    for some in (chosen[:1], chosen[1:]):  # the first says which energies are worth it
+        found = _with_energies(out, some, names)
+        for best in some:
+            for name in names:
+                out.add(found.get((name, frozenset(best.names))))
+            names = [n for n in names if _behind(out, best, n) < GROWTH.energy_reach]
+
+
+def _with_energies(out: Grown, chosen: Sequence[Candidate], names: Sequence[str]) -> dict[Key, Candidate]:
+    """Sets with each of these energies, from the energy's own fit and the effects of the set; without those known."""
+    sought: dict[Key, Sought] = {}
+    for best in chosen:
         for name in names:
-            if (name, frozenset(best.names)) in out.found:
-                continue
-            plain = out.case.plain[name]
-            out.case.tell(f"trying {best.label} with the energy {plain.hypothesis.material.title}")
-            out.add(_transplanted(out, best, plain))
-        names = [n for n in names if _behind(out, best, n) < GROWTH.energy_reach]
+            if (key := (name, frozenset(best.names))) not in out.found:
+                plain = out.case.plain[name]
+                out.case.tell(f"trying {best.label} with the energy {plain.hypothesis.material.title}")
+                sought[key] = _transplanted(best, plain)
+    found = out.search.fits(list(sought.values()))
+    return {key: c for key, c in zip(sought, found, strict=True) if c is not None}
 
 
 def _gains(out: Grown, c: Candidate) -> bool:
@@ -337,11 +351,10 @@ def _behind(out: Grown, best: Candidate, energy: str) -> float:
     return max(same.values()) - same.get(energy, -np.inf)
 
 
-def _transplanted(out: Grown, best: Candidate, plain: Candidate) -> Candidate | None:
+def _transplanted(best: Candidate, plain: Candidate) -> Sought:
     hypothesis: Hypothesis = replace(plain.hypothesis, effects=best.hypothesis.effects)
-    given = plain.hypothesis.material_size
     effects = best.x[best.hypothesis.material_size :]
-    return out.search.fit(hypothesis, [np.concatenate([plain.x[:given], effects])], best)
+    return Sought(hypothesis, [np.concatenate([plain.x[: plain.hypothesis.material_size], effects])], best)
 
 
 def _worth_more(out: Grown, size: int) -> bool:

@@ -86,7 +86,7 @@ def _with_evidence(
     m, part = search.measurement, _others(search, at)
     whole = weighed(search.linear(base), base.theta).log_evidence - search.noise.log_root
     rest = weighed(part.linear(others), others.theta).log_evidence - part.noise.log_root
-    beside = search.at(others.hypothesis, others.x)
+    beside = search.unweighed(others.hypothesis, others.x)
     film = base if beside is None else beside
     trace = np.minimum(m.force - film.residual, force) - (m.force - base.residual)
     gain = rest - whole + constant - float(np.log(2 * force))

@@ -106,7 +106,7 @@ def _promises(search: Search, base: Candidate) -> bool:
 
 
 def _again(search: Search, before: Saturated) -> Iterator[tuple[Candidate, Saturation]]:
-    film = search.at(before.film.hypothesis, before.film.x)
+    film = search.unweighed(before.film.hypothesis, before.film.x)
     if film is not None:
         yield film, before.law
 
@@ -121,7 +121,7 @@ def _starts(search: Search, base: Candidate) -> Iterator[tuple[Candidate, Satura
             continue
         part = search.measurement.select(lower)
         fitted = Search(part, search.noise.part(part, lower), search.seed, search.solve).fit(base.hypothesis, [base.x])
-        film = None if fitted is None else search.at(base.hypothesis, fitted.x)
+        film = None if fitted is None else search.unweighed(base.hypothesis, fitted.x)
         if film is not None and limit > 0:
             yield film, Saturation(limit, SATURATION.sharpness)
 
@@ -184,7 +184,7 @@ class _Point:
         u = c[:-2] * axes.local(axes.to_u(self.film.x))
         low, high = axes.bounds
         x = axes.to_x(np.clip(u, np.where(axes.one_sided, np.maximum(low, 0.0), low), high))
-        film = self.search.at(self.film.hypothesis, x)
+        film = self.search.unweighed(self.film.hypothesis, x)
         by_limit = float(np.clip(c[-2] * self.prior[0], -SATURATION.largest_step, SATURATION.largest_step))
         ln_width = SATURATION.ln_width[0] + float(c[-1]) * SATURATION.ln_width[1]
         law = Saturation(self.law.limit * float(np.exp(by_limit)), float(np.exp(-ln_width)))
@@ -196,25 +196,28 @@ def _settled(point: _Point) -> Saturated:
     theta = None
     for _ in range(SATURATION.steps):
         theta = weighed(point.model, theta).theta
-        here, following = point.density(theta), _better(point, theta)
+        here = point.density(theta)
+        following = _better(point, theta, here)
         if following is None:
             break
-        gained, point = following.density(theta) - here, following
-        if gained < SATURATION.tolerance:
+        point, there = following
+        if there - here < SATURATION.tolerance:
             break
     found = weighed(point.model, theta).log_evidence
     return Saturated(point.law, point.film, found, point.law.reading(point.force), point.force >= point.law.limit)
 
 
-def _better(point: _Point, theta: Array) -> _Point | None:
-    """The first point on the way to the most probable coefficients that is more probable than this one."""
+def _better(point: _Point, theta: Array, here: float) -> tuple[_Point, float] | None:
+    """The first point on the way to the most probable coefficients that is more probable than this one, whose ln p is
+    ``here``, and its ln p.
+    """
     k = point.film.x.size
-    mean, _ = point.model.coefficients(theta)
+    mean = point.model.mean(theta)
     goal = np.concatenate([mean[2 : k + 2], mean[:2]])  # the model has the law's columns first
-    here, way = point.coefficients, 1.0
+    begin, way = point.coefficients, 1.0
     for _ in range(SATURATION.halvings):
-        trial = point.moved(here + way * (goal - here))
-        if trial is not None and trial.density(theta) > point.density(theta):
-            return trial
+        trial = point.moved(begin + way * (goal - begin))
+        if trial is not None and (there := trial.density(theta)) > here:
+            return trial, there
         way *= 0.5
     return None

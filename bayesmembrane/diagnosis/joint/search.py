@@ -17,10 +17,14 @@ from bayesmembrane.diagnosis.candidates.standard import Shape, Size, Standard
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.joint.effects import EffectInTests
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
+from bayesmembrane.ground.lately import Lately
 from bayesmembrane.ground.parameters import Array, Parameter
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.form_error import ENERGY, LOCAL
 from bayesmembrane.physics.hypothesis import Hypothesis
+
+MADE = 200
+"""Hypotheses of single tests that are kept: of those that are searched for side by side, one for every test."""
 
 Columns = list[tuple[Parameter | None, Array]]
 
@@ -81,7 +85,9 @@ class JointSearch(Weighing):
     parts: tuple[Search, ...]
     thicker: tuple[float, ...]
     noise: OwnNoise
-    _made: dict[int, tuple[Hypothesis, Hypothesis]] = field(default_factory=dict, init=False, repr=False)
+    _made: Lately[tuple[int, int], tuple[Hypothesis, Hypothesis]] = field(
+        default_factory=lambda: Lately(MADE), init=False, repr=False
+    )
 
     @cached_property
     def force(self) -> Array:
@@ -94,12 +100,11 @@ class JointSearch(Weighing):
 
     def of(self, hypothesis: Hypothesis, test: int) -> Hypothesis:
         """What is claimed of one test."""
-        made = self._made.get(test)
-        if made is None or made[0] is not hypothesis:
-            own = tuple(e for u in _effects(hypothesis) if (e := u.within(test)) is not None)
-            made = hypothesis, Hypothesis(hypothesis.material, own, hypothesis.noise, hypothesis.convexity)
-            self._made[test] = made
-        return made[1]
+        return self._made.of((id(hypothesis), test), lambda: (hypothesis, self._within(hypothesis, test)))[1]
+
+    def _within(self, hypothesis: Hypothesis, test: int) -> Hypothesis:
+        own = tuple(e for u in _effects(hypothesis) if (e := u.within(test)) is not None)
+        return Hypothesis(hypothesis.material, own, hypothesis.noise, hypothesis.convexity)
 
     def places(self, hypothesis: Hypothesis, test: int) -> NDArray[np.intp]:
         """Where the coordinates of one test stand."""
@@ -118,15 +123,18 @@ class JointSearch(Weighing):
         return own
 
     def batch(self, hypothesis: Hypothesis, x: Array) -> tuple[Array, Array]:
-        found = np.empty((len(x), self.force.size))
-        slopes = np.zeros((*found.shape, x.shape[1]))
+        return self.batches([(hypothesis, x)])[0]
+
+    def batches(self, asked: Sequence[tuple[Hypothesis, Array]]) -> list[tuple[Array, Array]]:
+        out = [(np.empty((len(x), self.force.size)), np.zeros((len(x), self.force.size, x.shape[1]))) for _, x in asked]
         for i, (part, rows) in enumerate(zip(self.parts, self.rows, strict=True)):
-            r, j = part.batch(self.of(hypothesis, i), self.coordinates(hypothesis, i, x))
-            found[:, rows] = r
-            wide = np.zeros((*r.shape, x.shape[1]))
-            wide[:, :, self.places(hypothesis, i)] = j
-            slopes[:, rows] = wide
-        return found, slopes
+            own = part.batches([(self.of(h, i), self.coordinates(h, i, x)) for h, x in asked])
+            for (h, _), (found, slopes), (r, j) in zip(asked, out, own, strict=True):
+                found[:, rows] = r
+                wide = np.zeros((*r.shape, slopes.shape[2]))
+                wide[:, :, self.places(h, i)] = j
+                slopes[:, rows] = wide
+        return out
 
     def misfits(self, hypothesis: Hypothesis, x: Array) -> Array:
         each = [p.misfits(self.of(hypothesis, i), self.coordinates(hypothesis, i, x)) for i, p in enumerate(self.parts)]
@@ -137,10 +145,14 @@ class JointSearch(Weighing):
         return np.concatenate(each, axis=1)
 
     def traces(self, hypothesis: Hypothesis, x: Array, force: Array) -> Array:
-        out = np.zeros((len(hypothesis.effects), force.size))
+        return self.all_traces([(hypothesis, x, force)])[0]
+
+    def all_traces(self, every: Sequence[tuple[Hypothesis, Array, Array]]) -> list[Array]:
+        out = [np.zeros((len(h.effects), force.size)) for h, _, force in every]
         for i, (part, rows) in enumerate(zip(self.parts, self.rows, strict=True)):
-            own = part.traces(self.of(hypothesis, i), self.coordinates(hypothesis, i, x), force[rows])
-            out[self._acting(hypothesis.effects, i), rows] = own
+            own = [(self.of(h, i), self.coordinates(h, i, x), force[rows]) for h, x, force in every]
+            for (h, _, _), trace, found in zip(every, out, part.all_traces(own), strict=True):
+                trace[self._acting(h.effects, i), rows] = found
         return out
 
     def forms(self, force: Array, effects: Sequence[Effect], traces: Array) -> Columns:

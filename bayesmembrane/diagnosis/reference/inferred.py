@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -73,11 +74,24 @@ class _Restricted:
     def dof(self) -> int:
         return int(self.y.size - self.q.shape[1])
 
+    @cached_property
+    def _columns(self) -> tuple[Array, float]:
+        """(q and what y has beside it, of unit length (N, p + 1); that length): what q follows of y costs nothing."""
+        rest = self.y - self.q @ (self.q.T @ self.y)
+        rest -= self.q @ (self.q.T @ rest)  # once more: of a curve without noise little but round-off is left
+        length = float(np.linalg.norm(rest)) or 1.0
+        return np.column_stack([self.q, rest / length]), length
+
     def at(self, rho: float) -> tuple[float, float]:
         """(-2 ln L, RSS) at one correlation."""
+        columns, length = self._columns
+        white = decorrelated(columns, rho, self.gaps)
+        try:  # by products: q is orthonormal, and whitening makes no more than a thousand of its condition
+            r = np.diag(np.linalg.cholesky(white.T @ white))
+        except np.linalg.LinAlgError:
+            r = np.diag(np.linalg.qr(white, mode="r"))
         # The last diagonal entry of R is what y has beyond the span of the others.
-        r = np.diag(np.linalg.qr(decorrelated(np.column_stack([self.q, self.y]), rho, self.gaps), mode="r"))
-        rss = float(r[-1] ** 2)
+        rss = float(r[-1] * length) ** 2
         phi = forgotten(rho, self.gaps)
         log_det = float(np.sum(np.log1p(-(phi**2)))) + 2 * float(np.sum(np.log(np.abs(r[:-1]))))
         # A density 2 (1 - rho): noise that hardly forgets is a drift, which no test could tell from a misfit.

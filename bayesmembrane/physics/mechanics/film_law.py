@@ -104,6 +104,18 @@ class FilmLaw:
         assert self.tangents is not None
         return replace(self, pieces=self.pieces + np.einsum("bjcn,bn->bjc", self.tangents, change), tangents=None)
 
+    def of(self, rows: slice) -> FilmLaw:
+        """The law of some of the films."""
+        return FilmLaw(
+            self.gap,
+            self.prestretch[rows],
+            self.step[rows],
+            self.pieces[rows],
+            self.last[rows],
+            self.status[rows],
+            None if self.tangents is None else self.tangents[rows],
+        )
+
     @staticmethod
     def stack(laws: Sequence[FilmLaw]) -> FilmLaw:
         """The films of all laws, one after the other; tangents are left out."""
@@ -211,14 +223,11 @@ def tangent(found: FilmLaw, force: Array, change: Array) -> Array:
         q = np.where(keep[:, :, None], change / force[:, :, None], 0.0)
     out = np.zeros((*found.pieces.shape, q.shape[2]))
     for last in np.unique(found.last):
-        rows = np.flatnonzero(found.last == last)
         if last < 3:
             continue
-        first, second = _spline_slopes(int(last))
-        part = q[rows, :last]
-        dq, ddq = (np.einsum("ij,bjm->bim", m, part) for m in (first, second))
-        for m in range(q.shape[2]):
-            out[rows, :last, :, m] = _between(part[:, :, m], dq[:, :, m], ddq[:, :, m])
+        rows = np.flatnonzero(found.last == last)
+        pieces = _pieces_of_values(int(last)) @ q[rows, :last]
+        out[rows, :last] = pieces.reshape(rows.size, last, 6, q.shape[2])
     return out
 
 
@@ -246,6 +255,13 @@ def _spline_slopes(count: int) -> tuple[Array, Array]:
     unit = np.eye(count)
     spline = make_interp_spline(both, np.concatenate([unit[::-1], unit]), k=5 if count > 2 else 3)
     return spline(at, 1), spline(at, 2)
+
+
+@cache
+def _pieces_of_values(count: int) -> Array:
+    """(6 count, count) from values at j + 1/2 of an even function to the coefficients of the quintics through them."""
+    first, second = _spline_slopes(count)
+    return np.ascontiguousarray(_between(np.eye(count), first.T, second.T).reshape(count, -1).T)
 
 
 @cache
@@ -325,10 +341,10 @@ def _assemble(length, tautness, prestretch, deflection, force, slope, status, ed
 def _evaluate(pieces, step, last, prestretch, length, tautness, deflection, excess, force, slope):  # type: ignore[no-untyped-def]
     rows, points = deflection.shape
     longer = excess.size > 1
-    wide = WIDTH * length
+    # Divisions are what it costs: there are as few as can be.
+    over_wide, over_square = 1.0 / (WIDTH * length), 1.0 / (length * length)
     for b in range(rows):
-        own = prestretch[b] ** -6.0
-        ratio = 1.0 - tautness * (1.0 - own)
+        taut = tautness * (1.0 - prestretch[b] ** -6.0)
         inverse = 1.0 / step[b]
         end = (last[b] - 0.5) * (1.0 + ROOM)
         for n in range(points):
@@ -340,21 +356,21 @@ def _evaluate(pieces, step, last, prestretch, length, tautness, deflection, exce
                     force[b, n] = np.nan
                     slope[b, n] = np.nan
                 continue
-            extra = excess[b, n] if longer else 0.0
-            stretch = 1.0 + extra
-            area = 1.0 / (stretch * stretch)
-            q = x * x
-            if extra > 0.0:
-                q = (length * length + q) * area - length * length
-            reach = 1.0 + q / (length * length)
-            kappa = ((reach - 1.0) * (reach + 1.0) + (1.0 - ratio)) / (reach * reach)
+            shorter, q = 1.0, x * x
+            if longer and excess[b, n] > 0.0:
+                shorter = 1.0 / (1.0 + excess[b, n])
+                q = (length * length + q) * (shorter * shorter) - length * length
+            above = q * over_square
+            less = 1.0 / (1.0 + above)
+            kappa = (above * (above + 2.0) + taut) * (less * less)
             if not kappa > 0.0:
                 force[b, n] = 0.0
                 slope[b, n] = 0.0
                 continue
-            rise = 2.0 * ratio / (reach * reach * reach * length * length)
-            y = np.sqrt(max(q, 0.0))
-            t = np.arcsinh(y / wide) * inverse
+            rise = 2.0 * (1.0 - taut) * over_square * (less * less * less)
+            y = np.sqrt(max(q, 0.0)) * over_wide
+            root = np.sqrt(1.0 + y * y)
+            t = np.log(y + root) * inverse  # asinh, to round-off of one: t is compared with whole numbers
             if t > end:
                 force[b, n] = np.nan
                 slope[b, n] = np.nan
@@ -365,8 +381,8 @@ def _evaluate(pieces, step, last, prestretch, length, tautness, deflection, exce
             g = c[0] + z * (c[1] + z * (c[2] + z * (c[3] + z * (c[4] + z * c[5]))))
             dg = c[1] + z * (2.0 * c[2] + z * (3.0 * c[3] + z * (4.0 * c[4] + z * 5.0 * c[5])))
             bend = 0.0
-            if y > 1e-9 * length:
-                bend = dg * inverse / (2.0 * y * np.sqrt(wide * wide + q))
-            k = np.exp(g) * kappa / stretch
-            force[b, n] = k * x
-            slope[b, n] = k + x * k * (rise / kappa + bend) * 2.0 * x * area
+            if y > 1e-9:
+                bend = dg * inverse * (over_wide * over_wide) / (2.0 * y * root)
+            k = np.exp(g) * shorter
+            force[b, n] = k * kappa * x
+            slope[b, n] = k * (kappa + 2.0 * (x * x * shorter * shorter) * (rise + kappa * bend))

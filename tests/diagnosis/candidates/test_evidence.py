@@ -1,5 +1,7 @@
 """ln Z of a linear model against dense matrices and against integration."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -101,3 +103,26 @@ def test_bounds_take_what_lies_beyond_them() -> None:
 def test_a_tail_far_beyond_a_bound_is_a_tail() -> None:
     found = log_inside(np.array([-12.0]), np.eye(1), np.zeros(1), np.full(1, np.inf))
     assert found == pytest.approx(norm.logsf(12.0), rel=1e-9)
+
+
+def test_columns_that_are_turned_say_the_same() -> None:
+    """Single readings beside noise that remembers, and the same ones turned until they are orthogonal."""
+    plain = model(7)
+    rng = np.random.default_rng(3)
+    alike = np.eye(60)[:, 20:45] + 0.4 * np.eye(60, k=-1)[:, 20:45]
+    turn = np.linalg.eigh(alike.T @ alike)[1]
+    prior = (-1.0, 1.5)
+    models = [
+        replace(plain, blocks=(*plain.blocks[:1], block, *plain.blocks[1:]))
+        for block in (Block(alike, prior), Block(alike @ turn, prior, turn=turn))
+    ]
+    theta = np.linspace(-1.0, 0.2, len(models[0].priors))
+    one, other = (m.log_density(theta) for m in models)
+    assert other.value == pytest.approx(one.value, rel=1e-12)
+    assert other.slope == pytest.approx(one.slope, rel=1e-9, abs=1e-9)
+    assert other.bend == pytest.approx(one.bend, rel=1e-9, abs=1e-9)
+    for a, b in zip(models[0].coefficients(theta), models[1].coefficients(theta), strict=True):
+        assert b == pytest.approx(a, rel=1e-8, abs=1e-10)
+    assert models[1].mean(theta) == pytest.approx(models[0].mean(theta), rel=1e-8, abs=1e-10)
+    values = rng.standard_normal((60, 2))
+    assert models[1].freed(theta, values) == pytest.approx(models[0].freed(theta, values), rel=1e-9, abs=1e-11)

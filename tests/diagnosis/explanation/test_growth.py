@@ -34,14 +34,14 @@ class Shelf:
         self.asked: list[frozenset[str]] = []
         self.coordinates: list[np.ndarray] = []
 
-    def at(self, h: Hypothesis, x: np.ndarray) -> Candidate | None:
-        self.coordinates.append(x)
-        names = frozenset(e.name for e in h.effects)
-        return candidate(h, self.start[names]) if names in self.start else None
+    def placed(self, every: list[tuple[Hypothesis, np.ndarray]]) -> list[Candidate | None]:
+        self.coordinates += [x for _, x in every]
+        named = [(h, frozenset(e.name for e in h.effects)) for h, _ in every]
+        return [candidate(h, self.start[names]) if names in self.start else None for h, names in named]
 
-    def polished(self, c: Candidate) -> Candidate:
-        self.asked.append(frozenset(c.names))
-        return candidate(c.hypothesis, self.end[frozenset(c.names)])
+    def all_polished(self, every: list[Candidate]) -> list[Candidate]:
+        self.asked += [frozenset(c.names) for c in every]
+        return [candidate(c.hypothesis, self.end[frozenset(c.names)]) for c in every]
 
 
 def looked_back(shelf: Shelf, *found: Candidate) -> dict[frozenset[str], float]:
@@ -100,13 +100,14 @@ def exchanged(
     """Sets that are fitted by exchanging effects of {friction, tearing}, the best so far, with ln Z of ``end``."""
     asked: list[Any] = []
 
-    def added(_: Grown, base: Candidate, effect: Any) -> Candidate:
-        names = frozenset((*base.names, effect.name))
-        asked.append(names)
-        return candidate(with_effects(base.hypothesis, [effect]), end.get(names, -60.0))
+    def add(out: Grown, pairs: list[tuple[Candidate, Any]]) -> None:
+        for base, effect in pairs:
+            names = frozenset((*base.names, effect.name))
+            asked.append(names)
+            out.add(candidate(with_effects(base.hypothesis, [effect]), end.get(names, -60.0)))
 
     monkeypatch.setattr(growth, "first_order", lambda _, base, effect: promised[effect.name])
-    monkeypatch.setattr(growth, "_added", added)
+    monkeypatch.setattr(growth, "_add", add)
     visible = [components("effects")[n]() for n in ("friction", "tearing", *promised)]
     case = SimpleNamespace(null=candidate(claim(), 0.0), visible=visible)
     grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, SimpleNamespace(at=lambda *_: None))))

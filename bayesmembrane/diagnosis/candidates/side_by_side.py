@@ -1,0 +1,96 @@
+"""Least squares of several hypotheses, side by side: each step asks for the films of all of them at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesmembrane.calibration.descent import Descent, Patience
+from bayesmembrane.diagnosis.candidates.standard import Standard
+from bayesmembrane.diagnosis.reference.noise import OwnNoise
+from bayesmembrane.diagnosis.thresholds import SEARCH
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.hypothesis import Hypothesis
+
+Asked = tuple[Hypothesis, Array]
+"""A hypothesis, and coordinates x (B, k)."""
+Batches = Callable[[Sequence[Asked]], Sequence[tuple[Array, Array]]]
+"""r (B, N) N, fitted less measured, and dr/dx (B, N, k) of each that is asked; nan where there is no curve."""
+
+
+@dataclass(frozen=True, eq=False)
+class Freeing:
+    """W v with W (S + U U^T) W^T = 1: values freed of noise S and of a form error with the columns U.
+
+    With U = Q s V^T freed of noise, W = 1 - Q (1 - 1 / sqrt(1 + s^2)) Q^T after that.
+    """
+
+    noise: OwnNoise
+    axes: Array
+    shrink: Array
+
+    def __call__(self, values: Array) -> Array:
+        white = self.noise.white(values)
+        along = self.axes.T @ white.reshape(len(white), -1)
+        return white - (self.axes @ (self.shrink[:, None] * along)).reshape(white.shape)
+
+
+class Searching:
+    """Searches for one hypothesis from u (B, k), the prior's pull included.
+
+    u, size : where they end, and the roots of their sums of squares (B,); inf without a curve
+    """
+
+    def __init__(self, hypothesis: Hypothesis, axes: Standard, freeing: Freeing, starts: Array, most: int) -> None:
+        self.hypothesis, self.axes, self.freeing = hypothesis, axes, freeing
+        patience = Patience(SEARCH.given_up, SEARCH.slow_below, settled=SEARCH.settled)
+        self._descent = Descent(starts, axes.bounds, most, patience=patience)
+
+    @property
+    def u(self) -> Array:
+        return self._descent.x
+
+    @property
+    def size(self) -> Array:
+        return self._descent.size
+
+    @property
+    def asked(self) -> Asked:
+        """What it wants to know next: no coordinates once it is done."""
+        return self.hypothesis, self.axes.to_x(self._descent.asked)
+
+    @property
+    def done(self) -> bool:
+        return not len(self._descent.asked)
+
+    def told(self, r: Array, j: Array) -> None:
+        """Go on with residuals (B, N) N and their slopes (B, N, k) in x."""
+        u = self._descent.asked
+        r, j = _freed(self.freeing, r, j)
+        pull, steep = self.axes.pull(u)
+        diagonal = steep[:, :, None] * np.eye(u.shape[1])
+        self._descent.told(
+            np.concatenate([r, pull], axis=1), np.concatenate([j * self.axes.slope(u)[:, None, :], diagonal], axis=1)
+        )
+
+
+def run(searches: Sequence[Searching], batches: Batches) -> None:
+    """Until all of them are done."""
+    going = list(searches)
+    while going:
+        found = batches([s.asked for s in going])
+        for search, (r, j) in zip(going, found, strict=True):
+            search.told(r, j)
+        going = [s for s in going if not s.done]
+
+
+def _freed(freeing: Freeing, r: Array, j: Array) -> tuple[Array, Array]:
+    """Residuals (B, N) and slopes (B, N, k) freed; a start without a curve is nan, and only that one."""
+    wide = np.moveaxis(np.concatenate([r[:, :, None], j], axis=2), 1, 0)
+    out = np.full(wide.shape, np.nan)
+    good = np.all(np.isfinite(wide), axis=(0, 2))
+    out[:, good] = freeing(wide[:, good])
+    out = np.moveaxis(out, 0, 1)
+    return out[:, :, 0], out[:, :, 1:]

@@ -1,0 +1,77 @@
+"""Curves of several hypotheses at once: those of one energy are solved in one batch, whatever effects are beside it.
+
+A batch of eight films costs what one film does, and searches ask for few of each hypothesis.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.form_error import rows_without
+from bayesmembrane.physics.forward import AT_ONCE, Forward, Prediction
+from bayesmembrane.physics.materials.base import Material
+from bayesmembrane.physics.rigs.base import Films, Trial
+
+Asked = tuple[Forward, Array]
+"""A hypothesis at the readings of a measurement, and coordinates x (B, k)."""
+
+
+def in_step(asked: Sequence[Asked], sensitivities: bool = True) -> list[Prediction]:
+    """``forward(x, sensitivities, reached=False)`` of each, all of one measurement and with one solver."""
+    groups: dict[type[Material], list[int]] = defaultdict(list)
+    out: dict[int, Prediction] = {}
+    for i, (forward, x) in enumerate(asked):
+        if _drawn_through_points(forward, len(x)):
+            groups[forward.hypothesis.material].append(i)
+        else:
+            out[i] = forward(x, sensitivities=sensitivities, reached=False)
+    for group in groups.values():
+        out |= dict(zip(group, _together([asked[i] for i in group], sensitivities), strict=True))
+    return [out[i] for i in range(len(asked))]
+
+
+def traces_in_step(asked: Sequence[tuple[Forward, Array, Array]]) -> list[Array]:
+    """`form_error.traces` (E, N) N of each at one point x (k,), where its force is (N,) N."""
+    missing = [rows_without(f.hypothesis, x[None, :]) for f, x, _ in asked]
+    pairs = [
+        (f, np.concatenate([row for _, row in rows])) for (f, _, _), rows in zip(asked, missing, strict=True) if rows
+    ]
+    curves = iter(in_step(pairs, sensitivities=False))
+    out = []
+    for (forward, _, force), rows in zip(asked, missing, strict=True):
+        trace = np.zeros((len(forward.hypothesis.effects), force.size))
+        if rows:
+            trace[[i for i, _ in rows]] = np.nan_to_num(force - next(curves).force)
+        out.append(trace)
+    return out
+
+
+def _drawn_through_points(forward: Forward, rows: int) -> bool:
+    """True if films are solved at few points, and all that is computed of them fits into memory at once."""
+    size = rows * (forward.hypothesis.curve_size + 1) * forward.path.deflection.size
+    return forward.composes and not forward.rig.closed_form and size <= AT_ONCE
+
+
+def _together(asked: Sequence[Asked], sensitivities: bool) -> list[Prediction]:
+    """The curves of films of one energy, from one law of all of them."""
+    first = asked[0][0]
+    each = [(f.composition, f.effects(x)) for f, x in asked]
+    trial = Trial(
+        first.measurement,
+        first.path,
+        np.concatenate([c.prestretch(theta) for c, theta in each]),
+        np.concatenate([c.end(theta) for c, theta in each]),
+    )
+    parameters = np.concatenate([f.hypothesis.films(x) for f, x in asked])
+    films = Films(first.hypothesis.material, parameters, sensitivities, solve=first.solve)
+    law, margins = first.rig.law(films, trial)
+    out, begin = [], 0
+    for forward, x in asked:
+        rows = slice(begin, begin + len(x))
+        out.append(forward.over(x, (law.of(rows), (margins[0][rows], margins[1][rows])), sensitivities))
+        begin += len(x)
+    return out

@@ -1,0 +1,92 @@
+"""Hypotheses that are searched for side by side are found where each is found alone."""
+
+import numpy as np
+import pytest
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.candidates.candidate import with_effects
+from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.candidates.weighing import Sought, starts_with
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.mechanics import api
+from bayesmembrane.physics.mechanics.request import Request
+from bayesmembrane.physics.mechanics.solution import Curves
+from bayesmembrane.physics.rigs.annulus import Annulus
+from tests.diagnosis.curves import triangle, white_noise
+from tests.generator.film import Film
+
+SD = 0.004
+PLAIN = hypothesis("neo_hookean")
+
+
+class Counted:
+    """The solver, and how often it was called."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def __call__(self, asked: Request) -> Curves:
+        self.calls += 1
+        return api.solve(asked)
+
+
+@pytest.fixture(scope="module")
+def measured() -> Measurement:
+    path = triangle(90, (0.02, 0.03))
+    film = Film("neo_hookean", (8.0,), 0.010, 0.035, 0.04)
+    force = film.force(path) + SD * np.random.default_rng(5).standard_normal(path.size)
+    return Measurement(path, force, Annulus(0.010, 0.035), Specimen("film", 5e-5), time=np.arange(1.0, path.size + 1))
+
+
+def searching(measured: Measurement) -> tuple[Search, Counted]:
+    solve = Counted()
+    return Search(measured, white_noise(measured, SD, 80.0), solve=solve), solve
+
+
+def sought(search: Search) -> list[Sought]:
+    plain = search.fit(PLAIN, search.material_starts(PLAIN))
+    assert plain is not None
+    effects = [components("effects")[n]() for n in ("mullins", "friction", "prestretch", "permanent_set")]
+    return [
+        Sought(with_effects(PLAIN, [e]), starts_with([plain.x], e, search.expected_sizes(e)), plain) for e in effects
+    ]
+
+
+def test_together_and_alone_end_at_the_same_evidence_by_fewer_solutions(measured: Measurement) -> None:
+    (one, counted), (other, counted_alone) = searching(measured), searching(measured)
+    every, again = sought(one), sought(other)
+    counted.calls = counted_alone.calls = 0
+    together = one.fits(every)
+    alone = [other.fit(s.hypothesis, s.starts, s.parent) for s in again]
+    for a, b in zip(together, alone, strict=True):
+        assert a is not None
+        assert b is not None
+        assert a.log_evidence == pytest.approx(b.log_evidence, abs=0.02)
+    assert counted.calls < counted_alone.calls
+    polished = one.all_polished([c for c in together if c is not None])
+    for a, c in zip(polished, alone, strict=True):
+        assert c is not None
+        assert a.log_evidence == pytest.approx(other.polished(c).log_evidence, abs=0.02)
+
+
+def test_where_a_search_ended_is_not_solved_again(measured: Measurement) -> None:
+    search, solve = searching(measured)
+    found = search.fit(PLAIN, search.material_starts(PLAIN))
+    assert found is not None
+    solve.calls = 0
+    r, j = search.batch(found.hypothesis, found.x[None])
+    assert solve.calls == 0
+    assert np.array_equal(r[0], -found.residual)
+    assert np.array_equal(j[0], found.slopes)
+
+
+def test_a_hypothesis_without_a_film_is_none_beside_those_that_have_one(measured: Measurement) -> None:
+    search, _ = searching(measured)
+    effect = components("effects")["mullins"]()
+    start = starts_with([np.array([2.0])], effect, search.expected_sizes(effect))
+    lost = [np.full_like(s, np.nan) for s in start]
+    claims = [with_effects(PLAIN, [effect]) for _ in range(2)]
+    found = search.fits([Sought(claims[0], lost), Sought(claims[1], start)])
+    assert found[0] is None
+    assert found[1] is not None
