@@ -21,6 +21,7 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import OTHER_TESTS
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.threads import one_thread
 from bayesmembrane.physics.form_error import FormFactors, joint_factors
 from bayesmembrane.physics.forward import Forward
 
@@ -59,6 +60,7 @@ class OtherTest:
         return float(np.mean((y >= self.low) & (y <= self.high)))
 
 
+@one_thread
 def predicted(found: Diagnosis, other: Measurement, scatter: float = 0.0, seed: int = 0) -> OtherTest:
     """What all that ``found`` holds probable predicts of ``other``, a test of the same material.
 
