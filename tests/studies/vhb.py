@@ -149,7 +149,7 @@ def _tried(
         outside[other.rate] = rms(miss)
         low[other.rate] = float(kPa(np.mean(miss[other.measurement.leg > 0])))
     known = told.verdict in ("named", "ambiguous", "material")
-    member = known and any(candidate is j.candidate for j in told.members)
+    member = known and any(candidate.label == j.candidate.label for j in told.members)
     return Tried(
         candidate.hypothesis.material.name,
         candidate.names,
