@@ -95,8 +95,8 @@ class Evaluates(Protocol):
 
 
 @runtime_checkable
-class Partial(Evaluates, Protocol):
-    """A posterior of some of the coordinates of another."""
+class Marginalised(Evaluates, Protocol):
+    """A posterior of some of the coordinates of another: the rest is integrated out."""
 
     def whole(self, x: Array, /) -> Array:
         """(B, k) all coordinates of films with the coordinates x (B, m)."""

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from bayesmembrane.calibration.descent import Patience, descend
 from bayesmembrane.calibration.objective import Objective, separated
-from bayesmembrane.calibration.posterior import Evaluates, Evaluation, Outcomes, Partial, Posterior, weighed
+from bayesmembrane.calibration.posterior import Evaluates, Evaluation, Marginalised, Outcomes, Posterior, weighed
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.data.thinning import shortened
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.forward import AT_ONCE
 
 BROAD, CLOSE, ROUNDS, EACH = 256, 256, 5, 192
 HALVINGS = 40  # of the interval of tempering powers
@@ -26,7 +27,6 @@ WIDER = 1.5  # of the Laplace approximation
 DEGREES = 4.0  # of freedom of the t-distribution around a valley
 SPARE = 1.5  # effective number of candidates for each walker
 SCREENED_BY = 500  # readings, which is enough to see where to begin
-KEPT = 500_000  # numbers of curves of one batch
 FINEST = 1e-11  # of the largest force: no noise that is inferred is below, as its bounds say
 
 
@@ -44,9 +44,9 @@ class Tried:
     @classmethod
     def of(cls, posterior: Evaluates, x: Array, counts: Outcomes) -> Tried:
         """The points x (M, k), solved and counted."""
-        few = len(x) * posterior.readings <= KEPT
+        few = len(x) * posterior.readings <= AT_ONCE
         found = posterior.evaluate(x) if few else weighed(posterior, x)
-        counts.note(posterior.whole(x) if isinstance(posterior, Partial) else x, found.outcome)
+        counts.note(posterior.whole(x) if isinstance(posterior, Marginalised) else x, found.outcome)
         curves = found.curves if few and isinstance(found, Evaluation) else None
         return cls(x, found.log_posterior, curves)
 

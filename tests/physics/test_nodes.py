@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.thinning import MOST
-from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.forward import Forward, Prediction
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.nodes import NODES, nodes_of
 from bayesmembrane.physics.rigs.annulus import Annulus
@@ -39,13 +39,17 @@ def forward_of(material: str, m: Measurement) -> Forward:
     return Forward(hypothesis(material), m, m.deflection)
 
 
-@pytest.mark.parametrize("material", FILMS)
-def test_forces_from_the_nodes_are_those_of_the_film_at_every_reading(material: str) -> None:
-    forward = forward_of(material, long_curve())
+def both_ways(material: str, m: Measurement, films: ArrayLike) -> tuple[Prediction, Prediction]:
+    """What is told at every reading, and from the nodes."""
+    forward = forward_of(material, m)
     nodes = nodes_of(forward)
     assert nodes is not None
-    x: Array = np.array(FILMS[material])
-    whole, few = forward(x), nodes(x)
+    return forward(films), nodes(np.asarray(films))
+
+
+@pytest.mark.parametrize("material", FILMS)
+def test_forces_from_the_nodes_are_those_of_the_film_at_every_reading(material: str) -> None:
+    whole, few = both_ways(material, long_curve(), FILMS[material])
     assert np.all(whole.ok)
     np.testing.assert_allclose(few.force, whole.force, rtol=0, atol=1e-7 * np.max(whole.force))
     assert np.array_equal(few.status, whole.status)
@@ -54,11 +58,7 @@ def test_forces_from_the_nodes_are_those_of_the_film_at_every_reading(material: 
 
 def test_a_film_that_lacks_a_node_is_asked_at_every_reading() -> None:
     """A Gent film that locks on the way: no force beyond, and all of them before."""
-    forward = forward_of("gent", long_curve())
-    nodes = nodes_of(forward)
-    assert nodes is not None
-    x: Array = np.array([[2.0, -1.5], [2.0, 4.0]])
-    whole, few = forward(x), nodes(x)
+    whole, few = both_ways("gent", long_curve(), [[2.0, -1.5], [2.0, 4.0]])
     assert whole.ok.tolist() == few.ok.tolist() == [False, True]
     assert np.array_equal(few.status[0], whole.status[0])
     np.testing.assert_array_equal(few.force[0], whole.force[0])
@@ -70,11 +70,7 @@ def test_forces_of_a_strip_from_the_nodes_are_those_at_every_reading(material: s
     """Some readings are below rest, as noise has it, where a strip is slack."""
     m = long_curve(end=0.06)
     strip = Measurement(m.deflection - 1e-5, m.force, rig, m.specimen, time=m.time)
-    forward = forward_of(material, strip)
-    nodes = nodes_of(forward)
-    assert nodes is not None
-    x: Array = np.array(FILMS[material])
-    whole, few = forward(x), nodes(x)
+    whole, few = both_ways(material, strip, FILMS[material])
     assert np.all(whole.ok)
     np.testing.assert_allclose(few.force, whole.force, rtol=0, atol=1e-8 * np.max(whole.force))
     np.testing.assert_array_equal(few.convexity, whole.convexity)

@@ -6,8 +6,8 @@ import numpy as np
 
 from bayesmembrane.calibration.joint.objective import JointObjective, with_fewer_readings
 from bayesmembrane.calibration.joint.posterior import JointPosterior
-from bayesmembrane.calibration.posterior import Outcomes, weighed
-from bayesmembrane.calibration.starts import evolved, tempered
+from bayesmembrane.calibration.posterior import Outcomes
+from bayesmembrane.calibration.starts import Tried, evolved, tempered
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 
@@ -15,7 +15,6 @@ EACH, ROUNDS, AROUND = 256, 5, 96
 MOST = 4  # optima of the largest likelihood
 LIKELY = 40.0  # of |r|^2 above the least: valleys beyond it hold nothing of the posterior
 WIDER, DEGREES = 1.5, 4.0  # than the curvature says, and degrees of freedom of the t-distribution around a valley
-SPARE = 1.5  # effective number of candidates for each walker
 
 
 def joint_starts(
@@ -27,28 +26,18 @@ def joint_starts(
     and what differential evolution makes of the better ones; b <= 1 is the largest power at which they are worth more
     than the walkers. Raises `SettingsError` if next to no admissible parameters reach the data.
     """
-    x = _around(posterior, rng)
-    lp = _evaluated(posterior, x, counts)
-    wanted = ensembles * walkers
+    tried = Tried.of(posterior, _around(posterior, rng), counts)
     for _ in range(ROUNDS):
-        good = np.isfinite(lp)
-        more = posterior.prior.draw(rng, EACH) if np.count_nonzero(good) < 4 else _better(x[good], lp[good], rng)
-        x, lp = np.concatenate([x, more]), np.concatenate([lp, _evaluated(posterior, more, counts)])
-    x, lp = x[np.isfinite(lp)], lp[np.isfinite(lp)]
-    if len(x) < wanted:
+        good = tried.possible
+        more = posterior.prior.draw(rng, EACH) if len(good.x) < 4 else _better(good, rng)
+        tried = tried.joined(Tried.of(posterior, more, counts))
+    if len(tried.possible.x) < ensembles * walkers:
         raise SettingsError(
             f"next to no {posterior.joint.label()} films that meet the convexity prior "
             f'"{posterior.joint.convexity}" fit every test',
             remedy="use shorter ranges, another material or another convexity prior",
         )
-    chosen = tempered(lp, SPARE * wanted, wanted, rng)
-    return np.asarray(x[rng.permutation(chosen)].reshape(ensembles, walkers, -1))
-
-
-def _evaluated(posterior: JointPosterior, x: Array, counts: Outcomes) -> Array:
-    found = weighed(posterior, x)
-    counts.note(x, found.outcome)
-    return found.log_posterior
+    return tried.starts(rng, ensembles, walkers)
 
 
 def _around(posterior: JointPosterior, rng: np.random.Generator) -> Array:
@@ -94,6 +83,6 @@ def _suited(posterior: JointPosterior, number: int, x: Array, misfit: float, rng
     x[some, at[0]] = fits + 0.5 * rng.standard_normal(int(np.sum(some)))
 
 
-def _better(x: Array, lp: Array, rng: np.random.Generator) -> Array:
+def _better(good: Tried, rng: np.random.Generator) -> Array:
     """(EACH, K) what differential evolution makes of the better candidates."""
-    return evolved(x[tempered(lp, EACH / 2, EACH, rng)], rng)
+    return evolved(good.x[tempered(good.log_posterior, EACH / 2, EACH, rng)], rng)

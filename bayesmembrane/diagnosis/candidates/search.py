@@ -10,7 +10,7 @@ import numpy as np
 
 from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.diagnosis.candidates.evaluated import Evaluated, together
+from bayesmembrane.diagnosis.candidates.remembering import RememberingObjective, together
 from bayesmembrane.diagnosis.candidates.standard import Standard, expected_size, standard
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
@@ -43,7 +43,7 @@ class Search(Weighing):
     seed: int = 0
     solve: Solve = api.solve
     known_factors: FormFactors | None = None
-    _made: Lately[int, Evaluated] = field(default_factory=lambda: Lately(MADE), init=False, repr=False)
+    _made: Lately[int, RememberingObjective] = field(default_factory=lambda: Lately(MADE), init=False, repr=False)
 
     @property
     def force(self) -> Array:
@@ -59,10 +59,10 @@ class Search(Weighing):
         return api.unaided(asked, self.solve)
 
     def batch(self, hypothesis: Hypothesis, x: Array) -> tuple[Array, Array]:
-        return self._evaluated(hypothesis).batch(x)
+        return self._remembering(hypothesis).batch(x)
 
     def batches(self, asked: Sequence[tuple[Hypothesis, Array]]) -> list[tuple[Array, Array]]:
-        return together([(self._evaluated(hypothesis), x) for hypothesis, x in asked])
+        return together([(self._remembering(hypothesis), x) for hypothesis, x in asked])
 
     def misfits(self, hypothesis: Hypothesis, x: Array) -> Array:
         return np.asarray(self._objective(hypothesis).forward(x, reached=False).force - self.force)
@@ -105,11 +105,12 @@ class Search(Weighing):
         return self.measurement.select(np.sort(order[rows]))
 
     def _objective(self, hypothesis: Hypothesis) -> Objective:
-        return self._evaluated(hypothesis).objective
+        return self._remembering(hypothesis).objective
 
-    def _evaluated(self, hypothesis: Hypothesis) -> Evaluated:
+    def _remembering(self, hypothesis: Hypothesis) -> RememberingObjective:
         """Of one of the hypotheses that were asked for last: a search asks for one many times."""
         # By identity, for that costs nothing; what is made holds the hypothesis, so that no other one gets its number.
         return self._made.of(
-            id(hypothesis), lambda: Evaluated(Objective(hypothesis, self.measurement, "euclidean", self.quick))
+            id(hypothesis),
+            lambda: RememberingObjective(Objective(hypothesis, self.measurement, "euclidean", self.quick)),
         )

@@ -141,7 +141,7 @@ def _grow(out: Grown) -> bool:
         bases = [c for c in beam if frozenset(c.names) not in out.followed]
         for base in bases:
             out.followed.add(frozenset(base.names))
-            _add(out, [(base, effect) for effect in _promising(out, base, size)])
+            _add_effects(out, [(base, effect) for effect in _promising(out, base, size)])
         if not out.of_size(size):
             break
         if bases:
@@ -195,7 +195,7 @@ def _with_exchanged(out: Grown) -> None:
     for _ in range(GROWTH.exchanges):
         best = out.best
         own = [n for n in best.names if n not in out.case.null.names]
-        _add(out, [pair for name in own for pair in _exchanges(out, best, name)] if len(own) > 1 else [])
+        _add_effects(out, [pair for name in own for pair in _exchanges(out, best, name)] if len(own) > 1 else [])
         if best is out.best:
             break
 
@@ -223,7 +223,7 @@ def _with_twins(out: Grown) -> None:
         if (energy, names) not in out.found and new in known
     ]
     pairs = [(out.found.get((energy, frozenset(best.names) - {old})), known[new]) for old, new in unseen]
-    _add(out, [(base, effect) for base, effect in pairs[: TWINS.added] if base is not None])
+    _add_effects(out, [(base, effect) for base, effect in pairs[: TWINS.added] if base is not None])
 
 
 def _beam(out: Grown, size: int) -> list[Candidate]:
@@ -286,7 +286,7 @@ def _gain(model: Linear, theta: Array, white: Array, sides: Array) -> float:
     return float(np.max(0.5 * along**2 / (square + 1) * allowed - 0.5 * np.log1p(square)))
 
 
-def _add(out: Grown, pairs: Sequence[tuple[Candidate, Effect]]) -> None:
+def _add_effects(out: Grown, pairs: Sequence[tuple[Candidate, Effect]]) -> None:
     """Each of these candidates with one more effect."""
     sought = []
     for base, effect in pairs:

@@ -17,6 +17,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics.convexity import least_eigenvalue
 from bayesmembrane.physics.mechanics.solution import Curves, Status
+from bayesmembrane.physics.mechanics.strip_law import once
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,8 @@ class ShearLaw:
 
         With ``excess`` e (B, N) the specimen is at rest at a shear of e.
         """
-        shear = deflection / self.length - (0.0 if excess is None else excess)
+        shear = (once(deflection) if excess is None else deflection) / self.length
+        shear = shear if excess is None else shear - excess
         stretch, rate, bend = stretched(shear)
         with np.errstate(all="ignore"):
             _, w1, _, w11, _, _ = self.material.derivatives(self.parameters.T[:, :, None], stretch, 1.0 + 0.0 * stretch)
@@ -72,23 +74,25 @@ def shear_curves(law: ShearLaw, deflection: Array, sensitivities: bool = False) 
     """Curves of the specimens of ``law`` at ``deflection`` (N,) m; convexity is that at (l, 1)."""
     d = np.broadcast_to(deflection, (len(law.parameters), deflection.size))
     force, slope = law(d)
-    stretch, rate, _ = stretched(d / law.length)
-    one = np.ones_like(stretch)
+    shear = deflection[None, :] / law.length  # (1, N): kinematics are those of all specimens
+    stretch, rate, _ = stretched(shear)
+    one, rates = np.ones_like(stretch), None
     p = law.parameters.T[:, :, None]
     with np.errstate(all="ignore"):
         w, _, _, a, b, c = law.material.derivatives(p, stretch, one)
-        rates = np.stack([s[1] + 0.0 * stretch for s in law.material.sensitivities(p, stretch, one)], axis=2)
+        if sensitivities:
+            each = [s[1] + np.zeros(d.shape) for s in law.material.sensitivities(p, stretch, one)]
+            rates = (law.width * np.sign(shear) * rate)[:, :, None] * np.stack(each, axis=2)
         gd = np.abs(np.asarray(law.material.shear_modulus(law.parameters.T)))[:, None]
-    turned = (law.width * np.sign(d) * rate)[:, :, None]
     return Curves(
         deflection=d,
         force=force,
         status=np.where(np.isfinite(force), Status.OK, Status.LOCKED).astype(np.int8),
         note=np.zeros(d.shape, np.int8),
         slope=slope,
-        sensitivity=turned * rates if sensitivities else None,
+        sensitivity=rates,
         variation=np.zeros(d.shape),
-        max_stretch=stretch,
+        max_stretch=np.broadcast_to(stretch, d.shape),
         ellipticity=np.asarray(np.minimum(a, c) / gd),
         convexity=np.asarray(least_eigenvalue(a, b, c) / gd),
         energy=w * law.width * law.length + np.zeros(d.shape),

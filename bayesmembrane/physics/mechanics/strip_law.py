@@ -59,7 +59,7 @@ class StripLaw:
         With ``excess`` e (B, N) the strip is longer by that part: l = (1 + delta / L) / (1 + e).
         """
         longer = 1.0 if excess is None else 1.0 + excess
-        stretch = (1.0 + (_once(deflection) if excess is None else deflection) / self.rig.length) / longer
+        stretch = (1.0 + (once(deflection) if excess is None else deflection) / self.rig.length) / longer
         pulled, l2, dl2 = self.taut(stretch)
         width = self.rig.width
         with np.errstate(all="ignore"):
@@ -154,6 +154,6 @@ def _margins(law: StripLaw, a: Array, b: Array, c: Array) -> tuple[Array, Array]
     return np.asarray(least_eigenvalue(a, b, c) / gd), np.asarray(np.minimum(a, c) / gd)
 
 
-def _once(rows: Array) -> Array:
+def once(rows: Array) -> Array:
     """(1, N) of ``rows`` (B, N) that are one row seen B times; else as they are."""
     return rows[:1] if rows.strides[0] == 0 else rows

@@ -60,8 +60,8 @@ def independent(posterior: Posterior, tried: Tried, rng: np.random.Generator, co
     """
     shape = collapsed(posterior)
     if shape is None:
-        return _learned(_Learning(posterior, rng, counts), tried)
-    close = _filled(_Learning(shape, rng, counts), _shapes(tried, shape))
+        return _of_all_coordinates(_Learning(posterior, rng, counts), tried)
+    close = _of_shapes(_Learning(shape, rng, counts), _shapes(tried, shape))
     if close is None:
         return None
     states = close.states[:STATES]
@@ -80,7 +80,7 @@ def _shapes(tried: Tried, shape: Collapsed) -> Tried:
     return Tried(x, lp, curves)
 
 
-def _learned(search: _Learning, tried: Tried) -> Independent | None:
+def _of_all_coordinates(search: _Learning, tried: Tried) -> Independent | None:
     """What `independent` finds of all coordinates: what is best of `ROUNDS` is filled, if it has to be."""
     found: list[Independent] = []
     with suppress(np.linalg.LinAlgError):  # what was tried fills no volume
@@ -96,13 +96,13 @@ def _learned(search: _Learning, tried: Tried) -> Independent | None:
     more = best
     with suppress(np.linalg.LinAlgError):
         for _ in range(FILLINGS):
-            more = search.filled(more) or more
+            more = search.relearned(more) or more
             if more is not best and _rank(more) >= (True, LEAST_FILLED):
                 return more
     return best if _rank(best) >= (True, LEAST) else None
 
 
-def _filled(search: _Learning, tried: Tried) -> Independent | None:
+def _of_shapes(search: _Learning, tried: Tried) -> Independent | None:
     """What `independent` finds of shapes: a few hundred draws do not show the tail of their weights, and a mixture is
     filled as soon as there is one that is not `ENOUGH_SHAPE`.
     """
@@ -158,9 +158,9 @@ class _Learning:
             return None, tried
         return Independent(mixture, _resampled(x, weights, self.walkers, self.rng), found), tried
 
-    def filled(self, best: Independent) -> Independent | None:
+    def relearned(self, best: Independent) -> Independent | None:
         """The mixture with what it lacks, beside one that is learned from all that this took to find."""
-        whole, tried = self._filled(best)
+        whole, tried = self._filling(best)
         states = _resampled(whole.x, whole.log_weights, self.walkers, self.rng)
         fitted, _ = self.learned(tried, states, LEARN_MORE)
         mixture = joined([(fitted, FITTED), (whole.mixture, 1 - FITTED)])
@@ -168,10 +168,10 @@ class _Learning:
 
     def completed(self, best: Independent, tried: Tried) -> tuple[Independent | None, Tried]:
         """The mixture with what it lacks, and what this took to find with what was tried."""
-        whole, more = self._filled(best)
+        whole, more = self._filling(best)
         return self.judged(whole.mixture, tried.joined(more), CHECKED_SHAPES)
 
-    def _filled(self, best: Independent) -> tuple[Filled, Tried]:
+    def _filling(self, best: Independent) -> tuple[Filled, Tried]:
         solved: list[Tried] = []
 
         def log_density(x: Array) -> Array:

@@ -26,7 +26,8 @@ NEWTON, SHORT = 6, 1e-5
 """Steps for the largest value over t at most, and the last one: of so short a step the exponential is a polynomial."""
 LEAST = 1e-300  # of a variance
 LEFT, RIGHT = 8.0, 5.0
-MOST_LEFT_OUT = 0.5
+"""Standard deviations below and above the peak of t between which its nodes lie."""
+MOST_LEFT_OUT = 0.5  # by Laplace's method, of the integral: beyond it the next term is no small number either
 
 
 @compiled(error_model="numpy")

@@ -15,8 +15,8 @@ ROWS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluated:
-    """r (B, N) N and dr/dx (B, N, k) of an objective without weights; the last few points are not solved again."""
+class RememberingObjective:
+    """r (B, N) N and dr/dx (B, N, k) of an objective without weights; it does not solve its last few points again."""
 
     objective: Objective
     _rows: Lately[bytes, tuple[Array, Array]] = field(default_factory=lambda: Lately(ROWS), init=False, repr=False)
@@ -37,7 +37,7 @@ class Evaluated:
         return found
 
 
-def together(asked: Sequence[tuple[Evaluated, Array]]) -> list[tuple[Array, Array]]:
+def together(asked: Sequence[tuple[RememberingObjective, Array]]) -> list[tuple[Array, Array]]:
     """r (B, N) and dr/dx (B, N, k) of each, at x (B, k), solved side by side; all are of one measurement."""
     found = {i: known for i, (e, x) in enumerate(asked) if (known := e.known(x)) is not None}
     rest = [i for i in range(len(asked)) if i not in found]
