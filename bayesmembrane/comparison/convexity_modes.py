@@ -14,6 +14,7 @@ from scipy.special import logsumexp
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.sampling.convergence import effective_draws
+from bayesmembrane.calibration.sampling.proposals.collapsed import Collapsed, collapsed
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
 from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.ground.errors import SettingsError
@@ -85,8 +86,9 @@ def by_convexity(
         starts = starting_points(free, rng, 2, STARTS, Outcomes()).reshape(-1, free.size)
     except SettingsError:
         starts = first[:0]
-    target = _Target(free, posterior.hypothesis.convexity if WITHIN in masses else None)
-    found = _adapted(target, around(np.concatenate([first, starts]), rng), FREE.name, ROUNDS, rng)
+    target = _Target(free, posterior.hypothesis.convexity if WITHIN in masses else None, collapsed(free))
+    near = target.part(np.concatenate([first, starts]))
+    found = _adapted(target, around(near, rng), FREE.name, ROUNDS, rng)
     own, rows = (posterior.hypothesis.convexity.name, log_evidence, sd), []
     for mode in masses:
         part = found if found.ess(mode) >= LEAST_ESS else _again(target, found, mode, rng)
@@ -96,10 +98,43 @@ def by_convexity(
 
 @dataclass(frozen=True, eq=False)
 class _Target:
-    """A posterior without convexity prior, and the mode that is also to be seen within the range fitted."""
+    """A posterior without convexity prior, and the mode that is also to be seen within the range fitted.
+
+    Of the ``shape`` alone where modulus and noise can be integrated out, for no mode hangs on them.
+    """
 
     free: Posterior
     within: ConvexityMode | None
+    shape: Collapsed | None
+
+    @property
+    def size(self) -> int:
+        return self.free.size if self.shape is None else self.shape.size
+
+    def part(self, x: Array) -> Array:
+        """The coordinates that are drawn, of all (B, k)."""
+        return x if self.shape is None else x[:, 1:-1]
+
+    def solved(self, x: Array) -> tuple[Array, Mapping[str, NDArray[np.bool_]]]:
+        """ln p (B,) of no convexity at x (B, m), and which modes they meet."""
+        whole = x if self.shape is None else self.shape.whole(x)
+        prediction = self.free.forward(whole)
+        ok, lp = prediction.ok, np.full(len(x), -np.inf)
+        if np.any(ok):
+            with np.errstate(over="ignore", invalid="ignore"):
+                lp[ok] = self._density(whole[ok], x[ok], prediction.force[ok])
+        inside = {n: self.free.prior.inside(prediction, m) for n, m in MODES.items()}
+        if self.within is not None:
+            inside[WITHIN] = self.free.prior.inside(self.free.forward(whole, reached=False), self.within)
+        return np.where(np.isnan(lp), -np.inf, lp), inside
+
+    def _density(self, whole: Array, x: Array, force: Array) -> Array:
+        if self.shape is not None:
+            return self.shape.given(force / np.exp(whole[:, :1]), x)
+        noise = self.free.noise_at(whole, force)
+        residual = self.free.measurement.force - force
+        log_likelihood = noise.log_likelihood(residual, self.free.hypothesis.noise_coordinates(whole))
+        return self.free.prior.log_density(whole) + log_likelihood
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,27 +172,16 @@ class _Weighted:
 
 
 def _weigh(target: _Target, g: Mixture, count: int, rng: np.random.Generator) -> _Weighted:
-    x, free = g.draw(rng, count), target.free
-    prediction = free.forward(x)
-    log_likelihood = np.full(count, -np.inf)
-    ok = prediction.ok
-    if np.any(ok):
-        noise = free.hypothesis.noise_coordinates(x[ok])
-        with np.errstate(over="ignore", invalid="ignore"):
-            bound = free.noise_at(x[ok], prediction.force[ok])
-            log_likelihood[ok] = bound.log_likelihood(free.measurement.force - prediction.force[ok], noise)
-    log_weight = free.prior.log_density(x) + log_likelihood - g.log_density(x)
-    inside = {n: free.prior.inside(prediction, m) for n, m in MODES.items()}
-    if target.within is not None:
-        inside[WITHIN] = free.prior.inside(free.forward(x, reached=False), target.within)
-    return _Weighted(x, np.where(np.isnan(log_weight), -np.inf, log_weight), inside)
+    x = g.draw(rng, count)
+    lp, inside = target.solved(x)
+    return _Weighted(x, lp - g.log_density(x), inside)
 
 
 def _adapted(target: _Target, g: Mixture, mode: str, rounds: int, rng: np.random.Generator) -> _Weighted:
     """The last draws of a proposal that was fitted ``rounds`` times to what it found of ``mode``."""
     for _ in range(rounds):
         found = _weigh(target, g, EACH, rng)
-        if found.ess(mode) < target.free.size + 2:
+        if found.ess(mode) < target.size + 2:
             break
         g = around(found.resampled(mode, EACH, rng), rng)
     return _weigh(target, g, LAST, rng)
@@ -165,7 +189,7 @@ def _adapted(target: _Target, g: Mixture, mode: str, rounds: int, rng: np.random
 
 def _again(target: _Target, found: _Weighted, mode: str, rng: np.random.Generator) -> _Weighted:
     """Draws around those few that meet ``mode``, if there are enough to begin with."""
-    if found.ess(mode) < target.free.size + 2:
+    if found.ess(mode) < target.size + 2:
         return found
     return _adapted(target, around(found.resampled(mode, EACH, rng), rng), mode, 2, rng)
 

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp
 
 from bayesmembrane.app.demo import shipped_measurement
 from bayesmembrane.calibration.posterior import Posterior
@@ -12,7 +13,7 @@ from bayesmembrane.calibration.sampling.walk import Settings, run_ensembles
 from bayesmembrane.comparison.convexity_modes import by_convexity
 from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.nested import nested
-from bayesmembrane.comparison.evidence.target import PosteriorTarget
+from bayesmembrane.comparison.evidence.target import PosteriorTarget, fewest
 from bayesmembrane.comparison.prior_widths import prior_widths, scaled
 from bayesmembrane.physics.hypothesis import hypothesis
 from tests.statistics.cubature import log_evidence
@@ -65,6 +66,17 @@ def test_nested_sampling_is_right_within_three_standard_errors(name):
     found = nested(PosteriorTarget(posterior(name)), 212, tolerance=0.15)
     assert found.sd <= 0.15
     assert abs(found.log_evidence - exact(name)) < 3 * found.sd
+
+
+@pytest.mark.parametrize(
+    ("name", "range_name"), [("gent", "OP1"), ("gent", "OP2"), ("mooney_rivlin", "OP1"), ("mooney_rivlin", "OP2")]
+)
+def test_the_shape_alone_has_the_evidence_of_all_coordinates(name, range_name):
+    target = fewest(posterior(name, range_name=range_name))
+    assert target.dimension == 1
+    u = (np.arange(4000) + 0.5) / 4000
+    found = target.evaluate(target.prior_transform(u[:, None])).log_likelihood
+    assert logsumexp(found) - np.log(u.size) == pytest.approx(exact(name, range_name=range_name), abs=0.01)
 
 
 # Films that are not convex take long to be solved: "elliptic" allows many, and "none" all.

@@ -29,6 +29,7 @@ def bridge(
     seed: int = 0,
     effective: float | None = None,
     log_posterior: Array | None = None,
+    searched: Target | None = None,
 ) -> EvidenceEstimate:
     """Z = E_g[p h] / E_posterior[g h] for p = prior x likelihood, a normalised g, and h = 1 / (s1 p + s2 Z g).
 
@@ -43,6 +44,8 @@ def bridge(
     draws : (E, S, W, k) steps of W walkers of E ensembles, or (n, k) in the order in which they were drawn
     effective : what n flat draws are worth; needed with them
     log_posterior : log prior + log likelihood at the draws, if it is known; it saves evaluations
+    searched : the same integral over fewer coordinates, if there is one, in which modes are searched where draws are
+        given
 
     The standard error counts the spread of both averages, with the autocorrelation of the draws, and is never less than
     what the two halves differ by. X.-L. Meng, W. H. Wong, Statistica Sinica 6 (1996) 831; S. Frühwirth-Schnatter,
@@ -51,7 +54,8 @@ def bridge(
     Raises `SettingsError` for draws of another shape, fewer than 200 of them, or ones that the posterior rules out.
     """
     problem, rng = Problem(target), np.random.default_rng([seed, 4])
-    modes = search(problem, np.random.default_rng([seed, 10]))
+    sought = problem if searched is None else Problem(searched)
+    modes = search(sought, np.random.default_rng([seed, 10]))
     check: tuple[float, float] | None = None
     if draws is None:
         halves, check = _own(problem, modes, rng)
@@ -64,7 +68,8 @@ def bridge(
         # The way from the prior gives an estimate of its own, less exact: a gross difference is an error of either.
         sd = max(sd, 0.5 * (abs(value - check[0]) - 2.0 * check[1]))
     parts, missed = tuple(z for z, _ in found), modes.beyond(value, sd)
-    return EvidenceEstimate(value, sd, problem.evaluations, problem.seconds, parts, modes.coverage, missed)
+    evaluations = problem.evaluations + (0 if searched is None else sought.evaluations)
+    return EvidenceEstimate(value, sd, evaluations, problem.seconds, parts, modes.coverage, missed)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,13 +9,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from bayesmembrane.calibration.posterior import Posterior, weighed
+from bayesmembrane.calibration.posterior import Densities, Posterior, weighed
+from bayesmembrane.calibration.sampling.proposals.collapsed import Collapsed, collapsed
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 
 SURE = 0.99
 POINTS = 1 << 15  # of the prior from which modes are searched
-FILMS = 1 << 11  # the same for films, which take a millisecond each
+FILMS, SHAPES = 1 << 11, 1 << 10  # the same for films, and for shapes, of which fewer fill the prior as densely
 HOPELESS = 50_000  # draws of the prior of which none is possible
 
 
@@ -58,6 +59,10 @@ class PosteriorTarget:
     def dimension(self) -> int:
         return self.posterior.size
 
+    def part(self, x: Array) -> Array:
+        """The coordinates of this target of x (B, k): all."""
+        return x
+
     def log_prior(self, x: Array) -> Array:
         return self.posterior.log_prior(x)
 
@@ -70,6 +75,42 @@ class PosteriorTarget:
     def evaluate(self, x: Array) -> Any:
         """Both at once, from one solution of the film."""
         return weighed(self.posterior, x)
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeTarget:
+    """The same integral over the shape of the curve alone: modulus and noise are integrated out, to 2e-4 of ln Z."""
+
+    shape: Collapsed
+    points: int = SHAPES
+
+    @property
+    def dimension(self) -> int:
+        return self.shape.size
+
+    def part(self, x: Array) -> Array:
+        """The coordinates (B, k - 2) of this target of x (B, k)."""
+        return np.asarray(x[:, 1:-1])
+
+    def log_prior(self, x: Array) -> Array:
+        return self.evaluate(x).log_prior
+
+    def log_likelihood(self, x: Array) -> Array:
+        return self.evaluate(x).log_likelihood
+
+    def prior_transform(self, u: Array) -> Array:
+        half = np.full((len(u), 1), 0.5)
+        return self.part(self.shape.posterior.prior.transform(np.concatenate([half, u, half], axis=1)))
+
+    def evaluate(self, x: Array) -> Densities:
+        """Both at once, from one solution of the film."""
+        return weighed(self.shape, x)
+
+
+def fewest(posterior: Posterior) -> PosteriorTarget | ShapeTarget:
+    """The integral of a posterior over as few coordinates as there can be."""
+    shape = collapsed(posterior)
+    return PosteriorTarget(posterior) if shape is None else ShapeTarget(shape)
 
 
 @dataclass(frozen=True)
