@@ -216,7 +216,10 @@ def _waves(m: Measurement) -> _Family:
     if moving >= FOREIGN.least_points:  # a wave of the deflection stands still in a hold, like the disc
         places.append(("deflection", m.deflection, _frequencies(moving)))
     phase = np.concatenate([_phase(place, frequencies) for _, place, frequencies in places], axis=1)
-    both = np.stack([np.cos(phase), np.sin(phase)], axis=2)
+    both = np.empty((*phase.shape, 2))  # filled in place: these are the largest arrays of a diagnosis
+    np.cos(phase, out=both[..., 0])
+    np.sin(phase, out=both[..., 1])
+    both *= size
     periods = [(against, float(np.ptp(place)) / f) for against, place, waves in places for f in waves.tolist()]
 
     def told(found: Foreign, best: int, _: float) -> Foreign:
@@ -224,7 +227,7 @@ def _waves(m: Measurement) -> _Family:
         against, period = periods[best]
         return replace(found, size=float(np.max(np.abs(found.trace))), period=period, against=against)
 
-    return _Family(WAVE, np.asarray(size * both.reshape(len(m), -1)), told, 2)
+    return _Family(WAVE, both.reshape(len(m), -1), told, 2)
 
 
 def _phase(place: Array, frequencies: Array) -> Array:

@@ -107,7 +107,7 @@ def exchanged(
             out.add(candidate(with_effects(base.hypothesis, [effect]), end.get(names, -60.0)))
 
     monkeypatch.setattr(growth, "first_order", lambda _, base, effect: promised[effect.name])
-    monkeypatch.setattr(growth, "_add", add)
+    monkeypatch.setattr(growth, "_add_effects", add)
     visible = [components("effects")[n]() for n in ("friction", "tearing", *promised)]
     case = SimpleNamespace(null=candidate(claim(), 0.0), visible=visible)
     grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, SimpleNamespace(at=lambda *_: None))))
