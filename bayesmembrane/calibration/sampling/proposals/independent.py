@@ -23,11 +23,12 @@ ROUNDS, EACH = 3, 400
 """Rounds at most, and draws of the mixture that are solved in each."""
 ENOUGH, ENOUGH_SHAPE, ENOUGH_FILLED = 0.5, 0.75, 0.25
 """A proposal of this efficiency is good enough; one of shapes of the second, and of the third once it is filled."""
-LEAST, LEAST_FILLED = 0.25, 0.08
+LEAST, LEAST_FILLED, LEAST_SHAPE = 0.25, 0.08, 0.02
 """A chain of less than the first is stuck for so long that ensembles are as fast; a mixture that has been filled may be
-worth less, for its weights have no long tail: what holds it up is short, and many films are solved at once."""
+worth less, for its weights have no long tail: what holds it up is short, and many films are solved at once. Where one
+of shapes fails, ensembles have to walk along a narrow valley: they take a thousand times as many films as this."""
 FILLINGS, HOPELESS = 2, 0.02
-"""A mixture is filled so often at most, and not at all if it is worth less than this."""
+"""A mixture of all coordinates is filled so often at most, and not at all if it is worth less than this."""
 FITTED = 0.6  # weight of what is fitted to draws beside the mixture that is filled
 CHECKED, CHECKED_SHAPES = 2000, 1000  # draws that judge it
 DEPTH = 6.0
@@ -37,7 +38,9 @@ LEARN_FROM, LEARN_MORE = 800, 2000
 WALKERS, BURN, SNAPSHOTS, APART = 80, 100, 6, 25
 """Of the walk on the emulator: its walkers for each coordinate, steps to begin with, and snapshots so many steps apart:
 of what they give a mixture has about two components for each coordinate."""
-SHAPES = 100  # walkers where they stand for shapes
+SHAPES, MORE = 100, 4
+"""Walkers where they stand for shapes, and how many times as many snapshots where a first mixture was not enough: a
+narrow curved valley takes more components."""
 STATES = 256  # of those that walks may begin at
 
 
@@ -108,9 +111,9 @@ def _of_shapes(search: _Learning, tried: Tried) -> Independent | None:
     """
     found: list[Independent] = []
     with suppress(np.linalg.LinAlgError):
-        for _ in range(ROUNDS):
-            now, tried = search.round(tried)
-            if now is None or now.worth.efficiency < HOPELESS:
+        for turn in range(ROUNDS):
+            now, tried = search.round(tried, SNAPSHOTS * (MORE if turn else 1))
+            if now is None:
                 continue
             if _rank(now) >= (True, ENOUGH_SHAPE):
                 return now
@@ -120,7 +123,7 @@ def _of_shapes(search: _Learning, tried: Tried) -> Independent | None:
                 if _rank(more) >= (True, ENOUGH_FILLED):
                     return more
     best = max(found, key=_rank, default=None)
-    return best if best is not None and _rank(best) >= (True, LEAST_FILLED) else None
+    return best if best is not None and _rank(best) >= (True, LEAST_SHAPE) else None
 
 
 def _rank(found: Independent) -> tuple[bool, float]:
@@ -140,12 +143,12 @@ class _Learning:
         """On the emulator."""
         return SHAPES if isinstance(self.posterior, Collapsed) else WALKERS * self.posterior.size
 
-    def round(self, tried: Tried) -> tuple[Independent | None, Tried]:
+    def round(self, tried: Tried, snapshots: int = SNAPSHOTS) -> tuple[Independent | None, Tried]:
         """A mixture learned from what was tried, and what `EACH` draws say of it."""
         # Not the last round's draws by their weights: of a bad mixture one of them may outweigh all others.
         good = tried.possible
         states = good.x[tempered(good.log_posterior, self.walkers / 2, self.walkers, self.rng)]
-        return self.judged(widened(*self.learned(tried, states, LEARN_FROM)), tried, EACH)
+        return self.judged(widened(*self.learned(tried, states, LEARN_FROM, snapshots)), tried, EACH)
 
     def judged(self, mixture: Mixture, tried: Tried, count: int) -> tuple[Independent | None, Tried]:
         """What ``count`` draws say of a mixture, None if none is possible, and they with what was tried."""
@@ -180,7 +183,7 @@ class _Learning:
 
         return filled(best.mixture, log_density, self.rng), reduce(Tried.joined, solved)
 
-    def learned(self, tried: Tried, states: Array, most: int) -> tuple[Mixture, Array]:
+    def learned(self, tried: Tried, states: Array, most: int, snapshots: int = SNAPSHOTS) -> tuple[Mixture, Array]:
         """A mixture for the draws of an emulator, or for the ``states`` where there is none, and those draws."""
         draws = states
         with suppress(np.linalg.LinAlgError):
@@ -188,7 +191,7 @@ class _Learning:
             seen = Allowed.of(tried.x, tried.log_posterior > -np.inf)
             emulator = emulate(self.posterior, near.x, self.rng, seen, _solved(near))
             if emulator is not None:
-                draws = _walked(emulator, states, self.rng)
+                draws = _walked(emulator, states, self.rng, snapshots)
         return fit_mixture(_parted(draws, self.rng), self.rng), draws
 
 
@@ -211,10 +214,10 @@ def _near(tried: Tried, most: int, rng: np.random.Generator) -> NDArray[np.intp]
     return np.asarray(rng.permutation(order[:enough])[:most])
 
 
-def _walked(emulator: Emulator, states: Array, rng: np.random.Generator) -> Array:
+def _walked(emulator: Emulator, states: Array, rng: np.random.Generator, snapshots: int) -> Array:
     x, _ = emulator.walk(states, rng, BURN)
     parts = [x]
-    for _ in range(SNAPSHOTS):
+    for _ in range(snapshots):
         x, _ = emulator.walk(x, rng, APART)
         parts.append(x)
     return np.concatenate(parts)
