@@ -252,6 +252,16 @@ class GrowthThresholds:
     """Times that effects of the most probable set are exchanged for others, at most."""
     exchanged: int = 2
     """Effects that each of them is exchanged for."""
+    pairs: int = 10
+    """Sets that two effects promise to complete together, and that nobody fitted, at most."""
+    pairs_beside: int = 4
+    """Sets of one effect beside which two more are looked at together."""
+    pairs_reach: float = 6.0
+    """ln of the Bayes factor that two effects may promise less than the best two."""
+    searched_again: int = 4
+    """Sets of each size that are searched for from all of their parts."""
+    again_reach: float = 12.0
+    """ln of the Bayes factor, as far as factors count, behind the best of all, beyond which they are not."""
     worth: float = 1e-3
     """Of the probability of all smaller sets: below it, larger sets are not looked at."""
     round_off: float = 3e-6

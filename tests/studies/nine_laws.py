@@ -206,7 +206,7 @@ def page(rows: list[dict[str, Any]]) -> str:
         "",
         "arXiv 2509.16040 asks this of sparse regressions, three of them by three criteria (nine algorithms), with 5 "
         "and 10 % noise. How many states its curves have could not be read where this was written (its abstract and "
-        "summaries alone could), so that two numbers of states are shown.",
+        "summaries alone could), so that several numbers of states are shown.",
     ]
     for states in sorted({r["states"] for r in rows}, reverse=True):
         parts += _section(states, [r for r in rows if r["states"] == states])

@@ -14,6 +14,7 @@ from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.weighing import Sought, Weighing, starts_with
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
+from bayesmembrane.diagnosis.explanation.together import gains_of_pairs
 from bayesmembrane.diagnosis.explanation.twins import swapped
 from bayesmembrane.diagnosis.thresholds import GROWTH, SAMPLED, TWINS
 from bayesmembrane.ground.parameters import Array
@@ -108,6 +109,7 @@ def grown(case: DiagnosisCase) -> Grown:
     if _grow(out):
         _with_less(out)
     _with_exchanged(out)
+    _with_pairs(out)
     _with_twins(out)
     _checked(out)
     return out
@@ -211,6 +213,56 @@ def _exchanges(out: Grown, best: Candidate, name: str) -> list[tuple[Candidate, 
     gains = {e.name: first_order(out.search, less, e) for e in others}
     others.sort(key=lambda e: -gains[e.name])
     return [(less, effect) for effect in others[: GROWTH.exchanged]]
+
+
+def _with_pairs(out: Grown) -> None:
+    """Sets that two effects promise to complete together, and large ones from each of their parts.
+
+    An effect that looks like another one as long as it is alone is no set to grow from, and a search that goes on from
+    one part of a set may end where another does not. Sets with all of the best one and more were grown from it.
+    """
+    if out.case.question.quick or not out.of_size(2):
+        return
+    before = out.best
+    sought = _promising_pairs(out, list(out.case.plain.values()))
+    sought += _promising_pairs(out, out.best_of_each_set(1)[: GROWTH.pairs_beside])
+    near = [c for size in range(2, BELIEFS.most + 1) for c in out.best_of_each_set(size)[: GROWTH.searched_again]]
+    reach, best = GROWTH.again_reach / out.counts, frozenset(before.names)
+    sought += [frozenset(c.names) for c in near if before.log_evidence - c.log_evidence < reach]
+    others = [names for names in dict.fromkeys(sought) if not best <= names]
+    _add_effects(out, [step for names in others for step in _last_steps(out, names)])
+    for size in range(2, BELIEFS.most + 1):
+        if out.best is not before:
+            _with_other_energies(out, size)
+        out.polish(size)
+
+
+def _promising_pairs(out: Grown, bases: Sequence[Candidate]) -> list[frozenset[str]]:
+    """Sets that nobody fitted of one of ``bases`` and two effects more, by what they promise to first order."""
+    tried, promised = {names for _, names in out.found}, dict[frozenset[str], float]()
+    for base in bases:
+        here = out.found[_key(base)]
+        rest = [e for e in out.case.visible if e.name not in here.names]
+        for pair, gain in gains_of_pairs(out.search, here, rest).items():
+            names = frozenset(here.names) | pair
+            promised[names] = max(promised.get(names, -np.inf), here.log_evidence + gain)
+    first = max(promised.values(), default=0.0)
+    order = sorted(promised, key=lambda names: -promised[names])
+    near = [names for names in order if names not in tried and promised[names] > first - GROWTH.pairs_reach]
+    return near[: GROWTH.pairs]
+
+
+def _last_steps(out: Grown, names: frozenset[str]) -> list[tuple[Candidate, Effect]]:
+    """The sets that lack one of ``names``, each with the most probable energy that it was fitted with, and that one."""
+    known = {e.name: e for e in out.case.effects}
+    parts: dict[str, Candidate] = {}
+    for (_, own), c in out.found.items():
+        lacks = names - own
+        if own < names and len(lacks) == 1:
+            name = next(iter(lacks))
+            if name in known and (name not in parts or c.log_evidence > parts[name].log_evidence):
+                parts[name] = c
+    return [(base, known[name]) for name, base in parts.items()]
 
 
 def _with_twins(out: Grown) -> None:

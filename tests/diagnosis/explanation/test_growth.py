@@ -10,7 +10,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation import growth
 from bayesmembrane.diagnosis.explanation.case import OpenCase
-from bayesmembrane.diagnosis.explanation.growth import Grown, _with_exchanged, _with_less
+from bayesmembrane.diagnosis.explanation.growth import Grown, _last_steps, _promising_pairs, _with_exchanged, _with_less
 from bayesmembrane.diagnosis.thresholds import GROWTH
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
@@ -132,3 +132,34 @@ def test_a_better_set_that_is_found_by_that_is_gone_on_from(monkeypatch: pytest.
     asked = exchanged(monkeypatch, PROMISED, {better: -2.0})
     assert len(asked) == len(set(asked))
     assert frozenset({"tearing", "clamp_slip"}) in asked  # beside what is left of it
+
+
+def several(*found: tuple[tuple[str, ...], float]) -> Grown:
+    """A search that has found these sets, with effects of the library to look for."""
+    known = [components("effects")[n]() for n in ("friction", "mullins", "tearing", "clamp_slip")]
+    case = SimpleNamespace(null=candidate(claim(), 0.0), effects=known, visible=known)
+    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, None)))
+    for names, z in found:
+        grown.add(candidate(claim(*names), z))
+    return grown
+
+
+def test_a_set_is_searched_for_from_each_of_its_parts_that_was_found() -> None:
+    grown = several(((), -90.0), (("friction",), -40.0), (("tearing",), -50.0), (("friction", "mullins"), -10.0))
+    steps = _last_steps(grown, frozenset({"friction", "mullins", "tearing"}))
+    assert [(sorted(base.names), effect.name) for base, effect in steps] == [(["friction", "mullins"], "tearing")]
+    steps = _last_steps(grown, frozenset({"friction", "tearing"}))
+    assert {(*base.names, effect.name) for base, effect in steps} == {("friction", "tearing"), ("tearing", "friction")}
+
+
+def test_pairs_that_nobody_fitted_are_asked_for_by_what_they_promise(monkeypatch: pytest.MonkeyPatch) -> None:
+    promised = {
+        frozenset({"friction", "mullins"}): 50.0,  # fitted
+        frozenset({"tearing", "clamp_slip"}): 49.0,
+        frozenset({"mullins", "tearing"}): 49.5,
+        frozenset({"friction", "tearing"}): 50.0 - 1.1 * GROWTH.pairs_reach,
+    }
+    monkeypatch.setattr(growth, "gains_of_pairs", lambda *_: promised)
+    grown = several(((), -90.0), (("friction", "mullins"), -41.0))
+    (plain,) = grown.of_size(0)
+    assert _promising_pairs(grown, [plain]) == [{"mullins", "tearing"}, {"tearing", "clamp_slip"}]

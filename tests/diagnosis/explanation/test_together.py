@@ -1,0 +1,63 @@
+"""What two effects promise together equals what two further columns bring to the linear model."""
+
+import numpy as np
+import pytest
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.evidence import Block, extended
+from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
+from bayesmembrane.diagnosis.explanation.growth import first_order
+from bayesmembrane.diagnosis.explanation.together import gains_of_pairs
+from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.annulus import Annulus
+from tests.diagnosis.curves import white_noise
+from tests.generator.film import Film
+
+SD = 0.004
+OFFSETS = [components("effects")[n]() for n in ("force_offset", "zero_offset")]
+
+
+@pytest.fixture(scope="module")
+def fitted() -> tuple[Search, Candidate]:
+    """A film whose zeros are both off: one hides the other."""
+    rng, path = np.random.default_rng(61), np.linspace(0.0, 0.03, 91)[1:]
+    force = Film("neo_hookean", (8.0,), 0.010, 0.035, 0.04).force(path + 2e-4) - 0.01
+    m = Measurement(path, force + SD * rng.standard_normal(path.size), Annulus(0.010, 0.035), Specimen("film", 5e-5))
+    search, plain = Search(m, white_noise(m, SD, 80.0)), hypothesis("neo_hookean")
+    found = search.fit(plain, search.material_starts(plain))
+    assert found is not None
+    return search, found
+
+
+def columns(search: Search, base: Candidate) -> Array:
+    """Slopes of both offsets by their expected sizes, which have one shape each."""
+    each = [(slopes_of_effect(search, base, e), float(search.expected_sizes(e)[0])) for e in OFFSETS]
+    assert all(len(slopes) == 1 for slopes, _ in each)
+    return np.column_stack([slopes[0][0] * size for slopes, size in each])
+
+
+def test_two_at_once_equal_two_further_columns(fitted: tuple[Search, Candidate]) -> None:
+    search, base = fitted
+    model, white = search.linear(base), search.noise.white(columns(search, base))
+    usual = np.minimum(base.theta, model.priors[:, 0])
+    here = model.log_density(base.theta).value
+    more = extended(model, [Block(white)])
+    expected = max(more.log_density(theta).value - here for theta in (base.theta, usual))
+    assert gains_of_pairs(search, base, OFFSETS) == {
+        frozenset(("force_offset", "zero_offset")): pytest.approx(expected, abs=0.01)
+    }
+
+
+def test_two_promise_more_than_either_where_each_hides_the_other(fitted: tuple[Search, Candidate]) -> None:
+    search, base = fitted
+    (together,) = gains_of_pairs(search, base, OFFSETS).values()
+    assert together > max(first_order(search, base, e) for e in OFFSETS)
+
+
+def test_an_effect_alone_is_no_pair(fitted: tuple[Search, Candidate]) -> None:
+    assert gains_of_pairs(*fitted, OFFSETS[:1]) == {}
+    assert gains_of_pairs(*fitted, []) == {}
