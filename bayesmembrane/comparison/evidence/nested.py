@@ -22,7 +22,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 
 PILOT_LIVE, PILOT_PER_DIMENSION = 150, 30
-LEAST_LIVE, PER_DIMENSION, MOST_LIVE = 50, 10, 4000
+LEAST_LIVE, PER_DIMENSION, MOST_LIVE = 80, 15, 4000
 TOLERANCE, LEAST_SD = 0.13, 1e-3
 PILOTS, THEN, MOST_RUNS = 2, 1, 12
 FROM_DRAWS = 4  # runs at least, where none climbs from the prior: their scatter says what H / N leaves out
