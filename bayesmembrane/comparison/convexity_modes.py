@@ -113,7 +113,7 @@ class _Target:
 
     def part(self, x: Array) -> Array:
         """The coordinates that are drawn, of all (B, k)."""
-        return x if self.shape is None else x[:, 1:-1]
+        return x if self.shape is None else self.shape.part(x)
 
     def solved(self, x: Array) -> tuple[Array, Mapping[str, NDArray[np.bool_]]]:
         """ln p (B,) of no convexity at x (B, m), and which modes they meet."""

@@ -23,7 +23,7 @@ from bayesmembrane.comparison.convexity_modes import WITHIN, ByMode, by_convexit
 from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, SIGMAS, together
 from bayesmembrane.comparison.evidence.nested import ARun, Keep, nested
-from bayesmembrane.comparison.evidence.target import EvidenceEstimate, PosteriorTarget, averaged, fewest
+from bayesmembrane.comparison.evidence.target import EvidenceEstimate, PosteriorTarget, averaged, of_fewest_coordinates
 from bayesmembrane.comparison.leave_out.score import leave_one_out, leave_range_out
 from bayesmembrane.comparison.parts import drop_pieces, kept, run_folder, serves
 from bayesmembrane.comparison.prior_widths import prior_widths
@@ -179,7 +179,7 @@ def _nested(posterior: Posterior, draws: Array, seed: int, tell: Callable[[str],
     rng = np.random.default_rng([seed, 7])
     starts = starting_points(posterior, rng, 2, STARTS, Outcomes()).reshape(-1, posterior.size)
     tolerance = NESTED_SD if posterior.size <= FEW else NESTED_SD_MANY
-    target = fewest(posterior)
+    target = of_fewest_coordinates(posterior)
     return nested(target, seed, tolerance, tell, (target.part(draws), target.part(starts)), keep)
 
 
@@ -224,7 +224,7 @@ def _bridged(posterior: Posterior, run: Run, seed: int) -> EvidenceEstimate:
         seed=seed,
         effective=float(run.status["ess_bulk"]),
         log_posterior=log_posterior,
-        searched=fewest(posterior),
+        searched=of_fewest_coordinates(posterior),
     )
 
 

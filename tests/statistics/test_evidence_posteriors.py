@@ -13,7 +13,7 @@ from bayesmembrane.calibration.sampling.walk import Settings, run_ensembles
 from bayesmembrane.comparison.convexity_modes import by_convexity
 from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.nested import nested
-from bayesmembrane.comparison.evidence.target import PosteriorTarget, fewest
+from bayesmembrane.comparison.evidence.target import PosteriorTarget, of_fewest_coordinates
 from bayesmembrane.comparison.prior_widths import prior_widths, scaled
 from bayesmembrane.physics.hypothesis import hypothesis
 from tests.statistics.cubature import log_evidence
@@ -72,7 +72,7 @@ def test_nested_sampling_is_right_within_three_standard_errors(name):
     ("name", "range_name"), [("gent", "OP1"), ("gent", "OP2"), ("mooney_rivlin", "OP1"), ("mooney_rivlin", "OP2")]
 )
 def test_the_shape_alone_has_the_evidence_of_all_coordinates(name, range_name):
-    target = fewest(posterior(name, range_name=range_name))
+    target = of_fewest_coordinates(posterior(name, range_name=range_name))
     assert target.dimension == 1
     u = (np.arange(4000) + 0.5) / 4000
     found = target.evaluate(target.prior_transform(u[:, None])).log_likelihood

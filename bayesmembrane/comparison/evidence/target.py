@@ -90,7 +90,7 @@ class ShapeTarget:
 
     def part(self, x: Array) -> Array:
         """The coordinates (B, k - 2) of this target of x (B, k)."""
-        return np.asarray(x[:, 1:-1])
+        return self.shape.part(x)
 
     def log_prior(self, x: Array) -> Array:
         return self.evaluate(x).log_prior
@@ -107,7 +107,7 @@ class ShapeTarget:
         return weighed(self.shape, x)
 
 
-def fewest(posterior: Posterior) -> PosteriorTarget | ShapeTarget:
+def of_fewest_coordinates(posterior: Posterior) -> PosteriorTarget | ShapeTarget:
     """The integral of a posterior over as few coordinates as there can be."""
     shape = collapsed(posterior)
     return PosteriorTarget(posterior) if shape is None else ShapeTarget(shape)

@@ -61,6 +61,10 @@ class Collapsed:
         own = np.log(2 * np.pi * self.modulus.sd * self.noise.sd)
         return np.asarray(self.posterior.prior.log_density(self.whole(s)) + own)
 
+    def part(self, x: Array) -> Array:
+        """(B, k - 2) the shapes of x (B, k)."""
+        return x[:, 1:-1]
+
     def whole(self, s: Array) -> Array:
         """(B, k) all coordinates of shapes s (B, k - 2), modulus and noise at the medians of their priors."""
         x = np.empty((len(s), self.posterior.size))

@@ -74,7 +74,7 @@ def independent(posterior: Posterior, tried: Tried, rng: np.random.Generator, co
 
 def _shapes(tried: Tried, shape: Collapsed) -> Tried:
     """The shapes of what was tried, with ln p of those."""
-    x, lp, ok = tried.x[:, 1:-1], tried.log_posterior.copy(), np.isfinite(tried.log_posterior)
+    x, lp, ok = shape.part(tried.x), tried.log_posterior.copy(), np.isfinite(tried.log_posterior)
     if tried.curves is None:
         lp[ok] = weighed(shape, x[ok]).log_posterior
         return Tried(x, lp)
