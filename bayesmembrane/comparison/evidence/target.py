@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -45,8 +45,22 @@ class Target(Protocol):
     def prior_transform(self, u: Array) -> Array: ...
 
 
+class _Evaluated:
+    """A `Target` whose two logarithms come out of one computation."""
+
+    def evaluate(self, x: Array) -> Densities:
+        """Both at once, from one solution of the film."""
+        raise NotImplementedError
+
+    def log_prior(self, x: Array) -> Array:
+        return np.asarray(self.evaluate(x).log_prior)
+
+    def log_likelihood(self, x: Array) -> Array:
+        return np.asarray(self.evaluate(x).log_likelihood)
+
+
 @dataclass(frozen=True, eq=False)
-class PosteriorTarget:
+class PosteriorTarget(_Evaluated):
     """The posterior of a hypothesis as a `Target`: the prior is untruncated times the indicator of convexity.
 
     Its evidence must be divided by the mass that convexity leaves (`JointPrior.masses`).
@@ -63,22 +77,15 @@ class PosteriorTarget:
         """The coordinates of this target of x (B, k): all."""
         return x
 
-    def log_prior(self, x: Array) -> Array:
-        return self.posterior.log_prior(x)
-
-    def log_likelihood(self, x: Array) -> Array:
-        return self.posterior.log_likelihood(x)
-
     def prior_transform(self, u: Array) -> Array:
         return self.posterior.prior.transform(u)
 
-    def evaluate(self, x: Array) -> Any:
-        """Both at once, from one solution of the film."""
+    def evaluate(self, x: Array) -> Densities:
         return weighed(self.posterior, x)
 
 
 @dataclass(frozen=True, eq=False)
-class ShapeTarget:
+class ShapeTarget(_Evaluated):
     """The same integral over the shape of the curve alone: modulus and noise are integrated out, to 2e-4 of ln Z."""
 
     shape: Collapsed
@@ -92,18 +99,11 @@ class ShapeTarget:
         """The coordinates (B, k - 2) of this target of x (B, k)."""
         return self.shape.part(x)
 
-    def log_prior(self, x: Array) -> Array:
-        return self.evaluate(x).log_prior
-
-    def log_likelihood(self, x: Array) -> Array:
-        return self.evaluate(x).log_likelihood
-
     def prior_transform(self, u: Array) -> Array:
         half = np.full((len(u), 1), 0.5)
         return self.part(self.shape.posterior.prior.transform(np.concatenate([half, u, half], axis=1)))
 
     def evaluate(self, x: Array) -> Densities:
-        """Both at once, from one solution of the film."""
         return weighed(self.shape, x)
 
 

@@ -8,13 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects, without_effect
-from bayesmembrane.diagnosis.candidates.evidence import Linear
 from bayesmembrane.diagnosis.candidates.sampled import checked
-from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.weighing import Sought, Weighing, starts_with
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
-from bayesmembrane.diagnosis.explanation.together import gains_of_pairs
+from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pairs
 from bayesmembrane.diagnosis.explanation.twins import swapped
 from bayesmembrane.diagnosis.thresholds import GROWTH, SAMPLED, TWINS
 from bayesmembrane.ground.parameters import Array
@@ -304,38 +302,6 @@ def _promising(out: Grown, base: Candidate, size: int) -> list[Effect]:
     rest.sort(key=lambda e: -gains[e.name])
     promising = [e for e in rest if gains[e.name] > max(GROWTH.promise, gains[rest[0].name] - GROWTH.refit_reach)]
     return promising[: GROWTH.refits] if len(promising) > GROWTH.least_refits else rest[: GROWTH.least_refits]
-
-
-def first_order(search: Weighing, base: Candidate, effect: Effect) -> float:
-    """ln K of a little of ``effect`` beside ``base``, to first order, at the best of several shapes.
-
-    ln K = (s.r)^2 / (s.s + 1) / 2 - ln(1 + s.s) / 2 of the slope s by the expected size, both freed of what the base
-    can follow. A form error that has grown to carry what the effect would explain takes its trace as well: the base
-    with one no larger than usual is tried too, with what that costs.
-    """
-    model = search.linear(base)
-    size = float(search.expected_sizes(effect)[0])
-    slopes = [(slope * size, side) for slope, side in slopes_of_effect(search, base, effect)]
-    if not slopes:
-        return -np.inf
-    white = search.noise.white(np.column_stack([s for s, _ in slopes]))
-    sides = np.array([side if effect.size.one_sided else 0 for _, side in slopes])
-    usual = np.minimum(base.theta, model.priors[:, 0])
-    costs = model.log_density(base.theta).value - model.log_density(usual).value
-    return max(_gain(model, base.theta, white, sides), _gain(model, usual, white, sides) - costs)
-
-
-def _gain(model: Linear, theta: Array, white: Array, sides: Array) -> float:
-    """The best ln K of slopes (N, m), freed of noise, at the sizes ``theta`` (h,) of noise and form error; only of the
-    sign of ``sides`` (m,) where that is not zero.
-    """
-    freed = model.freed(theta, white)
-    along, square = freed.T @ model.data, np.sum(white * freed, axis=0)
-    # Of a slope that the base follows wholly nothing is left but round-off, which may be negative.
-    left = square > GROWTH.round_off * np.sum(white * white, axis=0)
-    along, square = np.where(left, along, 0.0), np.where(left, square, 0.0)
-    allowed = (sides == 0) | (sides * along > 0)
-    return float(np.max(0.5 * along**2 / (square + 1) * allowed - 0.5 * np.log1p(square)))
 
 
 def _add_effects(out: Grown, pairs: Sequence[tuple[Candidate, Effect]]) -> None:

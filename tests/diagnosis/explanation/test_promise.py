@@ -8,8 +8,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import Block, extended
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
-from bayesmembrane.diagnosis.explanation.growth import first_order
-from bayesmembrane.diagnosis.explanation.together import gains_of_pairs
+from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pairs
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import hypothesis
