@@ -14,13 +14,11 @@ from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pairs
 from bayesmembrane.diagnosis.explanation.twins import swapped
+from bayesmembrane.diagnosis.explanation.unfitted import Key
 from bayesmembrane.diagnosis.thresholds import GROWTH, SAMPLED, TWINS
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.hypothesis import Hypothesis
-
-Key = tuple[str, frozenset[str]]
-"""Energy, and all effects."""
 
 
 @dataclass(eq=False)
@@ -56,12 +54,12 @@ class Grown:
         best = max(c.log_evidence for c in self.found.values())
         return BELIEFS.counts(best - self.of_size(0)[0].log_evidence)
 
-    def believed(self, candidate: Candidate) -> float:
-        """ln of the probability of a hypothesis before the data."""
+    def believed(self, candidate: Candidate, energy: str | None = None) -> float:
+        """ln of the probability of a hypothesis before the data; with another ``energy`` if that is given."""
         own = [e.odds for e in candidate.hypothesis.effects if e.name not in self.case.null.names]
         of_set = BELIEFS.log_set(own, [e.odds for e in self.case.visible])
-        energy = candidate.hypothesis.material.name
-        return of_set + BELIEFS.log_energy(energy, self.case.question.energy, len(self.case.plain))
+        of = energy or candidate.hypothesis.material.name
+        return of_set + BELIEFS.log_energy(of, self.case.question.energy, len(self.case.plain))
 
     def of_size(self, size: int) -> list[Candidate]:
         """Those with so many effects beyond the given ones, the most probable first."""

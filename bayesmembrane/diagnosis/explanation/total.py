@@ -16,6 +16,7 @@ from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown
 from bayesmembrane.diagnosis.explanation.promise import first_order
 from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
+from bayesmembrane.diagnosis.explanation.unfitted import Key, unfitted
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
 
@@ -110,7 +111,8 @@ def summed(grown: Grown) -> Total:
     def own(c: Candidate) -> float:
         return counts * c.log_evidence + grown.believed(c)
 
-    raised = _raised(grown, {id(c): own(c) for c in every})
+    others = _other_energies(grown)
+    raised = _raised(grown, {id(c): own(c) for c in every}, others)
 
     def weight(c: Candidate) -> float:
         return own(c) + raised[frozenset(c.names)]
@@ -123,19 +125,21 @@ def summed(grown: Grown) -> Total:
     # What the data do not speak for is neither seen nor excluded, like a further effect that is idle.
     seen = [f for f in found if f.counted(counts) > BELIEFS.supported]
     terms += [(f.base, f.kind, own(f.base) + f.counted(counts) + BELIEFS.log_foreign(kinds)) for f in seen]
-    p = _normalised(np.array([w for _, _, w in terms]))
+    guessed = [(key, w + raised[key[1]] + nothing) for key, w in others.items()]
+    p = _normalised(np.array([*(w for _, _, w in terms), *(w for _, w in guessed)]))
     judged = [
         _judged(grown, c, float(q), grown.believed(c))
-        for (c, kind, _), q in zip(terms, p, strict=True)
+        for (c, kind, _), q in zip(terms, p[: len(terms)], strict=True)
         if kind == NOTHING
     ]
     owners = _owners(grown, [c for c, kind, _ in terms if kind == NOTHING])
+    parts = [(c.hypothesis.material.name, set_name(c, given), kind) for c, kind, _ in terms]
+    parts += [(energy, _joined(names - set(given)), NOTHING) for (energy, names), _ in guessed]
     joint, energies = defaultdict[tuple[str, str], float](float), defaultdict[str, float](float)
-    for (c, kind, _), q in zip(terms, p, strict=True):
-        name = set_name(c, given)
-        joint[owners[name], kind] += BELIEFS.unseen * float(q)
-        joint[name, kind] += (1.0 - BELIEFS.unseen) * float(q)
-        energies[c.hypothesis.material.name] += float(q)
+    for (energy, name, kind), q in zip(parts, p.tolist(), strict=True):
+        joint[owners[name], kind] += BELIEFS.unseen * q
+        joint[name, kind] += (1.0 - BELIEFS.unseen) * q
+        energies[energy] += q
     for name, q in _untried(grown, every, joint).items():
         joint[name, NOTHING] += q
     whole = sum(joint.values())
@@ -175,17 +179,25 @@ def _leaders(every: Sequence[Candidate]) -> list[Candidate]:
     return list(first.values())
 
 
-def _raised(grown: Grown, weights: Mapping[int, float]) -> dict[frozenset[str], float]:
+def _other_energies(grown: Grown) -> dict[Key, float]:
+    """ln weight of the energies that a set was not fitted with."""
+    foretold = unfitted({key: c.log_evidence for key, c in grown.found.items()})
+    some = {names: c for (_, names), c in grown.found.items()}
+    return {key: grown.counts * z + grown.believed(some[key[1]], key[0]) for key, z in foretold.items()}
+
+
+def _raised(grown: Grown, weights: Mapping[int, float], others: Mapping[Key, float]) -> dict[frozenset[str], float]:
     """By set of effects, by how much its ln weight rises where twins of it have more than they can be sure of.
 
-    ``weights`` : ln weight by the identity of a candidate.
+    ``weights`` : ln weight by the identity of a candidate; ``others`` : of what was not fitted.
     """
     plain = grown.found[(grown.case.null.hypothesis.material.name, frozenset(grown.case.null.names))]
     before = max(grown.search.excess(plain), 1e-300)
     total, stands = {}, {}
     for names in {names for _, names in grown.found}:
         same = [c for (_, own), c in grown.found.items() if own == names]
-        total[names] = float(np.logaddexp.reduce([weights[id(c)] for c in same]))
+        rest = [w for (_, own), w in others.items() if own == names]
+        total[names] = float(np.logaddexp.reduce([*(weights[id(c)] for c in same), *rest]))
         best = max(same, key=lambda c: weights[id(c)])
         left = grown.search.excess(best) / before if _plausible(best, grown.search) else np.inf
         stands[names] = Stands(left, best.log_evidence)
