@@ -207,8 +207,16 @@ def _improbable(d: Diagnosis) -> str:
 def _ambiguous(course: Course) -> str:
     d = course.telling
     sure = _certain(d)
-    which = f"only {sure} is certain" if sure else "this curve cannot tell which"
+    which = f"only {sure} is certain" if sure else f"{_in_all(d)}this curve cannot tell which"
     return f"{which}; the first explains {_explained(d)}{_beside(d)}"
+
+
+def _in_all(d: Diagnosis) -> str:
+    """``relaxation has 68 % in all, yet``: effects more probable than not, where sets with others add to their own."""
+    p = d.probabilities
+    likely = [n for n in p.likely() if p.of_effect(n) > p.effects.get(n, 0.0) + WORDS.probable]
+    each = [f"{effect_title(n)} {percent(p.of_effect(n))}" for n in likely]
+    return f"in all {listed(each)}, yet " if each else ""
 
 
 def _unknown(course: Course) -> str:

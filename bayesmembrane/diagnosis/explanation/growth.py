@@ -107,6 +107,7 @@ def grown(case: DiagnosisCase) -> Grown:
     _with_exchanged(out)
     _with_pairs(out)
     _with_twins(out)
+    _with_parts(out)
     _checked(out)
     return out
 
@@ -120,10 +121,9 @@ def _checked(out: Grown) -> None:
     out.case.tell("checking what decides by importance sampling")
     null = (out.case.null.hypothesis.material.name, frozenset(out.case.null.names))
     for _ in range(SAMPLED.most):
-        weights = {key: out.counts * c.log_evidence + out.believed(c) for key, c in out.found.items()}
-        key = null if null in rest else max(rest, key=weights.__getitem__, default=null)
-        share = weights.get(key, -np.inf) - float(np.logaddexp.reduce(list(weights.values())))
-        if key not in rest or (key != null and share < np.log(SAMPLED.decides)):
+        shares = _shares(out)
+        key = null if null in rest else max(rest, key=shares.__getitem__, default=null)
+        if key not in rest or (key != null and shares[key] < np.log(SAMPLED.decides)):
             break
         out.found[key] = checked(out.search, rest.pop(key), out.case.rng)
 
@@ -159,29 +159,50 @@ def _with_less(out: Grown) -> None:
     does not. Without this, effects that do nothing are named for having led the search.
     """
     for size in range(BELIEFS.most, 0, -1):
-        best = max(c.log_evidence for c in out.found.values())
-        starts: dict[Key, Candidate] = {}
-        for start in _lessened(out, size, best):
-            key = _key(start)
-            if key not in starts or start.log_evidence > starts[key].log_evidence:
-                starts[key] = start
-        near = [start for key, start in starts.items() if _worth_a_search(out, key, start, best)]
-        for c in out.search.all_polished(near):
-            out.add(c)
+        best = out.best.log_evidence
+        near = [c for c in out.of_size(size)[: GROWTH.lessened] if best - c.log_evidence < GROWTH.less_reach]
+        _search_on(out, [without_effect(c, name) for c in near for name in _own(out, c)])
+
+
+def _with_parts(out: Grown) -> None:
+    """What has a share in the sum without each of its effects, where that was not fitted with this energy.
+
+    An effect of no size would count as seen where the energy beside it is what explains the curve.
+    """
+    shares = _shares(out)
+    near = [out.found[key] for key, share in shares.items() if share > np.log(SAMPLED.decides)]
+    steps = [(c, name) for c in near for name in _own(out, c)]
+    new = [(c, n) for c, n in steps if (c.hypothesis.material.name, frozenset(c.names) - {n}) not in out.found]
+    _search_on(out, [without_effect(c, name) for c, name in new])
+
+
+def _own(out: Grown, c: Candidate) -> list[str]:
+    """Its effects beyond the given ones."""
+    return [n for n in c.names if n not in out.case.null.names]
+
+
+def _shares(out: Grown) -> dict[Key, float]:
+    """ln of the part that each hypothesis has in the sum of all that were fitted."""
+    weights = {key: out.counts * c.log_evidence + out.believed(c) for key, c in out.found.items()}
+    whole = float(np.logaddexp.reduce(list(weights.values())))
+    return {key: w - whole for key, w in weights.items()}
+
+
+def _search_on(out: Grown, steps: Sequence[tuple[Hypothesis, Array]]) -> None:
+    """From the best of these places for each hypothesis, where it is worth it."""
+    best, starts = out.best.log_evidence, dict[Key, Candidate]()
+    for start in out.search.placed(steps):
+        if start is not None and ((key := _key(start)) not in starts or start.log_evidence > starts[key].log_evidence):
+            starts[key] = start
+    near = [start for key, start in starts.items() if _worth_a_search(out, key, start, best)]
+    for c in out.search.all_polished(near):
+        out.add(c)
 
 
 def _worth_a_search(out: Grown, key: Key, start: Candidate, best: float) -> bool:
     """True for a start that is not far behind the ``best`` of all, nor behind what was found of it before."""
     before = out.found[key].log_evidence if key in out.found else -np.inf
     return start.log_evidence > max(best - GROWTH.less_reach, before - GROWTH.less_gain)
-
-
-def _lessened(out: Grown, size: int, best: float) -> list[Candidate]:
-    """The first hypotheses of this size without one of their effects, the others as they are."""
-    given = out.case.null.names
-    near = [c for c in out.of_size(size)[: GROWTH.lessened] if best - c.log_evidence < GROWTH.less_reach]
-    less = out.search.placed([without_effect(c, name) for c in near for name in c.names if name not in given])
-    return [c for c in less if c is not None]
 
 
 def _with_exchanged(out: Grown) -> None:
@@ -192,7 +213,7 @@ def _with_exchanged(out: Grown) -> None:
     """
     for _ in range(GROWTH.exchanges):
         best = out.best
-        own = [n for n in best.names if n not in out.case.null.names]
+        own = _own(out, best)
         _add_effects(out, [pair for name in own for pair in _exchanges(out, best, name)] if len(own) > 1 else [])
         if best is out.best:
             break
