@@ -33,6 +33,8 @@ from bayesmembrane.words.units import size_in_words
 
 MOST_TOLD = 3
 """Explanations whose probability is told."""
+TELLING = 0.1
+"""By how much an effect must be more probable in all than alone, for both to be told."""
 MOST_SIZES = 3
 """Effects whose size is told with it; what is not told on the first screen is below."""
 FAR_APART = 10.0
@@ -153,7 +155,8 @@ def _probabilities(course: Course) -> tuple[str, ...]:
 def _every(course: Course) -> list[str]:
     d = course.telling
     p = d.probabilities
-    probable = [name for name, q in p.effects.items() if q >= WORDS.probable][:MOST_TOLD]
+    most = MOST_TOLD - bool(d.verdict == "ambiguous" and _in_all(d))  # the first screen has room for so much
+    probable = [name for name, q in p.effects.items() if q >= WORDS.probable][:most]
     sizes = np.cumsum([len(name.split("+")) for name in probable])
     told = [_probable_set(d, n, course, bool(k <= MOST_SIZES)) for n, k in zip(probable, sizes, strict=True)]
     foreign = p.anything_foreign
@@ -206,15 +209,17 @@ def _improbable(d: Diagnosis) -> str:
 
 def _ambiguous(course: Course) -> str:
     d = course.telling
-    sure = _certain(d)
-    which = f"only {sure} is certain" if sure else f"{_in_all(d)}this curve cannot tell which"
+    sure, among = _certain(d), _in_all(d)
+    which = f"only {sure} is certain" if sure else f"{among}this curve cannot tell which"
     return f"{which}; the first explains {_explained(d)}{_beside(d)}"
 
 
 def _in_all(d: Diagnosis) -> str:
-    """``relaxation has 68 % in all, yet``: effects more probable than not, where sets with others add to their own."""
+    """``in all relaxation 68 %, yet``: effects more probable than not, where sets with others add to their own."""
     p = d.probabilities
-    likely = [n for n in p.likely() if p.of_effect(n) > p.effects.get(n, 0.0) + WORDS.probable]
+    if _certain(d):
+        return ""
+    likely = [n for n in p.likely() if p.of_effect(n) > p.effects.get(n, 0.0) + TELLING]
     each = [f"{effect_title(n)} {percent(p.of_effect(n))}" for n in likely]
     return f"in all {listed(each)}, yet " if each else ""
 
