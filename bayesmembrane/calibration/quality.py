@@ -16,6 +16,8 @@ NOTEWORTHY = 1e-3
 """A part of numerical failures above this is reported."""
 SMOOTH = 0.01
 """A p-value of neighbouring residuals below this is reported."""
+RULED_OUT = 3.0
+"""A gain in ln of the posterior density beyond the convexity prior above this is reported."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,8 @@ class Quality:
     alike, alike_p : lag-1 correlation of the residuals along the path, and how often the noise model by itself gives
         one as large; None if nobody looked
     noise : name of the noise model, "" if nobody looked
+    ruled_out : by how much ln of the posterior density is larger at a film that the convexity prior rules out; None if
+        nobody looked
     own_noise, extra_noise : N, stated by the measurement, and the median of the inferred one; None unless it dominates
     """
 
@@ -49,6 +53,7 @@ class Quality:
     alike: float | None = None
     alike_p: float | None = None
     noise: str = ""
+    ruled_out: float | None = None
 
     @property
     def converged(self) -> bool:
@@ -68,7 +73,8 @@ class Quality:
 
 def quality_of(status: Mapping[str, Any], noise_sd: Array) -> Quality:
     """The quality of a run from its ``status``, as it is stored, and its draws of the inferred noise in N, if any."""
-    alike = status.get("checks", {}).get("alike", {})
+    checks = status.get("checks", {})
+    alike = checks.get("alike", {})
     taus = [np.inf if tau is None else float(tau) for tau in status["tau"].values()]
     tally, dominated = status["tally"], bool(status["extra_noise_dominates"])
     return Quality(
@@ -85,6 +91,7 @@ def quality_of(status: Mapping[str, Any], noise_sd: Array) -> Quality:
         alike=alike.get("lag_1"),
         alike_p=alike.get("p_value"),
         noise=alike.get("noise", ""),
+        ruled_out=checks.get("ruled_out"),
     )
 
 

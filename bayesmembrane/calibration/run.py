@@ -21,12 +21,13 @@ import numpy as np
 
 from bayesmembrane.calibration.few import weighing
 from bayesmembrane.calibration.layout import measurement_of
-from bayesmembrane.calibration.outcome import outcome
+from bayesmembrane.calibration.outcome import MOST_DRAWS, outcome
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.prediction_store import read_predictions, write_predictions
 from bayesmembrane.calibration.predictions import Predictions, Wanted, predict_draws
 from bayesmembrane.calibration.quality import Quality, quality_of
 from bayesmembrane.calibration.resume import Origin, check_same, ends, origin
+from bayesmembrane.calibration.ruled_out import ruled_out_gain
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.segments import Segments
 from bayesmembrane.calibration.sampling.walk import (
@@ -241,6 +242,8 @@ class _Work:
         counted = _tally(self.posterior.solve)
         sampled = self._walked(segments)
         data, status = outcome(self.posterior, sampled, self.how.sampling.ess, self.how.seed)
+        x, _ = sampled.draws(MOST_DRAWS)
+        status["checks"]["ruled_out"] = ruled_out_gain(self.posterior, x.reshape(-1, x.shape[-1]), self.how.seed)
         if counted is not None and (now := _tally(self.posterior.solve)) is not None:
             status["cache"] = now.since(counted).summary()
         if segments is None:

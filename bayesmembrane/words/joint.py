@@ -8,7 +8,13 @@ from bayesmembrane.calibration.joint.fit import JointFit
 from bayesmembrane.calibration.joint.run import JointRun
 from bayesmembrane.words.hypothesis import material_title
 from bayesmembrane.words.language import listed, three_digits
-from bayesmembrane.words.sampling import convergence_sentence, failure_sentence, noise_sentence, smooth_sentence
+from bayesmembrane.words.sampling import (
+    convergence_sentence,
+    convexity_sentence,
+    failure_sentence,
+    noise_sentence,
+    smooth_sentence,
+)
 from bayesmembrane.words.seen import seen
 
 
@@ -22,6 +28,8 @@ def sentences(run: JointRun) -> tuple[str, ...]:
     said = [told for told in dict.fromkeys(convergence_sentence(p.quality) for p in run.parts) if told][:1]
     if failed := failure_sentence(run.parts[0].quality):
         said.append(failed)
+    if pressed := convexity_sentence(run.status.get("checks", {}).get("ruled_out")):
+        said.append(pressed)
     for label, part in zip(run.joint.labels, run.parts, strict=True):
         said += [f"{label}: {told}" for told in (noise_sentence(part.quality), smooth_sentence(part.quality)) if told]
     return tuple(said)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from bayesmembrane.calibration.quality import Quality
+from bayesmembrane.calibration.quality import RULED_OUT, Quality
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.calibration.sampling.convergence import LEAST_TAUS
 
@@ -19,6 +19,7 @@ def sentences(quality: Quality) -> tuple[str, ...]:
     said = (
         convergence_sentence(quality),
         failure_sentence(quality),
+        convexity_sentence(quality.ruled_out),
         noise_sentence(quality),
         smooth_sentence(quality),
     )
@@ -44,6 +45,20 @@ def failure_sentence(quality: Quality) -> str:
     return (
         f"{quality.failed} of {quality.evaluated} draws ({share:.2g} %) could not be solved to 1e-6 after every "
         "refinement and count as impossible; if they lie near the posterior, it is narrower than it should be."
+    )
+
+
+def convexity_sentence(gain: float | None) -> str:
+    """That the convexity prior decides, and not the data; "" if a film beyond it would gain little.
+
+    ``gain`` : in ln of the posterior density, of a film that it rules out over the best draw; None if nobody looked.
+    """
+    if gain is None or gain <= RULED_OUT:
+        return ""
+    return (
+        "The convexity prior decides, and not the data: films that it rules out fit better (by at least "
+        f"{gain:.3g} in ln of the posterior density), so that the draws lie at its edge, and the misfit counts as "
+        "noise. Another energy may follow the data; --convexity none lifts the prior."
     )
 
 

@@ -31,3 +31,10 @@ def test_failures_are_told_from_a_tenth_of_a_percent() -> None:
 def test_noise_that_dominates_is_told_with_both_numbers() -> None:
     (sentence,) = sentences(replace(GOOD, own_noise=0.01, extra_noise=0.02))
     assert "(20 mN) exceeds what the measurement states (10 mN)" in sentence
+
+
+def test_a_convexity_prior_that_decides_is_told() -> None:
+    assert sentences(replace(GOOD, ruled_out=1.0)) == ()
+    (sentence,) = sentences(replace(GOOD, ruled_out=10.24))
+    assert sentence.startswith("The convexity prior decides, and not the data")
+    assert "at least 10.2" in sentence

@@ -25,6 +25,7 @@ from bayesmembrane.calibration.outcome import MOST_DRAWS, marginal, outcome, wal
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.resume import check_same
+from bayesmembrane.calibration.ruled_out import ruled_out_gain
 from bayesmembrane.calibration.run import Run, RunSettings, predictions_of
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.growing import changed
@@ -210,7 +211,9 @@ def _made(
         joint=joint,
         x=x,
         log_posterior=lp,
-        status=_status(joint, x, lp, sampled, how) | {"walk": asked["walk"]},
+        status=_status(joint, x, lp, sampled, how)
+        | {"walk": asked["walk"]}
+        | {"checks": {"ruled_out": ruled_out_gain(posterior, x.reshape(-1, x.shape[-1]), how.seed)}},
         parts=parts,
         mass=posterior.prior.mass(posterior.inside, how.seed),
         fingerprint=str(asked["fingerprint"]),

@@ -29,7 +29,7 @@ from bayesmembrane.report.sections.run.tables import coordinates_table, paramete
 from bayesmembrane.words.calibration import convergence, describes, extrapolation, unknown, verdict, warnings
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed, percent, spoken_parameter
-from bayesmembrane.words.sampling import sentences, smooth_sentence
+from bayesmembrane.words.sampling import convexity_sentence, sentences, smooth_sentence
 
 MOST_CORNER = 4000  # draws in a corner plot
 TRUSTED = 0.7  # tail of the weights up to which a prediction without a point can be told from one with it
@@ -109,10 +109,10 @@ def _blocks(s: Shown, compared: Compared | None) -> list[Block]:
 
 
 def _sentences(s: Shown) -> list[str]:
-    smooth = smooth_sentence(s.quality) if s.quality is not None else ""
+    quality = () if s.quality is None else (convexity_sentence(s.quality.ruled_out), smooth_sentence(s.quality))
     told = [
         describes([replace(s.case, points=0)]),
-        smooth,
+        *quality,
         unknown([s.case]),
         extrapolation([s.case]),
         convergence([s.case]),
