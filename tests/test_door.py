@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
@@ -111,3 +112,9 @@ def test_the_lines_of_the_readme_run(tmp_path: Path) -> None:
     assert done.stderr == ""
     page = Path(tmp_path / done.stdout.strip().splitlines()[-1])
     assert page.read_text(encoding="utf-8").lstrip().lower().startswith("<!doctype html")
+
+
+def test_what_is_no_run_makes_no_population() -> None:
+    for wrong, told in (([], "no run to make a population of"), (["chains/x"], "'chains/x' is no run")):
+        with pytest.raises(bm.BayesmembraneError, match=told):
+            bm.population(cast(Any, wrong))

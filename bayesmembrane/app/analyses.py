@@ -39,6 +39,7 @@ from bayesmembrane.diagnosis.joint.diagnose import JointDiagnosis, diagnose_join
 from bayesmembrane.diagnosis.loop import Loop, LoopSettings
 from bayesmembrane.diagnosis.loop import loop as run_loop
 from bayesmembrane.diagnosis.result import Diagnosis
+from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.interrupts import Stop, never
 from bayesmembrane.ground.jobs import Submit, Tell, silent
 from bayesmembrane.ground.parameters import Array
@@ -202,7 +203,9 @@ def compare_joint(claims: Sequence[Joint], work: Work) -> Answer[dict[str, Compa
 
 
 def population(runs: Sequence[Run], work: Work, *, pool: Sequence[str] = ()) -> Answer[Population]:
-    """The population behind the specimens of several runs."""
+    """The population behind the specimens of several runs; raises `SettingsError` without any."""
+    if not runs:
+        raise SettingsError("there is no run to make a population of", remedy="name at least two")
     settings = {"seed": work.seed, "pool": list(pool), "draws": [run.draws_name for run in runs]}
     by, tests = population_of_runs, [r.measurement for r in runs]
     what = asked("population", by, tests, [r.hypothesis for r in runs], settings)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, cast, overload
 
 from bayesmembrane.app import analyses, documents
 from bayesmembrane.app.folders import lying
@@ -194,7 +194,10 @@ def population(
     ``pool`` are coordinates: ``ln_modulus`` and the others of the material unless given; of effects by full names, as
     ``thickness.error``. What is alike is drawn together, what differs is not (partial pooling).
     """
-    return analyses.population(runs, _work(seed, out), pool=pool).result
+    several: list[object] = [runs] if isinstance(runs, Run) else list(runs)
+    if odd := [r for r in several if not isinstance(r, Run)]:
+        raise SettingsError(f"{odd[0]!r:.40} is no run", remedy="give what sample returns, or load its folder")
+    return analyses.population(cast("list[Run]", several), _work(seed, out), pool=pool).result
 
 
 @one_thread

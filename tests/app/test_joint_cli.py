@@ -150,6 +150,10 @@ def test_runs_of_specimens_make_a_population(run: Run, short_walks: None) -> Non
     page = Path("page/index.html").read_text()
     assert "The population of specimens" in page
     assert "90 % bands of its curve" in page
+    (earlier,) = Path("p").glob("*_population_*")
+    code, out, err = run("population", *runs, str(earlier), "--out", "p")
+    assert code == 0
+    assert f"{earlier} is an earlier answer about a population, no run: left out." in " ".join(err.split())
     code, out, err = run("population", runs[0], "--out", "p")
     assert (code, out) == (1, "")
     assert "two specimens at least" in err

@@ -62,5 +62,6 @@ def test_one_that_is_not_convex_is_asked_for_by_one_test_and_by_two() -> None:
 @pytest.mark.parametrize("two", [False, True])
 def test_a_prior_that_asks_nothing_rules_nothing_out(two: bool) -> None:
     claim, m = hypothesis("mooney_rivlin", convexity="none"), sheet(0.16, 0.04, seed=74)
-    posterior = JointPosterior(joint({"one": m, "two": m}, claim)) if two else Posterior(claim, m)
+    other = sheet(0.16, 0.04, seed=75)
+    posterior = JointPosterior(joint({"one": m, "two": other}, claim)) if two else Posterior(claim, m)
     assert ruled_out_gain(posterior, np.zeros((8, posterior.size)), seed=1) is None

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bayesmembrane.app.options import OutputOptions, StoredOption
-from bayesmembrane.app.terminal import answer, say, table
+from bayesmembrane.app.terminal import answer, note, say, table
 
 if TYPE_CHECKING:
     from bayesmembrane.calibration.hierarchy.population import Population
 
 place = 7.5
+EARLIER = "population.json"  # a pattern that names all runs of a folder names what was made of them, too
 
 
 def verb(
@@ -33,7 +34,11 @@ def verb(
     from bayesmembrane.app import analyses
     from bayesmembrane.calibration.run import load_run, run_folders
 
-    runs = [load_run(path) for folder in folders for path in run_folders(folder)]
+    named = [f for f in folders if len(folders) == 1 or not (f / EARLIER).is_file()]
+    for folder in folders:
+        if folder not in named:
+            note(f"{folder} is an earlier answer about a population, no run: left out.")
+    runs = [load_run(path) for folder in named for path in run_folders(folder)]
     names = [name.strip() for name in pool.split(",") if name.strip()]
     found = analyses.population(runs, analyses.Work(output.seed, stored.folder), pool=names)
     answer(found.document, output.as_json, lambda: show(found.result))

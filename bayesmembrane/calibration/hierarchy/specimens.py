@@ -57,7 +57,8 @@ def of_runs(runs: Sequence[Run], pool: Sequence[str] = ()) -> Specimens:
     ``pool`` names coordinates: ``ln_modulus`` and all others of the material, unless given; those of effects by their
     full names, as ``thickness.error``. The draws' mean and covariance, less what the prior put into
     them, S_j^-1 = C_j^-1 - C_0^-1, make the normal likelihood: exact where it is normal, as it is of coordinates that
-    the data tell well. Raises `SettingsError` for runs of different materials, or coordinates that one of them lacks.
+    the data tell well. Raises `SettingsError` for runs of different materials or of the same readings, and for
+    coordinates that one of them lacks.
     """
     if not runs:
         raise SettingsError("there is no run to make a population of", remedy="name at least two")
@@ -69,6 +70,7 @@ def of_runs(runs: Sequence[Run], pool: Sequence[str] = ()) -> Specimens:
                 run.name,
                 "make a population of one material",
             )
+    _each_once(runs)
     own = (LN_MODULUS, *(p.name for p in material.coordinates[1:]))
     names = tuple(pool) or own
     full = [_full(name, material.name, own) for name in names]
@@ -88,6 +90,16 @@ def of_runs(runs: Sequence[Run], pool: Sequence[str] = ()) -> Specimens:
         spread=priors[:, 1],
         skewed=tuple(label for label, f in zip(labels, found, strict=True) if f[2] > SKEWED),
     )
+
+
+def _each_once(runs: Sequence[Run]) -> None:
+    seen = [run.measurement.data_hash for run in runs]
+    for number, (run, own) in enumerate(zip(runs, seen, strict=True)):
+        if own in seen[:number]:
+            raise SettingsError(
+                f"{runs[seen.index(own)].name} and {run.name} are of the same readings: one specimen would be two",
+                remedy="name one run for each specimen",
+            )
 
 
 def _full(name: str, material: str, own: Sequence[str]) -> str:

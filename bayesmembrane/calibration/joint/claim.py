@@ -56,7 +56,8 @@ class Joint:
     effects and those of its noise. The energy is that of the thinnest film, so that the order of the tests does not
     matter; a film d times as thick has d times its membrane parameters, which adds ln d to the first coordinate.
 
-    Raises `SettingsError` for no test, for two of one label, and for tests of different energies or convexity priors.
+    Raises `SettingsError` for no test, for two of one label or of the same readings, which would count twice, and for
+    tests of different energies or convexity priors.
     """
 
     parts: tuple[JointTest, ...]
@@ -67,6 +68,7 @@ class Joint:
         labels = self.labels
         if twice := sorted({label for label in labels if labels.count(label) > 1}):
             raise SettingsError(f'two tests are called "{twice[0]}"', remedy="give each its own name")
+        self._no_reading_twice()
         for part in self.parts:
             h = part.hypothesis
             if h.material is not self.material or h.convexity != self.convexity:
@@ -74,6 +76,15 @@ class Joint:
                     "a joint calibration has one energy and one convexity prior",
                     f'test "{part.label}"',
                     f"use {self.material.name} and {self.convexity} there, too",
+                )
+
+    def _no_reading_twice(self) -> None:
+        first: dict[str, str] = {}
+        for part in self.parts:
+            if (label := first.setdefault(part.measurement.data_hash, part.label)) != part.label:
+                raise SettingsError(
+                    f'the tests "{label}" and "{part.label}" hold the same readings, which would count twice',
+                    remedy="leave one of them out",
                 )
 
     @property
@@ -191,11 +202,14 @@ def joint(
     Without labels tests are called after their specimens. Raises what `JointTest` and `Joint` raise, and
     `SettingsError` for a claim that is missing or belongs to no test.
     """
+    each: list[object] = list(measurements.values() if isinstance(measurements, Mapping) else measurements)
+    if odd := [m for m in each if not isinstance(m, Measurement)]:
+        raise SettingsError(f"{odd[0]!r:.40} is no measurement", remedy="read it first, by read or read_measurement")
     named = measurements if isinstance(measurements, Mapping) else _named(measurements)
     if isinstance(hypothesis, Mapping):
-        if odd := sorted(set(hypothesis) ^ set(named)):
+        if alone := sorted(set(hypothesis) ^ set(named)):
             raise SettingsError(
-                f'"{odd[0]}" is not both among the measurements and among the hypotheses',
+                f'"{alone[0]}" is not both among the measurements and among the hypotheses',
                 remedy="name each test in both",
             )
         claims = dict(hypothesis)

@@ -178,6 +178,9 @@ def test_what_makes_no_population_is_said() -> None:
         specimens(np.zeros((1, 1)), np.ones((1, 1)))
     with pytest.raises(SettingsError, match="no run"):
         of_runs([])
+    (run,) = walked((10.0,))
+    with pytest.raises(SettingsError, match="of the same readings"):
+        of_runs([run, run])
     with pytest.raises(SettingsError, match="do not go together"):
         specimens(np.full((2, 1), np.nan), np.ones((2, 1)))
     assert isinstance(population(specimens(np.zeros((2, 1)), np.ones((2, 1)))), Population)

@@ -1,6 +1,7 @@
 """Joint runs: draws against an integral, storage, interruption, and what several tests are worth."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +46,8 @@ def test_draws_of_two_strips_are_those_of_the_integral() -> None:
 def test_one_measurement_twice_has_half_the_variance() -> None:
     m = made(STRIP, "mooney_rivlin", (8.0, 2.0), seed=3)
     claim = stated_only("mooney_rivlin")
-    once, twice = (JointPosterior(joint([m] * n, claim)) for n in (1, 2))
+    again = replace(m, full_range=1.01 * m.full_range)  # the same file twice is refused
+    once, twice = (JointPosterior(joint(ms, claim)) for ms in ([m], [m, again]))
     at = fit_jointly(once.joint).coordinates
 
     def precision(p: JointPosterior) -> np.ndarray:
