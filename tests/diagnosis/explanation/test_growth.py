@@ -10,7 +10,14 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation import growth
 from bayesmembrane.diagnosis.explanation.case import OpenCase
-from bayesmembrane.diagnosis.explanation.growth import Grown, _last_steps, _promising_pairs, _with_exchanged, _with_less
+from bayesmembrane.diagnosis.explanation.growth import (
+    Grown,
+    _last_steps,
+    _promising_pairs,
+    _with_exchanged,
+    _with_less,
+    _with_parts,
+)
 from bayesmembrane.diagnosis.thresholds import GROWTH
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
@@ -62,6 +69,22 @@ def test_a_smaller_set_is_searched_for_from_a_larger_one(before: float | None) -
     earlier = [] if before is None else [candidate(claim("friction"), before)]
     found = looked_back(shelf, candidate(claim("friction", "mullins"), -10.0), *earlier)
     assert found[FRICTION] == -9.5
+    assert shelf.asked == [FRICTION]
+
+
+def test_what_decides_is_fitted_without_each_of_its_effects() -> None:
+    """A set that is fitted with an energy whose part was fitted with others only; one without a share is left alone."""
+    shelf = Shelf({FRICTION: -11.0, MULLINS: -90.0}, {FRICTION: -9.5})
+    odds = [SimpleNamespace(odds=1.0) for _ in range(4)]
+    plain = candidate(claim(), -60.0)
+    case = SimpleNamespace(null=plain, plain={"gent": plain}, visible=odds, question=SimpleNamespace(energy=None))
+    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, shelf)))
+    for c in (plain, candidate(claim("friction", "mullins"), -10.0), candidate(claim("friction", "tearing"), -80.0)):
+        grown.add(c)
+    _with_parts(grown)
+    assert shelf.asked == [FRICTION]
+    assert grown.found["gent", FRICTION].log_evidence == -9.5
+    _with_parts(grown)
     assert shelf.asked == [FRICTION]
 
 

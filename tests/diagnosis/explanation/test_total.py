@@ -21,8 +21,8 @@ FOUR = (1.0,) * 4  # odds of all effects
 TRIED = [SimpleNamespace(odds=1.0, name=n) for n in ("friction", "mullins")]
 
 
-def candidate(*effects: str, log_evidence: float) -> Candidate:
-    claim = with_effects(hypothesis("gent"), [components("effects")[n]() for n in effects])
+def candidate(*effects: str, log_evidence: float, energy: str = "gent") -> Candidate:
+    claim = with_effects(hypothesis(energy), [components("effects")[n]() for n in effects])
     nothing, x = np.zeros(3), np.zeros(claim.curve_size)
     return Candidate(claim, x, nothing, nothing[:, None], log_evidence, (), nothing[None], np.zeros(2), nothing)
 
@@ -90,3 +90,27 @@ def test_a_further_effect_that_nobody_fitted_is_not_excluded(monkeypatch: pytest
     assert 0 < found[-2.0]["friction+tearing"] < found[50.0]["friction+tearing"] < BELIEFS.untried * np.e
     assert found[50.0]["friction"] == pytest.approx(nothing["friction"], abs=2 * BELIEFS.untried)
     assert [sum(p.values()) for p in found.values()] == pytest.approx([1.0, 1.0])
+
+
+def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two energies are alike without effects: friction fitted with both has no more than Mullins fitted with one."""
+    monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
+    monkeypatch.setattr(total, "first_order", lambda *_: -np.inf)
+    plain = [candidate(log_evidence=-60.0, energy=name) for name in ("gent", "yeoh")]
+    case = SimpleNamespace(
+        null=plain[0],
+        plain=dict(zip(("gent", "yeoh"), plain, strict=True)),
+        visible=[*TRIED, *TRIED],
+        question=SimpleNamespace(energy=None),
+        twins=lambda: frozenset(),
+        foreign=lambda *_: [],
+        tell=lambda _: None,
+    )
+    search = SimpleNamespace(excess=lambda c: LEFT, expected_sizes=lambda e: np.array([e.size.scale]))
+    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
+    both = [candidate("friction", log_evidence=-10.0, energy=name) for name in ("gent", "yeoh")]
+    for c in (*plain, *both, candidate("mullins", log_evidence=-10.0)):
+        grown.add(c)
+    p = total.summed(grown).probabilities
+    assert p.effects["mullins"] == pytest.approx(p.effects["friction"])
+    assert p.energies["gent"] == pytest.approx(p.energies["yeoh"])
