@@ -163,8 +163,8 @@ _LAST = re.compile(r"^(?P<name>.+?)(?:\s+in\s+|\s*[/,_]\s*|\s+)(?P<unit>[^\s,_]+
 
 
 def named(header: str) -> Named:
-    """``Force [N]``, ``Force (N)``, ``force_N``, ``Force, N``, ``Kraft in N``, ``F/N`` -> (name, unit)."""
-    text = " ".join(unicodedata.normalize("NFKC", header).replace("#", " ").split()).strip(" \"'")
+    """``Force [N]``, ``Force (N):``, ``force_N``, ``Force, N``, ``Kraft in N``, ``F/N`` -> (name, unit)."""
+    text = " ".join(unicodedata.normalize("NFKC", header).replace("#", " ").split()).strip(" \"'").rstrip(": ")
     found = _BRACKETED.match(text)
     if found and found["name"].strip():
         return Named(found["name"].strip(), found["unit"].strip())

@@ -183,6 +183,8 @@ PREAMBLES = {
     "spanish": "Muestra;film 3\nLongitud calibrada;50;mm\nAnchura;10;mm\nEspesor;0,5;mm\n",
     "polish": "Próbka;film 3\nDługość pomiarowa;50;mm\nSzerokość;10;mm\nGrubość;0,5;mm\n",
     "chinese": "试样;film 3\n标距;50;mm\n宽度;10;mm\n厚度;0.5;mm\n",
+    "units in brackets, then a colon": "Próbka:;film 3\nDługość pomiarowa [mm]:;50\nSzerokość [mm]:;10\n"
+    "Grubość [mm]:;0,5\nPrędkość [mm/min]:;100\n",
     "area": "Sample;film 3\nL0;50;mm\nThickness;0,5;mm\nCross-section;5;mm²\n",
     "inches": "Specimen;film 3\nGauge length;1,968503937007874;in\nWidth;0,3937007874015748;in\nThickness;500;µm\n",
 }
