@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,6 +82,18 @@ def candidates(block: NumberBlock, hints: Hints) -> list[PossibleColumn]:
         return [c for c in found if not _empty(c.column, block)]
     said = {k: _pointed(v, block) for k, v in pairs_of(hints.columns, "--columns").items()}
     return _replaced(found, said, hints)
+
+
+def left_over(block: NumberBlock, used: Iterable[int], hints: Hints) -> list[PossibleColumn]:
+    """The columns that are known and not ``used``, in their own units; none if ``--columns`` goes by their places."""
+    if hints.columns and "=" not in hints.columns:
+        return []
+    rest = [c for c in block.columns if c.at not in used]
+    found = []
+    for column in rest:
+        said = not column.unit or column.header.lower() in hints.pairs
+        found.append(_candidate(column, hints if said else replace(hints, units="")))
+    return [c for c in found if c is not None]
 
 
 def has_curve(found: Iterable[PossibleColumn]) -> bool:
