@@ -164,7 +164,8 @@ def guess_of(role: str, chosen: PossibleColumn, hints: Hints) -> list[Guess]:
     header = chosen.column.header or f"column {chosen.column.at + 1}"
     said = bool(hints.columns)
     why = "--columns says so" if said else "its name says so" if chosen.score > 3 else "it alone has such a unit"
-    return [Guess(f"column of {role}", f'"{header}" in {chosen.unit or "1"}', why, f"--columns {role}=...")]
+    unit = "1" if chosen.unit in ("", "one") else chosen.unit
+    return [Guess(f"column of {role}", f'"{header}" in {unit}', why, f"--columns {role}=...")]
 
 
 # ---- what a column seems to be ---------------------------------------------------------------------------------------
@@ -284,7 +285,8 @@ def _refuse_unit(chosen: PossibleColumn, block: NumberBlock) -> None:
     example = {TIME: "s", TRAVEL: "mm", FORCE: "N", STRESS: "MPa", STRAIN: "percent"}.get(chosen.role, "1")
     named_unit = f', and "{chosen.column.unit}" is none of it' if chosen.column.unit else ""
     fault = f'the column "{header}" names no unit of {QUANTITY[chosen.role]}{named_unit}'
-    raise DataError(fault, block.place, f"say --units {chosen.role}={example}, or what it is")
+    others = "mm/mm, 1 or ratio, whichever it is" if QUANTITY[chosen.role] == RATIO else "what it is"
+    raise DataError(fault, block.place, f"say --units {chosen.role}={example}, or {others}")
 
 
 # ---- numbers ---------------------------------------------------------------------------------------------------------

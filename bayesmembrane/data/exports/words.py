@@ -129,12 +129,12 @@ def plain(text: str) -> str:
 
 @lru_cache(maxsize=4096)
 def unit_of(text: str, quantity: str = "") -> str:
-    """The unit that a text is, as `ground.units` spells it; "" if it is none (``1`` and ``-`` are "one").
+    """The unit that a text is, as `ground.units` spells it; "" if it is none (``1``, ``-``, ``ratio`` are "one").
 
     Masses are forces only where ``quantity`` says that a force is meant.
     """
     bare = unicodedata.normalize("NFKC", text).strip().strip("[]()<>{}\"' ").strip().rstrip(".")
-    if bare in ("-", "1", "—", "–"):
+    if bare.lower() in ("-", "1", "—", "–", "ratio"):
         return "one"
     if not bare or len(bare) > 12 or _MOMENT.fullmatch(bare):
         return ""

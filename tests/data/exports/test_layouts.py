@@ -219,6 +219,16 @@ def test_units_said() -> None:
     same_force(imported(text.encode(), units="time=s,travel=mm,load=N"))
 
 
+@pytest.mark.parametrize(
+    ("unit", "per_one"), [("ratio", 1), ("Ratio", 1), ("1", 1), ("mm/mm", 1), ("percent", 100), ("%", 100)]
+)
+def test_units_of_a_strain_said(unit: str, per_one: int) -> None:
+    text = lines("Strain,Stress (MPa)", per_one * (STRETCH - 1), STRESS / 1e6, form="%.9g")
+    found = imported(text.encode(), units=f"strain={unit}")
+    same_stretch(found)
+    assert not any("in one" in g.value for g in found.guesses)
+
+
 def test_compression_and_zero() -> None:
     text = lines("Position (mm),Force (N)", -212.5 - 1e3 * TRAVEL, -FORCE)
     same_force(imported(text.encode()), times=False)

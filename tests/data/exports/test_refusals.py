@@ -39,7 +39,7 @@ PLAIN = lines("Time (s),Extension (mm),Load (N)", TIME, MM, FORCE)
         (lines("Time (s),Extension,Load (N)", TIME, MM, FORCE), ['"Extension" names no unit', "--units travel=mm"]),
         (lines("Extension (furlong),Load (N)", MM, FORCE), ['"furlong" is none of it', "--units travel=mm"]),
         (lines("Load 1 (N),Load 2 (N),Weg (mm)", FORCE, 2 * FORCE, MM), ["may each be the force", '--columns "force=Load 1']),
-        (lines("Strain,Stress (MPa)", 0.4 * TIME, STRESS / 1e6), ['"Strain" names no unit', "--units strain=percent"]),
+        (lines("Strain,Stress (MPa)", 0.4 * TIME, STRESS / 1e6), ['"Strain" names no unit', "--units strain=percent, or mm/mm, 1 or ratio"]),
         (lines("Strain (mm/mm),Stress (MPa)", STRETCH, STRESS / 1e6), ["starts at 1", "--strain stretch"]),
         (lines("Stretch,Stress (MPa)", STRETCH - 1, STRESS / 1e6), ["called a stretch and starts at 0", "strain=Stretch"]),
         (lines("Strain (%),Load (N)", 100 * (STRETCH - 1), FORCE), ["nominal stress", "--width-mm and --thickness-um"]),
