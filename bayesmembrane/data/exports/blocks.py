@@ -86,6 +86,13 @@ def blocks_of(sheet: Sheet) -> list[NumberBlock]:
     return [part for block in _joined(found) for part in _side_by_side(block)]
 
 
+def names_beyond(block: NumberBlock) -> list[str]:
+    """What the names call the columns of text to the right of all numbers."""
+    if block.header is None or block.sheet.delimiter == " " or not any(c.header for c in block.columns):
+        return []
+    return [str(c) for c in block.sheet.cells(block.header)[max(block.numbers) + 1 :] if c != ""]
+
+
 def _runs(sheet: Sheet) -> Iterator[_RunOfRows]:
     """Rows of numbers that follow each other."""
     start, at = 0, frozenset[int]()

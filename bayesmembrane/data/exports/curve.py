@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayesmembrane.data.exports.blocks import NumberBlock
+from bayesmembrane.data.exports.blocks import NumberBlock, names_beyond
 from bayesmembrane.data.exports.columns import TRUE, Read, trimmed
 from bayesmembrane.data.exports.export import Export
 from bayesmembrane.data.exports.film import Film, film_of
@@ -71,7 +71,7 @@ def curve_of(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: Sequence
     if TIME in columns:
         export.contradict(gaps(columns[TIME], export.lines))
     _outside(export, blocks)
-    ignored = [c.header for c in block.columns if c.header and c.at not in export.used]
+    ignored = [c.header for c in block.columns if c.header and c.at not in export.used] + names_beyond(block)
     if ignored:
         export.notes.append(f"ignored columns: {', '.join(ignored)}")
     rig = hints.rig or ("uniaxial" if strip else "")

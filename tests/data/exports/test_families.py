@@ -52,6 +52,17 @@ def test_each_specimen_of_a_workbook_has_its_own_sizes() -> None:
         assert np.array_equal(imported(data, sheet=f"Values film {k}").columns["stretch"], found.columns["stretch"])
 
 
+@pytest.mark.parametrize(
+    "header", ["SetName,Time_S,Displacement_um,Force_mN,FileName", "SetName,Time_S,Displacement_um,Force_mN"]
+)
+def test_columns_of_text_are_told_on_both_sides_of_the_numbers(header: str) -> None:
+    rows = lines((), TIME, 1e3 * MM, 1e3 * FORCE).strip().split("\n")
+    after = ",a.jpg" if header.endswith("FileName") else ""
+    found = imported("\n".join([header, *(f"Set1,{row}{after}" for row in rows), ""]).encode())
+    told = "ignored columns: SetName, FileName" if after else "ignored columns: SetName"
+    assert told in found.notes
+
+
 def test_two_axes_become_a_biaxial_test(tmp_path: Path) -> None:
     header = "SetName,Cycle,Time_S,XSize_um,YSize_um,XDisplacement_um,YDisplacement_um,XForce_mN,YForce_mN"
     size = 0 * TIME + 5000.0
