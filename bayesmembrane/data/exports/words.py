@@ -92,6 +92,8 @@ FACTS = {
 """What a preamble says of specimen and test. ``strain_length`` is that of a strain of its own, an extensometer's;
 ``length`` is one that does not say whether it is free, total or gauge length: both are told and not used."""
 _FACT = {name: re.compile(rf"(?<![a-z])(?:{words})(?![a-z0-9])") for name, (_, words) in FACTS.items()}
+_H = re.compile(r"h0? \w+$")
+"""The symbol of a thickness beside its unit: alone, ``h`` may be hours."""
 NAME = re.compile(
     r"(?:specimen|sample)(?: (?:name|id|label|designation|identifier))?|probenbezeichnung|probe|probenname"
     r"|proben ?beschriftung|etykiet\w* probki|etiqueta de la probeta"
@@ -226,6 +228,8 @@ def _word(pattern: re.Pattern[str], text: str) -> bool:
 def fact_of(key: str) -> str:
     """Which fact of specimen or test a key of the preamble names, "" if none."""
     text = plain(key)
+    if _H.match(text) and unit_of(named(key).unit, LENGTH):
+        return "thickness"
     if len(text) <= 90 and _FACT["gauge_length"].search(text):
         if _EXTENSOMETER.search(text):
             return "strain_length"
