@@ -86,6 +86,13 @@ def blocks_of(sheet: Sheet) -> list[NumberBlock]:
     return [part for block in _joined(found) for part in _side_by_side(block)]
 
 
+def names_beyond(block: NumberBlock) -> list[str]:
+    """What the names call the columns of text to the right of all numbers."""
+    if block.header is None or block.sheet.delimiter == " " or not any(c.header for c in block.columns):
+        return []
+    return [str(c) for c in block.sheet.cells(block.header)[max(block.numbers) + 1 :] if c != ""]
+
+
 def _runs(sheet: Sheet) -> Iterator[_RunOfRows]:
     """Rows of numbers that follow each other."""
     start, at = 0, frozenset[int]()
@@ -245,8 +252,8 @@ def _group_labels(block: NumberBlock, groups: list[tuple[ExportColumn, ...]]) ->
 # ---- what the rest says ----------------------------------------------------------------------------------------------
 
 
-def facts_of(sheet: Sheet, used: set[int], label: str = "") -> tuple[list[Fact], list[str]]:
-    """(facts, remarks on what names no unit) of the rows that are not ``used``."""
+def facts_of(sheet: Sheet, used: set[int], labels: Sequence[str] = ()) -> tuple[list[Fact], list[str]]:
+    """(facts, remarks on what names no unit) of the rows that are not ``used``; ``labels`` of the specimen, if any."""
     rows = [r for r in range(len(sheet)) if r not in used][:2000]
     facts: list[Fact] = []
     remarks: list[str] = []
@@ -256,7 +263,7 @@ def facts_of(sheet: Sheet, used: set[int], label: str = "") -> tuple[list[Fact],
                 facts.append(fact)
             else:
                 remarks.append(fact)
-        facts.extend(_of_table(sheet, r, label))
+        facts.extend(_of_table(sheet, r, labels))
     return facts, remarks
 
 
@@ -294,8 +301,8 @@ def _of_line(sheet: Sheet, row: int) -> Iterator[Fact | str]:
     yield Fact(name, to_si(value, scale), f"{cells[0].strip(': ')} {value:g} {unit}".strip(), sheet.line(row))
 
 
-def _of_table(sheet: Sheet, row: int, label: str) -> Iterator[Fact]:
-    """Facts of a table of results: names in this row, units in it or below, one line of values or ``label``'s."""
+def _of_table(sheet: Sheet, row: int, labels: Sequence[str]) -> Iterator[Fact]:
+    """Facts of a table of results: names in this row, units in it or below, one line of values or that of a label."""
     cells = sheet.cells(row)
     wanted = {j: fact_of(c) for j, c in enumerate(cells) if isinstance(c, str) and c and fact_of(c)}
     if not wanted or row + 1 >= len(sheet) or sum(isinstance(c, str) and c != "" for c in cells) < 2:
@@ -306,7 +313,7 @@ def _of_table(sheet: Sheet, row: int, label: str) -> Iterator[Fact]:
     first = row + 2 if has_units else row + 1
     values = [(r, _padded(sheet.cells(r), width)) for r in range(first, min(first + 50, len(sheet)))]
     values = [(r, v) for r, v in values if any(_value(sheet, v[j])[0] is not None for j in wanted)]
-    named_so = [(r, v) for r, v in values if label and label in [str(c) for c in v]]
+    named_so = [(r, v) for label in labels for r, v in values if label in [str(c) for c in v]]
     chosen = named_so or (values if len(values) == 1 else [])
     for r, v in chosen[:1]:
         for j, name in wanted.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -84,6 +84,18 @@ def candidates(block: NumberBlock, hints: Hints) -> list[PossibleColumn]:
     return _replaced(found, said, hints)
 
 
+def left_over(block: NumberBlock, used: Iterable[int], hints: Hints) -> list[PossibleColumn]:
+    """The columns that are known and not ``used``, in their own units; none if ``--columns`` goes by their places."""
+    if hints.columns and "=" not in hints.columns:
+        return []
+    rest = [c for c in block.columns if c.at not in used]
+    found = []
+    for column in rest:
+        said = not column.unit or column.header.lower() in hints.pairs
+        found.append(_candidate(column, hints if said else replace(hints, units="")))
+    return [c for c in found if c is not None]
+
+
 def has_curve(found: Iterable[PossibleColumn]) -> bool:
     """Whether there is something of how far and something of how hard."""
     roles = {c.role for c in found}
@@ -152,7 +164,8 @@ def guess_of(role: str, chosen: PossibleColumn, hints: Hints) -> list[Guess]:
     header = chosen.column.header or f"column {chosen.column.at + 1}"
     said = bool(hints.columns)
     why = "--columns says so" if said else "its name says so" if chosen.score > 3 else "it alone has such a unit"
-    return [Guess(f"column of {role}", f'"{header}" in {chosen.unit or "1"}', why, f"--columns {role}=...")]
+    unit = "1" if chosen.unit in ("", "one") else chosen.unit
+    return [Guess(f"column of {role}", f'"{header}" in {unit}', why, f"--columns {role}=...")]
 
 
 # ---- what a column seems to be ---------------------------------------------------------------------------------------
@@ -272,7 +285,8 @@ def _refuse_unit(chosen: PossibleColumn, block: NumberBlock) -> None:
     example = {TIME: "s", TRAVEL: "mm", FORCE: "N", STRESS: "MPa", STRAIN: "percent"}.get(chosen.role, "1")
     named_unit = f', and "{chosen.column.unit}" is none of it' if chosen.column.unit else ""
     fault = f'the column "{header}" names no unit of {QUANTITY[chosen.role]}{named_unit}'
-    raise DataError(fault, block.place, f"say --units {chosen.role}={example}, or what it is")
+    others = "mm/mm, 1 or ratio, whichever it is" if QUANTITY[chosen.role] == RATIO else "what it is"
+    raise DataError(fault, block.place, f"say --units {chosen.role}={example}, or {others}")
 
 
 # ---- numbers ---------------------------------------------------------------------------------------------------------

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayesmembrane.data.exports.blocks import NumberBlock
-from bayesmembrane.data.exports.columns import trimmed
+from bayesmembrane.data.exports.blocks import NumberBlock, names_beyond
+from bayesmembrane.data.exports.columns import TRUE, Read, trimmed
 from bayesmembrane.data.exports.export import Export
 from bayesmembrane.data.exports.film import Film, film_of
 from bayesmembrane.data.exports.hints import Guess, Hints
 from bayesmembrane.data.exports.parts import facts_beside, part
+from bayesmembrane.data.exports.redundant import compare_rest
 from bayesmembrane.data.exports.relations import gaps, jumps, speed_against
 from bayesmembrane.data.exports.sheets import Sheet
 from bayesmembrane.data.exports.signs import carried, signed, zero_told, zeroed, zeroed_force
@@ -70,7 +71,7 @@ def curve_of(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: Sequence
     if TIME in columns:
         export.contradict(gaps(columns[TIME], export.lines))
     _outside(export, blocks)
-    ignored = [c.header for c in block.columns if c.header and c.at not in export.used]
+    ignored = [c.header for c in block.columns if c.header and c.at not in export.used] + names_beyond(block)
     if ignored:
         export.notes.append(f"ignored columns: {', '.join(ignored)}")
     rig = hints.rig or ("uniaxial" if strip else "")
@@ -188,7 +189,7 @@ def _plain(export: Export, film: Film, time: Array | None) -> dict[str, Array]:
 def _strip(export: Export, film: Film, time: Array | None) -> dict[str, Array]:
     """Stretch, and nominal stress in Pa."""
     force = export.column(FORCE)
-    stress, true = export.column(STRESS, "|engineering"), export.column(STRESS, "true")
+    stress, true = _stresses(export)
     stretch, travel = stretch_of(export, film, force or stress or true)
     force, stress, true = (carried(export, load) for load in (force, stress, true))
     zero_told(export, force or stress or true, "force" if force is not None else "stress")
@@ -197,9 +198,20 @@ def _strip(export: Export, film: Film, time: Array | None) -> dict[str, Array]:
         k = int(np.argmin(stretch))
         fault = f"a stretch of {stretch[k]:g} cannot be"
         raise DataError(fault, export.block.sheet.place(export.rows[k]), "check --gauge-length-mm, --zero and --strain")
+    compare_rest(export, stretch, nominal)
     if travel is not None:
         _against_speed(export, film, travel, time)
     return _with(export, time, {"stretch": stretch, "nominal_stress": nominal})
+
+
+def _stresses(export: Export) -> tuple[Read | None, Read | None]:
+    """(stress, true stress), one of them or none: the true one only where that was said, or there is no other."""
+    true_first = export.hints.stress == TRUE
+    true = export.column(STRESS, TRUE) if true_first else None
+    stress = export.column(STRESS, "|engineering") if true is None else None
+    if stress is None and not true_first:
+        true = export.column(STRESS, TRUE)
+    return stress, true
 
 
 def _with(export: Export, time: Array | None, columns: dict[str, Array]) -> dict[str, Array]:

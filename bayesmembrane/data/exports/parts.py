@@ -55,10 +55,10 @@ def _chosen(
     parts: list[tuple[NumberBlock, list[PossibleColumn]]], file: str, hints: Hints
 ) -> tuple[NumberBlock, list[PossibleColumn]]:
     labels = _labels([b for b, _ in parts])
-    if hints.part:
-        for k, label in enumerate(labels, 1):
-            if hints.part in (str(k), label):
-                return parts[k - 1]
+    numbers = [str(k) for k in range(1, len(parts) + 1)]
+    for names in (numbers, labels, [b.sheet.name for b, _ in parts]):
+        if hints.part and names.count(hints.part) == 1:
+            return parts[names.index(hints.part)]
     shown = ", ".join(f"{k}: {label}" for k, label in enumerate(labels[:20], 1))
     fault = f'there is no part "{hints.part}"' if hints.part else f"the file has {len(parts)} sets of readings"
     raise DataError(f"{fault} ({shown})", file, "say which, --part 1 or its name")
@@ -102,11 +102,11 @@ def facts_beside(
     facts: list[Fact] = []
     remarks: list[str] = []
     name = ""
-    label = block.label or block.sheet.name
+    labels = [label for label in (block.label, block.sheet.name) if label]
     for sheet in sorted(sheets, key=lambda s: s is not block.sheet):
         used = {r for b in blocks if b.sheet is sheet and len(b.rows) > 1 and b.header is not None for r in b.rows}
         used |= set(block.rows) if sheet is block.sheet else set()
-        more, said = facts_of(sheet, used, label)
+        more, said = facts_of(sheet, used, labels)
         facts += more
         remarks += said
         name = name or name_in(sheet, used)

@@ -8,6 +8,7 @@ import numpy as np
 
 from bayesmembrane.data.motion import legs
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.units import UNITS
 
 APART = 0.02
 """Two columns contradict each other where they differ by more than this part of the larger one's range."""
@@ -18,10 +19,12 @@ REGULAR, SKIPS = 0.01, 5
 """Times whose steps differ by no more than this part are regular, and so few steps of twice the size are gaps."""
 
 
-def contradiction(what: str, said: Array, other: Array, lines: Sequence[int], tolerance: float = APART) -> str:
-    """A sentence on the rows in which ``said`` (N,) and ``other`` (N,) differ; "" if they agree.
+def contradiction(
+    what: str, said: Array, other: Array, lines: Sequence[int], unit: str = "", tolerance: float = APART
+) -> str:
+    """A sentence on the rows in which ``said`` (N,) and ``other`` (N,), in SI, differ; "" if they agree.
 
-    ``what`` names both, "A and B".
+    ``what`` names both, "A and B"; ``unit``, as `ground.units` spells it, is the one that numbers are shown in.
     """
     reach = max(float(np.ptp(said)), float(np.ptp(other)), 1e-300)
     difference = np.abs(said - other)
@@ -32,8 +35,14 @@ def contradiction(what: str, said: Array, other: Array, lines: Sequence[int], to
     where = f"line {lines[bad[0]]}" if bad.size == 1 else f"lines {lines[bad[0]]} to {lines[bad[-1]]}"
     return (
         f"{what} contradict each other in {bad.size} of {said.size} rows ({where}; "
-        f"most in line {lines[worst]}: {said[worst]:.4g} against {other[worst]:.4g})"
+        f"most in line {lines[worst]}: {_shown(said[worst], unit)} against {_shown(other[worst], unit)})"
     )
+
+
+def _shown(value: float, unit: str) -> str:
+    """A value in SI as a number of a unit: ``3.42 MPa``."""
+    name = {"percent": "%", "1": "", "one": ""}.get(unit, unit.replace("_per_", "/"))
+    return f"{value / UNITS[unit].factor if name else value:.4g} {name}".rstrip()
 
 
 def gauge_length_behind(travel: Array, strain: Array) -> tuple[float, float]:
@@ -64,10 +73,11 @@ def speed_against(travel: Array, time: Array, speed: float, lines: Sequence[int]
         return ""
     t, x = time[:first] - time[0], np.abs(travel[:first] - travel[0])
     return contradiction(
-        f"the stated speed of {6e4 * speed:.4g} mm/min times the time and the travel (mm)",
-        1e3 * speed * t,
-        1e3 * x,
+        f"the stated speed of {6e4 * speed:.4g} mm/min times the time and the travel",
+        speed * t,
+        x,
         lines[:first],
+        "mm",
         SPEED_APART,
     )
 

@@ -82,6 +82,13 @@ def lengthened(export: Export, e: Array, travel: Array | None, load: Read | None
     return e
 
 
+def turned_alike(export: Export, strain: Read, used: Array) -> Read:
+    """A strain that is only compared with the ``used`` one (N,): turned where that may be, from its start as said."""
+    e = strain.values - strain.values[0] if "travel" in export.hints.zero else strain.values
+    turns = bool(export.hints.sign) or _presses(export)
+    return replace(strain, values=-e if turns and float(np.dot(e, used)) < 0 else e)
+
+
 def carried(export: Export, load: Read | None) -> Read | None:
     """A strip's force or stress, positive where it is pulled, and from its start if that was said."""
     if load is None:

@@ -107,9 +107,10 @@ def _against_length(export: Export, length: float) -> None:
 
 
 def _strain(export: Export, travel: Array | None) -> Read:
-    """The column of strain; its unit from the data if the file names none and the gauge length is known."""
-    chosen = best(export.found, STRAIN, export.block)
-    assert chosen is not None
+    """The column of strain, the engineering one of two; its unit from the data where the file names none."""
+    kinds = ("true", "|engineering") if export.hints.strain == "true" else ("|engineering", "true")
+    of_kind = ((k, best(export.found, STRAIN, export.block, k)) for k in kinds)
+    kind, chosen = next((k, c) for k, c in of_kind if c is not None)
     if not chosen.unit:
         bare = read(export.block, replace(chosen, unit="one"), export.rows, export.hints)
         largest = float(np.max(np.abs(bare.values)))
@@ -118,7 +119,7 @@ def _strain(export: Export, travel: Array | None) -> Read:
             why = f"the file names no unit, and its largest value is {largest:g}"
             export.guess("unit of the strain", unit, why, "--units strain=percent or 1")
             export.found = [c if c is not chosen else replace(chosen, unit=unit) for c in export.found]
-    found = export.column(STRAIN)
+    found = export.column(STRAIN, kind)
     assert found is not None
     return found
 
@@ -133,15 +134,14 @@ def nominal_of(
     kind = export.hints.stress or (stress.kind if stress is not None else "")
     if stress is not None and kind == "true":
         true, stress = stress, None
-    if true is not None and stress is not None:
-        export.contradict(
-            contradiction(
-                "true stress and engineering stress times stretch", true.values, stress.values * stretch, export.lines
-            )
-        )
+    if true is not None and by_force is not None:
+        what = "true stress and force over width and thickness times stretch"
+        export.contradict(contradiction(what, true.values, by_force * stretch, export.lines, true.unit))
     if stress is not None and by_force is not None:
         export.contradict(
-            contradiction("stress and force over width and thickness (Pa)", stress.values, by_force, export.lines)
+            contradiction(
+                "stress and force over width and thickness", stress.values, by_force, export.lines, stress.unit
+            )
         )
     if by_force is not None and (stress is None or (export.hints.width and export.hints.thickness)):
         size = f"{1e3 * (film.width or 0):g} mm times {1e3 * (film.thickness or 0):g} mm"

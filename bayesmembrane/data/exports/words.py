@@ -92,6 +92,8 @@ FACTS = {
 """What a preamble says of specimen and test. ``strain_length`` is that of a strain of its own, an extensometer's;
 ``length`` is one that does not say whether it is free, total or gauge length: both are told and not used."""
 _FACT = {name: re.compile(rf"(?<![a-z])(?:{words})(?![a-z0-9])") for name, (_, words) in FACTS.items()}
+_H = re.compile(r"h0? \w+$")
+"""The symbol of a thickness beside its unit: alone, ``h`` may be hours."""
 NAME = re.compile(
     r"(?:specimen|sample)(?: (?:name|id|label|designation|identifier))?|probenbezeichnung|probe|probenname"
     r"|proben ?beschriftung|etykiet\w* probki|etiqueta de la probeta"
@@ -129,12 +131,12 @@ def plain(text: str) -> str:
 
 @lru_cache(maxsize=4096)
 def unit_of(text: str, quantity: str = "") -> str:
-    """The unit that a text is, as `ground.units` spells it; "" if it is none (``1`` and ``-`` are "one").
+    """The unit that a text is, as `ground.units` spells it; "" if it is none (``1``, ``-``, ``ratio`` are "one").
 
     Masses are forces only where ``quantity`` says that a force is meant.
     """
     bare = unicodedata.normalize("NFKC", text).strip().strip("[]()<>{}\"' ").strip().rstrip(".")
-    if bare in ("-", "1", "—", "–"):
+    if bare.lower() in ("-", "1", "—", "–", "ratio"):
         return "one"
     if not bare or len(bare) > 12 or _MOMENT.fullmatch(bare):
         return ""
@@ -163,8 +165,8 @@ _LAST = re.compile(r"^(?P<name>.+?)(?:\s+in\s+|\s*[/,_]\s*|\s+)(?P<unit>[^\s,_]+
 
 
 def named(header: str) -> Named:
-    """``Force [N]``, ``Force (N)``, ``force_N``, ``Force, N``, ``Kraft in N``, ``F/N`` -> (name, unit)."""
-    text = " ".join(unicodedata.normalize("NFKC", header).replace("#", " ").split()).strip(" \"'")
+    """``Force [N]``, ``Force (N):``, ``force_N``, ``Force, N``, ``Kraft in N``, ``F/N`` -> (name, unit)."""
+    text = " ".join(unicodedata.normalize("NFKC", header).replace("#", " ").split()).strip(" \"'").rstrip(": ")
     found = _BRACKETED.match(text)
     if found and found["name"].strip():
         return Named(found["name"].strip(), found["unit"].strip())
@@ -226,6 +228,8 @@ def _word(pattern: re.Pattern[str], text: str) -> bool:
 def fact_of(key: str) -> str:
     """Which fact of specimen or test a key of the preamble names, "" if none."""
     text = plain(key)
+    if _H.match(text) and unit_of(named(key).unit, LENGTH):
+        return "thickness"
     if len(text) <= 90 and _FACT["gauge_length"].search(text):
         if _EXTENSOMETER.search(text):
             return "strain_length"

@@ -52,6 +52,63 @@ def test_each_specimen_of_a_workbook_has_its_own_sizes() -> None:
         assert np.array_equal(imported(data, sheet=f"Values film {k}").columns["stretch"], found.columns["stretch"])
 
 
+def named_sheets() -> bytes:
+    """Two specimens whose sheets bear the names of the results, and other names above their readings."""
+    book = openpyxl.Workbook()
+    results = book.active
+    assert results is not None
+    rows = [["Specimen", "h (mm)", "b0 (mm)", "L0 (mm)", "Fmax (N)"], ["S1", 0.5, 10, 50, 1], ["S2", 0.6, 12, 40, 2]]
+    for row in rows:
+        results.append(row)
+    for k in (1, 2):
+        sheet = book.create_sheet(f"S{k}")
+        for row in [[f"Silicone strip {k}"], ["Test time", "Standard travel", "Standard force"], ["s", "mm", "N"]]:
+            sheet.append(row)
+        for t, x, f in zip(TIME, MM, k * FORCE, strict=True):
+            sheet.append([float(t), float(x), float(f)])
+    out = io.BytesIO()
+    book.save(out)
+    return out.getvalue()
+
+
+def test_a_part_is_chosen_by_the_name_of_its_sheet_and_has_the_sizes_of_that_name() -> None:
+    data = named_sheets()
+    for part, times, sizes in (("S1", 1, (5e-4, 0.01, 0.05)), ("S2", 2, (6e-4, 0.012, 0.04))):
+        found = imported(data, part=part)
+        assert (found.film.thickness, found.film.width, found.film.length) == pytest.approx(sizes)
+        assert found.columns["nominal_stress"] == pytest.approx(times * FORCE / (sizes[0] * sizes[1]))
+    by_label = imported(data, part="Silicone strip 2")
+    assert np.array_equal(by_label.columns["stretch"], imported(data, part="2").columns["stretch"])
+    with pytest.raises(DataError, match=r'there is no part "S3" \(1: Silicone strip 1, 2: Silicone strip 2\)'):
+        imported(data, part="S3")
+
+
+def test_the_name_of_a_sheet_with_several_parts_chooses_none() -> None:
+    book = openpyxl.Workbook()
+    sheet = book.active
+    assert sheet is not None
+    sheet.title = "Daten"
+    for row in [["A", None, "B", None], ["Weg (mm)", "Kraft (N)"] * 2]:
+        sheet.append(row)
+    for x, f in zip(MM, FORCE, strict=True):
+        sheet.append([float(x), float(f), float(x), 2 * float(f)])
+    out = io.BytesIO()
+    book.save(out)
+    with pytest.raises(DataError, match='there is no part "Daten"'):
+        imported(out.getvalue(), part="Daten")
+
+
+@pytest.mark.parametrize(
+    "header", ["SetName,Time_S,Displacement_um,Force_mN,FileName", "SetName,Time_S,Displacement_um,Force_mN"]
+)
+def test_columns_of_text_are_told_on_both_sides_of_the_numbers(header: str) -> None:
+    rows = lines((), TIME, 1e3 * MM, 1e3 * FORCE).strip().split("\n")
+    after = ",a.jpg" if header.endswith("FileName") else ""
+    found = imported("\n".join([header, *(f"Set1,{row}{after}" for row in rows), ""]).encode())
+    told = "ignored columns: SetName, FileName" if after else "ignored columns: SetName"
+    assert told in found.notes
+
+
 def test_two_axes_become_a_biaxial_test(tmp_path: Path) -> None:
     header = "SetName,Cycle,Time_S,XSize_um,YSize_um,XDisplacement_um,YDisplacement_um,XForce_mN,YForce_mN"
     size = 0 * TIME + 5000.0

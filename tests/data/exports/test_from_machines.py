@@ -24,6 +24,13 @@ BLOCK = {"rig": "compression", "gauge_length": LENGTH, "width": WIDTH, "thicknes
 
 
 @pytest.mark.parametrize(
+    ("key", "fact"), [("h (mm)", "thickness"), ("h0 [µm]:", "thickness"), ("h", ""), ("Time (h)", ""), ("h (N)", "")]
+)
+def test_h_is_a_thickness_only_with_a_unit_of_length(key: str, fact: str) -> None:
+    assert fact_of(key) == fact
+
+
+@pytest.mark.parametrize(
     ("travel", "force", "sign"), [(1, -1, "flip-force"), (-1, 1, "flip-travel"), (-1, -1, "flip"), (1, 1, "keep")]
 )
 def test_a_said_sign_turns_what_a_strip_carries_too(travel: int, force: int, sign: str) -> None:

@@ -183,6 +183,8 @@ PREAMBLES = {
     "spanish": "Muestra;film 3\nLongitud calibrada;50;mm\nAnchura;10;mm\nEspesor;0,5;mm\n",
     "polish": "Próbka;film 3\nDługość pomiarowa;50;mm\nSzerokość;10;mm\nGrubość;0,5;mm\n",
     "chinese": "试样;film 3\n标距;50;mm\n宽度;10;mm\n厚度;0.5;mm\n",
+    "units in brackets, then a colon": "Próbka:;film 3\nDługość pomiarowa [mm]:;50\nSzerokość [mm]:;10\n"
+    "Grubość [mm]:;0,5\nPrędkość [mm/min]:;100\n",
     "area": "Sample;film 3\nL0;50;mm\nThickness;0,5;mm\nCross-section;5;mm²\n",
     "inches": "Specimen;film 3\nGauge length;1,968503937007874;in\nWidth;0,3937007874015748;in\nThickness;500;µm\n",
 }
@@ -215,6 +217,16 @@ def test_no_header_but_names_said() -> None:
 def test_units_said() -> None:
     text = lines("Time,Extension,Load", TIME, 1e3 * TRAVEL, FORCE)
     same_force(imported(text.encode(), units="time=s,travel=mm,load=N"))
+
+
+@pytest.mark.parametrize(
+    ("unit", "per_one"), [("ratio", 1), ("Ratio", 1), ("1", 1), ("mm/mm", 1), ("percent", 100), ("%", 100)]
+)
+def test_units_of_a_strain_said(unit: str, per_one: int) -> None:
+    text = lines("Strain,Stress (MPa)", per_one * (STRETCH - 1), STRESS / 1e6, form="%.9g")
+    found = imported(text.encode(), units=f"strain={unit}")
+    same_stretch(found)
+    assert not any("in one" in g.value for g in found.guesses)
 
 
 def test_compression_and_zero() -> None:

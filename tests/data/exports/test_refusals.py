@@ -39,7 +39,7 @@ PLAIN = lines("Time (s),Extension (mm),Load (N)", TIME, MM, FORCE)
         (lines("Time (s),Extension,Load (N)", TIME, MM, FORCE), ['"Extension" names no unit', "--units travel=mm"]),
         (lines("Extension (furlong),Load (N)", MM, FORCE), ['"furlong" is none of it', "--units travel=mm"]),
         (lines("Load 1 (N),Load 2 (N),Weg (mm)", FORCE, 2 * FORCE, MM), ["may each be the force", '--columns "force=Load 1']),
-        (lines("Strain,Stress (MPa)", 0.4 * TIME, STRESS / 1e6), ['"Strain" names no unit', "--units strain=percent"]),
+        (lines("Strain,Stress (MPa)", 0.4 * TIME, STRESS / 1e6), ['"Strain" names no unit', "--units strain=percent, or mm/mm, 1 or ratio"]),
         (lines("Strain (mm/mm),Stress (MPa)", STRETCH, STRESS / 1e6), ["starts at 1", "--strain stretch"]),
         (lines("Stretch,Stress (MPa)", STRETCH - 1, STRESS / 1e6), ["called a stretch and starts at 0", "strain=Stretch"]),
         (lines("Strain (%),Load (N)", 100 * (STRETCH - 1), FORCE), ["nominal stress", "--width-mm and --thickness-um"]),
@@ -133,11 +133,92 @@ def test_true_against_engineering_stress() -> None:
     assert contradictions(text) == ""
 
 
+TWICE = (100 * np.log(STRETCH), STRESS * STRETCH / 1e6, 100 * (STRETCH - 1), STRESS / 1e6)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "True strain (%),True stress (MPa),Engineering strain (%),Engineering stress (MPa)",
+        "Wahre Dehnung [%],Wahre Spannung [MPa],Technische Dehnung [%],Technische Spannung [MPa]",
+        "Log strain (%),True stress (MPa),Nominal strain (%),Nominal stress (MPa)",
+        "True strain (%),True stress (MPa),Strain (%),Stress (MPa)",
+    ],
+)
+def test_of_true_and_engineering_columns_the_engineering_ones_are_taken(header: str) -> None:
+    names = header.split(",")
+    found = imported(lines(header, *TWICE).encode())
+    assert found.columns["stretch"] == pytest.approx(STRETCH, abs=1e-6)
+    assert found.columns["nominal_stress"] == pytest.approx(STRESS, rel=1e-4, abs=20)
+    assert not found.contradictions
+    assert f"compared with the curve, and not used: {names[0]}, {names[1]}" in found.notes
+    assert not any("ignored" in note for note in found.notes)
+    true = imported(lines(header, *TWICE).encode(), strain="true", stress="true")
+    assert true.columns["stretch"] == pytest.approx(STRETCH, abs=1e-6)
+    assert true.columns["nominal_stress"] == pytest.approx(STRESS, rel=1e-4, abs=20)
+    assert any(g.value == f'"{names[0]}" is true' for g in true.guesses)
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        ("", "true"),
+        ("strain=Strain,stress=Stress (MPa)", "true"),
+        ("strain=3", "true"),
+        ("strain=True strain,stress=True stress (MPa)", "engineering"),
+    ],
+)
+def test_what_a_choice_of_columns_leaves_over_is_compared_with_the_curve(columns: str, words: str) -> None:
+    header = "True strain,True stress (MPa),Strain,Stress (MPa)"
+    strain, stress = np.log(STRETCH), TWICE[1].copy()
+    strain[-2:] *= 1.2
+    stress[-5:] *= 1.15
+    text = lines(header, strain, stress, STRETCH - 1, TWICE[3])
+    found = imported(text.encode(), columns=columns, units="strain=mm/mm").contradictions
+    assert [f"{words} strain and" in found[0], f"{words} stress and" in found[1], len(found)] == [True, True, 2]
+    assert "in 2 of 25 rows (lines 25 to 26" in found[0]
+    assert found[0].endswith(" mm/mm)")
+    assert "in 5 of 25 rows (lines 22 to 26" in found[1]
+    assert "MPa against 0.1" in found[1]
+
+
+def test_a_column_left_out_by_its_place_is_not_compared() -> None:
+    text = lines("True strain (%),True stress (MPa),Strain (%),Stress (MPa)", *TWICE[:1], TWICE[3], *TWICE[2:])
+    assert "true stress and" in contradictions(text)
+    assert contradictions(text, columns="-,-,strain,stress") == ""
+
+
+def test_a_column_that_is_only_compared_keeps_its_own_unit_and_may_have_gaps() -> None:
+    text = lines("True strain (%),True stress (MPa),Strain,Stress (MPa)", *TWICE[:2], STRETCH - 1, TWICE[3])
+    assert contradictions(text, columns="strain=Strain", units="strain=mm/mm") == ""
+    found = imported(damaged(text, 9, 0, "-.-").encode(), columns="strain=Strain", units="strain=mm/mm")
+    assert not found.contradictions
+    assert "ignored columns: True strain (%)" in found.notes
+
+
+def test_true_stress_against_force_over_area() -> None:
+    text = lines("Strain (%),Force (N),True stress (kPa)", 100 * (STRETCH - 1), FORCE, STRESS / 1e3)
+    found = contradictions(text, width=0.01, thickness=5e-4)
+    assert "true stress and force over width and thickness times stretch contradict" in found
+    assert "kPa against" in found
+
+
+@pytest.mark.parametrize("sign", [{"rig": "compression"}, {"sign": "flip"}])
+def test_what_is_only_compared_is_turned_round_with_what_is_used(sign: dict[str, str]) -> None:
+    pressed = 1 - 0.2 * (STRETCH - 1)
+    columns = TIME, -100 * np.log(pressed), STRESS * pressed / 1e6, 100 * (1 - pressed), STRESS / 1e6
+    text = lines("Time (s),True strain (%),True stress (MPa),Nominal strain (%),Nominal stress (MPa)", *columns)
+    found = imported(text.encode(), **sign)
+    assert found.columns["stretch"] == pytest.approx(pressed, abs=1e-6)
+    assert not found.contradictions
+
+
 @pytest.mark.parametrize(("speed", "agrees"), [(50.0, True), (60.0, False)])
 def test_speed_times_time_against_displacement(speed: float, agrees: bool) -> None:
     x = np.linspace(0, 10, 25)  # mm in 12 s
-    text = lines("Time (s),Extension (mm),Load (N)", TIME, x, FORCE, before=f"Test speed (mm/min),{speed}\n")
-    assert ("times the time and the travel" not in contradictions(text)) == agrees
+    for key in ("Test speed (mm/min)", "Prędkość [mm/min]", "Prędkość [mm/min]:", "Test speed (mm/min) :"):
+        text = lines("Time (s),Extension (mm),Load (N)", TIME, x, FORCE, before=f"{key},{speed}\n")
+        assert ("times the time and the travel" not in contradictions(text)) == agrees
 
 
 def test_stress_against_force_over_area() -> None:
