@@ -27,7 +27,7 @@ def ruled_out_gain(posterior: Posterior | JointPosterior, x: Array, seed: int) -
     if free is None:
         return None
     rng, count = np.random.default_rng([seed, 3]), max(LEAST, min(POINTS, READINGS // posterior.readings))
-    some = x[rng.integers(len(x), size=4 * POINTS)]
+    some = x[rng.integers(len(x), size=4 * count)]
     root = WIDER * np.linalg.cholesky(np.cov(some.T) + 1e-12 * np.eye(x.shape[1]))
     lp = weighed(free, some).log_posterior
     best, within = some[int(np.argmax(lp))], float(np.max(lp))

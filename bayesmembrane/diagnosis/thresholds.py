@@ -472,7 +472,7 @@ class LoopThresholds:
 class WordsThresholds:
     """From where on something is worth a sentence."""
 
-    likely: float = 0.8
+    likely: float = 0.5
     """Probability of an effect, summed over sets, from which on an ambiguous answer says so."""
     listed_sets: int = 4
     """Sets of an ambiguous answer that are told with their sizes; of more the rest are counted."""
