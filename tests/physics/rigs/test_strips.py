@@ -432,3 +432,23 @@ def test_a_published_test_in_both_directions_is_read(files: Files) -> None:
     part = m.select(m.deflection < 0)
     force = Forward(found.hypothesis, part, part.deflection)(found.coordinates).force[0]
     assert np.corrcoef(force, part.force)[0, 1] > 0.99
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "side", "said"),
+    [
+        (0.5, 2.5, -1, "line 2: every stress below a stretch of 1, where the specimen is pressed, is positive"),
+        (0.3, 1.3, 1, "line 13: every stress above a stretch of 1, where the specimen is pulled, is negative"),
+    ],
+)
+def test_a_side_with_the_wrong_sign_is_refused(files: Files, low: float, high: float, side: int, said: str) -> None:
+    """Though on the other side, where most of the readings lie, all is well."""
+    stretch = np.append(np.linspace(low, 0.95, 11), np.linspace(1.05, high, 11 - side * 3))
+    stress = 0.4 * (stretch - stretch**-2.0) * np.where(side * (stretch - 1) > 0, -1, 1)
+    rows = "".join(f"{x:.6g},{s:.6g}\n" for x, s in zip(stretch, stress, strict=True))
+    assert said in files.fault("stretch,nominal_stress_MPa\n" + rows)
+
+
+def test_a_zero_that_is_off_is_no_wrong_sign(files: Files) -> None:
+    m = files.read("stretch,nominal_stress_MPa\n0.97,0.02\n0.99,0.05\n1.2,0.3\n1.6,0.5\n")
+    assert m.force[0] > 0
