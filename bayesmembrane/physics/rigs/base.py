@@ -166,6 +166,10 @@ class Homogeneous(Rig, ABC):
             f"deflection is {1e-3 * shown['m'][0]:.4g} of {self.axes[0]}"
         )
 
+    def filed(self, deflection: float) -> tuple[str, str]:
+        """What a file calls a deflection in m, and its value there: ("stretch", "1.2")."""
+        return self.axes[0], f"{self.axes[1] + deflection / self.length:g}"
+
     def place(self, deflection: float) -> str:
         return f"a {self.axes[0]} of {self.axes[1] + deflection / self.length:.3g}"
 
@@ -242,7 +246,7 @@ class Strip(Homogeneous, ABC):
         if across is not None:
             places = 2 * places
         elif np.any(pulled):  # else the signs come first: pressed, its order is another one
-            check_sequence(columns, places)
+            check_sequence(columns, places, self.filed)
         if across is not None:  # held wide a film pulls below rest, and held narrow it may push above
             pulled, pushed = pulled & (across >= 1), pushed & (across <= 1)
         against = ((pulled & (force < 0)) | (pushed & (force > 0))) & (np.abs(force) > 0.01 * np.max(np.abs(force)))

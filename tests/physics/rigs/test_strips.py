@@ -452,3 +452,24 @@ def test_a_side_with_the_wrong_sign_is_refused(files: Files, low: float, high: f
 def test_a_zero_that_is_off_is_no_wrong_sign(files: Files) -> None:
     m = files.read("stretch,nominal_stress_MPa\n0.97,0.02\n0.99,0.05\n1.2,0.3\n1.6,0.5\n")
     assert m.force[0] > 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "curve", "said"),
+    [
+        ("shear", "shear,shear_stress_MPa\n0,0\n1,0.4\n1,0.4\n0,0\n", "line 4: the shear 1 stands there twice"),
+        ("uniaxial", PULLED + "1.4,0.5\n", "line 5: the stretch 1.4 stands there twice"),
+        (
+            "uniaxial",
+            PULLED + "1.3,0.4\n1.5,0.6\n1.6,0.7\n",
+            "line 5: the stretch is not in order (1.3 after 1.4); sort",
+        ),
+        (
+            "compression",
+            "stretch,nominal_stress_MPa\n0.9,-0.1\n0.8,-0.2\n0.8,-0.2\n",
+            "line 4: the compression to a stretch of 0.8 stands there twice",
+        ),
+    ],
+)
+def test_an_order_that_no_test_has_is_told_as_the_file_has_it(files: Files, kind: str, curve: str, said: str) -> None:
+    assert said in files.fault(curve, kind)
