@@ -119,6 +119,22 @@ def test_files_come_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("height_sd_mm", "force_sd_N", "known: covariance, height_sd_mm, origin"),
+        ("lift_mm = 35\n", "", "the key lift_mm is missing; add it with its value, as in lift_mm = 30"),
+        ("lift_mm = 35", "lift_cm = 0", "lift_cm must be a positive length, and 0 cm is not"),
+    ],
+)
+def test_a_fault_of_the_specimen_file_is_told_by_its_own_keys(tmp_path: Path, old: str, new: str, said: str) -> None:
+    (tmp_path / "c.csv").write_text("radius_mm,height_mm\n12,20\n13,19\n")
+    (tmp_path / "c.toml").write_text(TOML.replace(old, new))
+    with pytest.raises(DataError) as caught:
+        read_measurement(tmp_path / "c.csv", tmp_path / "c.toml")
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
     ("rows", "said"),
     [
         ("5,30\n12,20\n", "line 2: a radius of 5 mm is not on the film between 10 and 35 mm"),

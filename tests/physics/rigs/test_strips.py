@@ -473,3 +473,23 @@ def test_a_zero_that_is_off_is_no_wrong_sign(files: Files) -> None:
 )
 def test_an_order_that_no_test_has_is_told_as_the_file_has_it(files: Files, kind: str, curve: str, said: str) -> None:
     assert said in files.fault(curve, kind)
+
+
+UP_AND_DOWN = [*np.linspace(1.0, 1.5, 11), *np.linspace(1.45, 1.0, 10)]
+
+
+def labelled(column: str, values: list[int]) -> str:
+    rows = zip(UP_AND_DOWN, values, strict=True)
+    return f"stretch,nominal_stress_MPa,{column}\n" + "".join(f"{x:.6g},{x - 1:.6g},{v}\n" for x, v in rows)
+
+
+@pytest.mark.parametrize(
+    ("cycle", "said"),
+    [
+        ([3] * 10 + [2] * 11, "line 2, column cycle: the cycles begin with 3, and 2 follows in line 12; write 1, 2, 3"),
+        ([1] * 8 + [2] * 2 + [1] * 11, "line 12, column cycle: cycle 1 comes after cycle 2; write 1, 2, 3"),
+        ([1] * 20 + [0], "line 22, column cycle: 0 is no cycle"),
+    ],
+)
+def test_cycles_that_fall_are_blamed_where_the_wrong_one_stands(files: Files, cycle: list[int], said: str) -> None:
+    assert said in files.fault(labelled("cycle", cycle))
