@@ -22,6 +22,8 @@ HELD, STILL = 12, 0.1
 """Readings of a hold, at least, and the part of the speed before it at which the disc counts as standing still."""
 MOST_HELD = 4000
 """In a longer record holds are looked for in means of neighbours, half as many as this."""
+CONTRADICTED = 0.1
+"""Of all readings: where legs turn, as many may be counted to the other one."""
 NOMINAL_SPEED = 1e-3
 """m/s: without times the disc counts as moved at this speed, so that a second is a millimetre of travel."""
 SLOWEST = 1e-3
@@ -199,6 +201,20 @@ def check_time(time: Array, places: list[str]) -> None:
         raise DataError(
             f"the time does not increase ({time[k]:g} s after {time[k - 1]:g} s)", places[k], "sort the lines by time"
         )
+
+
+def contradicted(motion: Motion) -> tuple[str, ...]:
+    """A note, where the legs that were said are not those that the deflections show in many readings."""
+    if motion.said_leg is None:
+        return ()
+    against = legs(motion.deflection) != motion.said_leg
+    for still in holds(motion.deflection):
+        against[still] = False
+    rows = int(np.sum(against))
+    if rows <= CONTRADICTED * against.size:
+        return ()
+    said = f"the column direction contradicts the motion in {rows} of {against.size} rows"
+    return (f"{said}: it was believed, and should be 1 while the deflection grows and -1 while it falls",)
 
 
 Filed = Callable[[float], tuple[str, str]]

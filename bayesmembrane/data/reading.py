@@ -13,7 +13,7 @@ import numpy as np
 
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen, check_covariance
-from bayesmembrane.data.motion import Motion
+from bayesmembrane.data.motion import Motion, contradicted
 from bayesmembrane.data.settings import TomlSection, load_toml
 from bayesmembrane.data.tables import TextTable, parse_table, read_matrix, read_text
 from bayesmembrane.data.thinning import READ, of_few
@@ -66,7 +66,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
         specimen_toml.name,
         covariance_file,
         "; ".join(o for o in origin if o),
-        (*notes, *rig.remarks(found)),
+        (*notes, *rig.remarks(found), *(contradicted(motion) if motion else ())),
     )
     if sd is not None and np.min(sd) < LEAST_SD:
         fault = f"a standard deviation of {np.min(sd):g} N looks like a wrong unit"

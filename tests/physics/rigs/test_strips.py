@@ -483,6 +483,14 @@ def labelled(column: str, values: list[int]) -> str:
     return f"stretch,nominal_stress_MPa,{column}\n" + "".join(f"{x:.6g},{x - 1:.6g},{v}\n" for x, v in rows)
 
 
+def test_a_direction_against_the_motion_is_noted(files: Files) -> None:
+    said = [1] * 11 + [-1] * 10
+    assert files.read(labelled("direction", said)).provenance.notes == ()
+    m = files.read(labelled("direction", [-s for s in said]))
+    assert "the column direction contradicts the motion in 21 of 21 rows" in m.provenance.notes[0]
+    assert m.leg.tolist() == [-s for s in said]
+
+
 @pytest.mark.parametrize(
     ("cycle", "said"),
     [
