@@ -18,6 +18,7 @@ from pydantic_core import ErrorDetails
 
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.campaign.places import line_of
+from bayesmembrane.data.settings import not_toml
 from bayesmembrane.data.tables import read_text
 from bayesmembrane.ground.errors import SettingsError, unknown_name
 from bayesmembrane.ground.registry import components
@@ -197,10 +198,8 @@ def read_campaign(path: Path) -> CampaignFile:
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        fault = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
-        raise SettingsError(
-            f"this is not valid TOML: {fault}", str(path), "texts stand in quotes, and numbers have decimal points"
-        ) from None
+        fault, remedy = not_toml(text, error)
+        raise SettingsError(fault, str(path), remedy) from None
     try:
         return CampaignFile.model_validate(table)
     except ValidationError as error:

@@ -13,7 +13,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from bayesmembrane.data.motion import check_order, check_time
+from bayesmembrane.data.motion import Filed, check_order, check_time, in_mm
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.units import FORCE, LENGTH
@@ -140,12 +140,12 @@ def check_lifted(columns: Mapping[str, Array], file: str, lines: Sequence[int]) 
     check_deviations(columns, places)
 
 
-def check_sequence(columns: Mapping[str, Array], places: list[str]) -> None:
+def check_sequence(columns: Mapping[str, Array], places: list[str], filed: Filed = in_mm) -> None:
     """Raise `DataError` unless the readings can be in the order of a test; ``places`` (N,) name their rows."""
     if "time" in columns:
         check_time(columns["time"], places)
     else:
-        check_order(columns["deflection"], places)
+        check_order(columns["deflection"], places, filed)
 
 
 def check_deviations(columns: Mapping[str, Array], places: list[str]) -> None:

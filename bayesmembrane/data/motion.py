@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,6 +22,8 @@ HELD, STILL = 12, 0.1
 """Readings of a hold, at least, and the part of the speed before it at which the disc counts as standing still."""
 MOST_HELD = 4000
 """In a longer record holds are looked for in means of neighbours, half as many as this."""
+CONTRADICTED = 0.1
+"""Of all readings: where legs turn, as many may be counted to the other one."""
 NOMINAL_SPEED = 1e-3
 """m/s: without times the disc counts as moved at this speed, so that a second is a millimetre of travel."""
 SLOWEST = 1e-3
@@ -200,7 +203,30 @@ def check_time(time: Array, places: list[str]) -> None:
         )
 
 
-def check_order(deflection: Array, places: list[str]) -> None:
+def contradicted(motion: Motion) -> tuple[str, ...]:
+    """A note, where the legs that were said are not those that the deflections show in many readings."""
+    if motion.said_leg is None:
+        return ()
+    against = legs(motion.deflection) != motion.said_leg
+    for still in holds(motion.deflection):
+        against[still] = False
+    rows = int(np.sum(against))
+    if rows <= CONTRADICTED * against.size:
+        return ()
+    said = f"the column direction contradicts the motion in {rows} of {against.size} rows"
+    return (f"{said}: it was believed, and should be 1 while the deflection grows and -1 while it falls",)
+
+
+Filed = Callable[[float], tuple[str, str]]
+"""Of a deflection in m: what a file calls it, and its value there."""
+
+
+def in_mm(deflection: float) -> tuple[str, str]:
+    """As files of a lifted disc have it."""
+    return "deflection", f"{1e3 * deflection:g} mm"
+
+
+def check_order(deflection: Array, places: list[str], filed: Filed = in_mm) -> None:
     """Raise `DataError` where deflections (N,) without times cannot be the order of a test; ``places`` name the rows.
 
     File order is then time order: the film is loaded first, no deflection is measured twice in a row, and a reversal
@@ -210,18 +236,19 @@ def check_order(deflection: Array, places: list[str]) -> None:
     same = np.flatnonzero(step == 0)
     if same.size:
         k = int(same[0]) + 1
-        raise DataError(
-            f"the deflection {1e3 * deflection[k]:g} mm stands there twice", places[k], "remove one line or add time_s"
-        )
-    remedy = "sort the lines by deflection, or add time_s if the film was really moved like this"
+        fault = "the {} {} stands there twice".format(*filed(deflection[k]))
+        raise DataError(fault, places[k], "remove one line or add time_s")
+    name = filed(0.0)[0]
+    remedy = f"sort the lines by {name}, or add time_s if the film was really moved like this"
     if step.size and step[0] < 0:
-        raise DataError("the deflections fall from the first line on", places[1], remedy)
+        raise DataError(f"the {name} falls from the first line on", places[1], remedy)
     starts = np.flatnonzero(np.diff(np.sign(step))) + 1
     lengths = np.diff(np.append(starts, step.size))
     short = np.flatnonzero(lengths < 2)
     if short.size:
         k = int(starts[short[0]]) + 1
-        fault = f"the deflections are not in order ({1e3 * deflection[k]:g} mm after {1e3 * deflection[k - 1]:g} mm)"
+        here, before = (filed(deflection[i])[1] for i in (k, k - 1))
+        fault = f"the {name} is not in order ({here} after {before})"
         raise DataError(fault, places[k], remedy)
 
 

@@ -13,20 +13,21 @@ import numpy as np
 
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen, check_covariance
-from bayesmembrane.data.motion import Motion
+from bayesmembrane.data.motion import Motion, contradicted
 from bayesmembrane.data.settings import TomlSection, load_toml
 from bayesmembrane.data.tables import TextTable, parse_table, read_matrix, read_text
 from bayesmembrane.data.thinning import READ, of_few
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
-from bayesmembrane.ground.units import FORCE, LENGTH, RATIO, TIME
+from bayesmembrane.ground.units import FORCE, LENGTH, RATIO, STRESS, TIME
 
 # What lies beyond these is a wrong unit, not a film.
 THINNEST = 1e-8  # m
 RIG_SIZES = (1e-6, 1.0)  # m
 LARGEST_LIFT = 20.0  # largest deflection relative to the size of the rig
 LEAST_SD = 1e-12  # N
+_USUAL = {FORCE: "N", STRESS: "MPa", LENGTH: "mm"}
 PHASES = MappingProxyType({"cycle": RATIO, "direction": RATIO})
 """Columns by which whoever measured says cycles (1, 2, ...) and legs (1 loading, -1 unloading)."""
 
@@ -48,7 +49,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     rig = rig.as_read(columns)
     found = _at(table.file, rig.from_columns, columns, specimen.thickness)
     deflection, force, across = found["deflection"], found["force"], found.get("across")
-    motion = _said_motion(table, found, rig)
+    motion = _said_motion(table, found)
     rig.check_readings(found, table.file, table.lines)
     _check_size(deflection, table, rig)
     single = _stated(options, rig, specimen.thickness)
@@ -65,7 +66,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
         specimen_toml.name,
         covariance_file,
         "; ".join(o for o in origin if o),
-        (*notes, *rig.remarks(found)),
+        (*notes, *rig.remarks(found), *(contradicted(motion) if motion else ())),
     )
     if sd is not None and np.min(sd) < LEAST_SD:
         fault = f"a standard deviation of {np.min(sd):g} N looks like a wrong unit"
@@ -83,8 +84,11 @@ def _rig(section: TomlSection) -> Fixture:
         supported = f"supported: {', '.join(known)}"
         raise DataError(f'there is no rig of the kind "{kind}"', section.where, supported)
     cls: type[Fixture] = known[kind]
-    required = {name: not cls.has_default(name) for name in cls.length_names()}
-    lengths = {name: section.measure(name, LENGTH, f"{name}_mm", need) for name, need in required.items()}
+    usual = cls.example().lengths
+    lengths = {
+        name: section.positive(name, LENGTH, f"{name}_mm", not cls.has_default(name), 1e3 * usual[name])
+        for name in cls.length_names()
+    }
     section.finish()
     rig = _at(section.where, partial(cls, **{k: v for k, v in lengths.items() if v is not None}))
     if not RIG_SIZES[0] <= rig.size() <= RIG_SIZES[1]:
@@ -94,7 +98,7 @@ def _rig(section: TomlSection) -> Fixture:
 
 def _specimen(section: TomlSection, rig: Fixture, default_name: str) -> Specimen:
     name = section.text("name") or default_name
-    thickness = section.measure("thickness", LENGTH, "thickness_um")
+    thickness = section.measure("thickness", LENGTH, "thickness_um", like=50)
     section.finish()
     specimen = _at(section.where, Specimen, name, thickness)
     if not THINNEST <= specimen.thickness <= rig.thickest:
@@ -134,27 +138,39 @@ def curve_columns(
     return {name: table.column(*place) for name, place in places.items()}, notes
 
 
-def _said_motion(table: TextTable, found: Mapping[str, Array], rig: Fixture) -> Motion | None:
+def _said_motion(table: TextTable, found: Mapping[str, Array]) -> Motion | None:
     """The path with the legs and cycles that columns say, None if there are no such columns."""
     leg, cycle = found.get("direction"), found.get("cycle")
     if leg is None and cycle is None:
         return None
-    for name, values, good in (
-        ("direction", leg, None if leg is None else np.abs(leg) == 1),
-        (
-            "cycle",
-            cycle,
-            None if cycle is None else (cycle >= 1) & (cycle == np.round(cycle)) & (np.diff(cycle, prepend=0) >= 0),
-        ),
-    ):
-        if values is not None and good is not None and not np.all(good):
-            k = int(np.argmin(good))
-            rule = "1 while loading and -1 while unloading" if name == "direction" else "1, 2, 3 in their order"
-            raise DataError(
-                f"{values[k]:g} is no {name}", f"{table.file}, line {table.lines[k]}, column {name}", f"write {rule}"
-            )
+    if leg is not None and not np.all(good := np.abs(leg) == 1):
+        k = int(np.argmin(good))
+        raise _no_phase(table, k, "direction", f"{leg[k]:g} is no direction", "1 while loading and -1 while unloading")
+    if cycle is not None:
+        _check_cycles(table, cycle)
     reach = float(np.max(found["deflection"]))
     return Motion(found["deflection"], found.get("time"), reach, None, leg, cycle)
+
+
+def _check_cycles(table: TextTable, cycle: Array) -> None:
+    """Raise `DataError` unless the cycles (N,) are whole numbers from 1 that never fall."""
+    rule = "1, 2, 3 in their order"
+    whole = (cycle >= 1) & (cycle == np.round(cycle))
+    if not np.all(whole):
+        k = int(np.argmin(whole))
+        raise _no_phase(table, k, "cycle", f"{cycle[k]:g} is no cycle", rule)
+    falls = np.flatnonzero(np.diff(cycle) < 0)
+    if not falls.size:
+        return
+    k = int(falls[0]) + 1
+    if cycle[0] > 1 and cycle[0] == cycle[k - 1]:  # what is wrong is how the file begins, not what comes after
+        fault = f"the cycles begin with {cycle[0]:g}, and {cycle[k]:g} follows in line {table.lines[k]}"
+        raise _no_phase(table, 0, "cycle", fault, rule)
+    raise _no_phase(table, k, "cycle", f"cycle {cycle[k]:g} comes after cycle {cycle[k - 1]:g}", rule)
+
+
+def _no_phase(table: TextTable, row: int, column: str, fault: str, rule: str) -> DataError:
+    return DataError(fault, f"{table.file}, line {table.lines[row]}, column {column}", f"write {rule}")
 
 
 def _check_size(deflection: Array, table: TextTable, rig: Fixture) -> None:
@@ -171,7 +187,7 @@ def _stated(options: TomlSection, rig: Fixture, thickness: float) -> float | Non
     """N, the standard deviation that the specimen file states for all points, or None; in any quantity of the rig."""
     found = {}
     for name, quantity in rig.noise.items():
-        value = options.measure(name, quantity, f"{name}_{'N' if quantity == FORCE else 'MPa'}", required=False)
+        value = options.measure(name, quantity, f"{name}_{_USUAL[quantity]}", required=False)
         if value is not None:
             found[name] = value * rig.newton(quantity, thickness)
     if len(found) > 1:

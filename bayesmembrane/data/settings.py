@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -19,10 +20,28 @@ def load_toml(path: Path) -> TomlSection:
     try:
         return TomlSection(tomllib.loads(text), str(path))
     except (ValueError, RecursionError) as error:
-        fault = "it is nested too deeply" if isinstance(error, RecursionError) else f"{error}"
-        raise DataError(
-            f"this is not valid TOML: {fault}", str(path), "texts stand in quotes, and numbers have decimal points"
-        ) from None
+        fault, remedy = not_toml(text, error)
+        raise DataError(fault, str(path), remedy) from None
+
+
+def not_toml(text: str, error: ValueError | RecursionError) -> tuple[str, str]:
+    """(fault, remedy) of a text that ``tomllib`` refused with ``error``."""
+    if isinstance(error, RecursionError):
+        return "this is not valid TOML: it is nested too deeply", "write it flat, as the examples are"
+    line = re.search(r"at line (\d+)", str(error))
+    content = text.split("\n")[int(line[1]) - 1 :][:1] if line else []
+    bare = re.search(r"[=\[,]\s*([-+]?)(\d*\.\d*)\s*(?:[],#]|$)", content[0]) if content else None
+    if bare and len(bare[2]) > 1 and not (bare[2][0].isdigit() and bare[2][-1].isdigit()):
+        remedy = f"a number has digits on both sides of its point: write {bare[1]}{_with_digits(bare[2])}"
+    else:
+        remedy = "texts stand in quotes, and numbers have decimal points"
+    return f"this is not valid TOML: {error}", remedy
+
+
+def _with_digits(number: str) -> str:
+    """``.003`` -> ``0.003``, ``5.`` -> ``5.0``."""
+    before, after = number.split(".")
+    return f"{before or '0'}.{after or '0'}"
 
 
 class TomlSection:
@@ -56,8 +75,13 @@ class TomlSection:
             raise DataError(f"{key} must be a text in quotes, and it is {_shown(value)}", self.where)
         return value
 
-    def measure(self, name: str, quantity: str, example: str, required: bool = True) -> float | None:
-        """The number under ``name_<unit>`` in SI, None if there is none and it is not required."""
+    def measure(
+        self, name: str, quantity: str, example: str, required: bool = True, like: float | None = None
+    ) -> float | None:
+        """The number under ``name_<unit>`` in SI, None if there is none and it is not required.
+
+        ``example`` is such a key, and ``like`` a usual value of it.
+        """
         keys = [k for k in self.table if split_header(k)[0] == name]
         self._note(example, *keys)
         if len(keys) > 1:
@@ -65,14 +89,23 @@ class TomlSection:
         if not keys:
             self._refuse_unit(name, quantity)
             if required:
-                raise DataError(
-                    f"the key {example} is missing", self.where, self._like(example) or f"add {example} = ..."
-                )
+                add = f"add it with its value, {'a number' if like is None else f'as in {example} = {like:g}'}"
+                raise DataError(f"the key {example} is missing", self.where, self._like(example) or add)
             return None
         unit = split_header(keys[0])[1]
         if not unit and "" not in known_units(quantity):
             raise DataError(f"the key {keys[0]} names no unit", self.where, f"call it {example}")
         return to_si(self._number(keys[0]), factor(unit, quantity, f"{self.where}, {keys[0]}"))
+
+    def positive(self, name: str, quantity: str, example: str, required: bool, like: float) -> float | None:
+        """As `measure`, of what must be above zero."""
+        value = self.measure(name, quantity, example, required, like)
+        if value is not None and value <= 0:
+            key = next(k for k in self.table if split_header(k)[0] == name)
+            given = f"{self._number(key):g} {split_header(key)[1]}"
+            fault = f"{key} must be a positive {quantity}, and {given} is not"
+            raise DataError(fault, self.where, f"correct it, as in {example} = {like:g}")
+        return value
 
     def all_text(self) -> str:
         """Every key with its value, for sections whose content is free."""

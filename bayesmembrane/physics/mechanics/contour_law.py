@@ -80,9 +80,8 @@ class ContourLaw:
         found = profile(self.material.from_vector(parameters), self.lift, points=POINTS, **radii)
         if found.status is not Status.OK:
             return found.status, None
-        # Lifted far, some films are narrowest below the disc: what lies outside of the neck is seen.
-        neck = int(np.argmin(found.f))
-        return Status.OK, PchipInterpolator(found.f[neck:], found.height[neck:])
+        seen = _seen(found.f)
+        return Status.OK, PchipInterpolator(found.f[seen], found.height[seen])
 
     def _heights(self, radius: Array) -> tuple[Array, Array]:
         height, slope = np.full(radius.shape, np.nan), np.full(radius.shape, np.nan)
@@ -91,6 +90,17 @@ class ContourLaw:
                 at = np.clip(radius[b], shape.x[0], shape.x[-1])
                 height[b], slope[b] = shape(at), shape(at, 1)
         return height, slope
+
+
+def _seen(radius: Array) -> NDArray[np.intp]:
+    """Which points of a film, at radii (M,) from the disc down to the clamp, are seen from above and without the neck.
+
+    Lifted far, some films are narrowest below the disc, and some hang over what lies below them: there is one height at
+    each radius, the highest outside of the neck.
+    """
+    neck = int(np.argmin(radius))
+    farthest = np.maximum.accumulate(radius[neck:])
+    return neck + np.flatnonzero(np.diff(farthest, prepend=-np.inf) > 0)
 
 
 def contour_curves(law: ContourLaw, margins: Curves, radius: Array, sensitivities: bool = False) -> Curves:

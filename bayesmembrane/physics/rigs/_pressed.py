@@ -79,12 +79,15 @@ class Pressed(Homogeneous, ABC):
         if "time" not in columns and np.all(np.diff(x) < 0):
             remedy = "write the lines in the order in which they were measured, from a stretch of 1 down, or add time_s"
             raise DataError("the stretch rises from the first line on", places[0], remedy)
-        check_sequence(columns, places)
+        check_sequence(columns, places, self.filed)
         against = (push < 0) & (np.abs(push) > 0.01 * np.max(np.abs(push)))
         if np.sum(against) > 0.5 * x.size:
             fault = "the stress has one sign at most points and the other sign where most is carried"
             raise DataError(fault, places[int(np.argmax(against))], "check where it is zero")
         check_deviations(columns, places)
+
+    def filed(self, deflection: float) -> tuple[str, str]:
+        return "compression", f"to a stretch of {1.0 - deflection / self.length:g}"
 
     def to_columns(self, arrays: Mapping[str, Array], thickness: float) -> dict[str, Array]:
         out = {"time_s": arrays["time"]} if "time" in arrays else {}

@@ -27,6 +27,7 @@ Law = Any
 
 PUSHED = 0.01  # of the largest force: a negative one beyond it is no noise about the zero of a slack film
 ABOVE_REST = 0.02  # of the largest compression: so far above rest a test in compression may start
+SIDE = 0.1  # of the farther one: a side that goes less far from rest may be a zero that is off
 STATES = 40  # at which a closed form is asked for its convexity
 
 
@@ -165,6 +166,10 @@ class Homogeneous(Rig, ABC):
             f"deflection is {1e-3 * shown['m'][0]:.4g} of {self.axes[0]}"
         )
 
+    def filed(self, deflection: float) -> tuple[str, str]:
+        """What a file calls a deflection in m, and its value there: ("stretch", "1.2")."""
+        return self.axes[0], f"{self.axes[1] + deflection / self.length:g}"
+
     def place(self, deflection: float) -> str:
         return f"a {self.axes[0]} of {self.axes[1] + deflection / self.length:.3g}"
 
@@ -241,7 +246,7 @@ class Strip(Homogeneous, ABC):
         if across is not None:
             places = 2 * places
         elif np.any(pulled):  # else the signs come first: pressed, its order is another one
-            check_sequence(columns, places)
+            check_sequence(columns, places, self.filed)
         if across is not None:  # held wide a film pulls below rest, and held narrow it may push above
             pulled, pushed = pulled & (across >= 1), pushed & (across <= 1)
         against = ((pulled & (force < 0)) | (pushed & (force > 0))) & (np.abs(force) > 0.01 * np.max(np.abs(force)))
@@ -252,6 +257,8 @@ class Strip(Homogeneous, ABC):
             if self.pressed and not np.any(pulled):
                 remedy += f', or say kind = "{self.pressed}" if it is positive where it pushes'
             raise DataError(fault, places[k], remedy)
+        if across is None:
+            _check_sides(deflection, force, places)
         if not np.any(deflection > 0):
             fault = "no stretch is above 1, and this rig only pulls"
             raise DataError(fault, file, "keep the signs as they are, and add the readings in tension of this rubber")
@@ -262,6 +269,21 @@ class Strip(Homogeneous, ABC):
         out["stretch"] = 1.0 + arrays["deflection"] / self.length
         out["nominal_stress_MPa"] = 1e-6 * arrays["force"] / (self.width * thickness)
         return out | ({"force_sd_N": arrays["force_sd"]} if "force_sd" in arrays else {})
+
+
+def _check_sides(deflection: Array, force: Array, places: Sequence[str]) -> None:
+    """Raise `DataError` for a side of rest, pulled or pressed, on which every stress (N,) has the wrong sign."""
+    told = np.abs(force) > 0.01 * np.max(np.abs(force))
+    for side, where, wrong, done in ((1, "above", "negative", "pulled"), (-1, "below", "positive", "pressed")):
+        there = told & (side * deflection > 0)
+        far = np.max(side * deflection) > SIDE * np.max(np.abs(deflection))
+        carries = np.sum(there) > 0.5 * np.sum(side * deflection > 0)
+        if far and carries and np.all(side * force[there] < 0):
+            fault = f"every stress {where} a stretch of 1, where the specimen is {done}, is {wrong}"
+            remedy = (
+                "in a test that goes both ways write the stress positive where it pulls and negative where it pushes"
+            )
+            raise DataError(fault, places[int(np.argmax(there))], remedy)
 
 
 def only_pressed(stretch: Array) -> bool:

@@ -68,7 +68,7 @@ class Shear(Homogeneous):
         x, force = columns["deflection"], columns["force"]
         if float(np.max(x)) < -float(np.min(x)):
             raise DataError("the shear is largest where it is negative", file, "change the signs of shear and stress")
-        check_sequence(columns, places)
+        check_sequence(columns, places, self.filed)
         against = (x * force < 0) & (np.abs(force) > 0.01 * np.max(np.abs(force)))
         if np.sum(against) > 0.5 * x.size:
             fault = "at most points the stress is against the shear"

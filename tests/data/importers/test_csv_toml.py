@@ -88,8 +88,8 @@ def test_the_template_is_complete_without_its_hashes(tmp_path: Path) -> None:
         ("deflection_mm;force_N\n1,5;0,1\n2,5;1.000,2\n", 'line 3, column force_N: "1.000,2" is not a number'),
         ("deflection_mm;force_N\n1,5;0,1\n2,5;\n", "line 3, column force_N: the cell is empty"),
         ("deflection_mm,force_N\n1,5,0,1\n", "as decimal commas would cause; write decimal points, or semicolons"),
-        ("deflection_mm;force_N\n1;0,1\n3;0,2\n2;0,3\n", "line 4: the deflections are not in order"),
-        ("deflection_mm;force_N\n-1;-0,1\n-3;-0,2\n-4;-1\n", "fall from the first line on"),
+        ("deflection_mm;force_N\n1;0,1\n3;0,2\n2;0,3\n", "line 4: the deflection is not in order"),
+        ("deflection_mm;force_N\n-1;-0,1\n-3;-0,2\n-4;-1\n", "falls from the first line on"),
     ],
 )
 def test_what_cannot_be_read_is_refused_with_its_place(tmp_path: Path, content: str | bytes, said: str) -> None:

@@ -16,6 +16,8 @@ from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.registry import material
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.materials.mooney_rivlin import MooneyRivlin
+from bayesmembrane.physics.mechanics.profile import profile
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.contour import Contour
 from tests.physics.mechanics.films import INNER, MM, OUTER, silicone
@@ -54,6 +56,19 @@ def test_slopes_in_all_coordinates_are_differences_and_none_is_the_modulus() -> 
     step = np.array([0.0, 1e-3])
     numeric = (f(x + step).force - f(x - step).force)[0] / 2e-3
     assert found.sensitivity[0, :, 1] == pytest.approx(numeric, rel=1e-3, abs=1e-4 * np.max(np.abs(numeric)))
+
+
+def test_a_film_that_hangs_over_itself_has_the_heights_seen_from_above() -> None:
+    """Such a film reaches beyond its clamp, and comes back below."""
+    lift, film = 900 * MM, [110478.0, -307.0]
+    shape = profile(MooneyRivlin(*film), lift, inner_radius=INNER, outer_radius=OUTER)
+    assert np.max(shape.f) > 1.5 * OUTER
+    m = Measurement(RADIUS, 0 * RADIUS, Contour(INNER, OUTER, lift), Specimen("film", 5e-5))
+    h = hypothesis("mooney_rivlin")
+    found = Forward(h, m, m.deflection)(h.material.to_coordinates(film))
+    assert np.all(found.ok)
+    before = slice(int(np.argmax(shape.f)))
+    assert found.force[0] == pytest.approx(np.interp(RADIUS, shape.f[before], shape.height[before]), abs=1e-3 * lift)
 
 
 @pytest.mark.study
@@ -101,6 +116,22 @@ def test_files_come_back(tmp_path: Path) -> None:
     assert again.rig == m.rig
     for name in ("deflection", "force", "force_sd"):
         assert getattr(again, name) == pytest.approx(getattr(m, name), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("height_sd_mm", "force_sd_N", "known: covariance, height_sd_mm, origin"),
+        ("lift_mm = 35\n", "", "the key lift_mm is missing; add it with its value, as in lift_mm = 30"),
+        ("lift_mm = 35", "lift_cm = 0", "lift_cm must be a positive length, and 0 cm is not"),
+    ],
+)
+def test_a_fault_of_the_specimen_file_is_told_by_its_own_keys(tmp_path: Path, old: str, new: str, said: str) -> None:
+    (tmp_path / "c.csv").write_text("radius_mm,height_mm\n12,20\n13,19\n")
+    (tmp_path / "c.toml").write_text(TOML.replace(old, new))
+    with pytest.raises(DataError) as caught:
+        read_measurement(tmp_path / "c.csv", tmp_path / "c.toml")
+    assert said in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -432,3 +432,72 @@ def test_a_published_test_in_both_directions_is_read(files: Files) -> None:
     part = m.select(m.deflection < 0)
     force = Forward(found.hypothesis, part, part.deflection)(found.coordinates).force[0]
     assert np.corrcoef(force, part.force)[0, 1] > 0.99
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "side", "said"),
+    [
+        (0.5, 2.5, -1, "line 2: every stress below a stretch of 1, where the specimen is pressed, is positive"),
+        (0.3, 1.3, 1, "line 13: every stress above a stretch of 1, where the specimen is pulled, is negative"),
+    ],
+)
+def test_a_side_with_the_wrong_sign_is_refused(files: Files, low: float, high: float, side: int, said: str) -> None:
+    """Though on the other side, where most of the readings lie, all is well."""
+    stretch = np.append(np.linspace(low, 0.95, 11), np.linspace(1.05, high, 11 - side * 3))
+    stress = 0.4 * (stretch - stretch**-2.0) * np.where(side * (stretch - 1) > 0, -1, 1)
+    rows = "".join(f"{x:.6g},{s:.6g}\n" for x, s in zip(stretch, stress, strict=True))
+    assert said in files.fault("stretch,nominal_stress_MPa\n" + rows)
+
+
+def test_a_zero_that_is_off_is_no_wrong_sign(files: Files) -> None:
+    m = files.read("stretch,nominal_stress_MPa\n0.97,0.02\n0.99,0.05\n1.2,0.3\n1.6,0.5\n")
+    assert m.force[0] > 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "curve", "said"),
+    [
+        ("shear", "shear,shear_stress_MPa\n0,0\n1,0.4\n1,0.4\n0,0\n", "line 4: the shear 1 stands there twice"),
+        ("uniaxial", PULLED + "1.4,0.5\n", "line 5: the stretch 1.4 stands there twice"),
+        (
+            "uniaxial",
+            PULLED + "1.3,0.4\n1.5,0.6\n1.6,0.7\n",
+            "line 5: the stretch is not in order (1.3 after 1.4); sort",
+        ),
+        (
+            "compression",
+            "stretch,nominal_stress_MPa\n0.9,-0.1\n0.8,-0.2\n0.8,-0.2\n",
+            "line 4: the compression to a stretch of 0.8 stands there twice",
+        ),
+    ],
+)
+def test_an_order_that_no_test_has_is_told_as_the_file_has_it(files: Files, kind: str, curve: str, said: str) -> None:
+    assert said in files.fault(curve, kind)
+
+
+UP_AND_DOWN = [*np.linspace(1.0, 1.5, 11), *np.linspace(1.45, 1.0, 10)]
+
+
+def labelled(column: str, values: list[int]) -> str:
+    rows = zip(UP_AND_DOWN, values, strict=True)
+    return f"stretch,nominal_stress_MPa,{column}\n" + "".join(f"{x:.6g},{x - 1:.6g},{v}\n" for x, v in rows)
+
+
+def test_a_direction_against_the_motion_is_noted(files: Files) -> None:
+    said = [1] * 11 + [-1] * 10
+    assert files.read(labelled("direction", said)).provenance.notes == ()
+    m = files.read(labelled("direction", [-s for s in said]))
+    assert "the column direction contradicts the motion in 21 of 21 rows" in m.provenance.notes[0]
+    assert m.leg.tolist() == [-s for s in said]
+
+
+@pytest.mark.parametrize(
+    ("cycle", "said"),
+    [
+        ([3] * 10 + [2] * 11, "line 2, column cycle: the cycles begin with 3, and 2 follows in line 12; write 1, 2, 3"),
+        ([1] * 8 + [2] * 2 + [1] * 11, "line 12, column cycle: cycle 1 comes after cycle 2; write 1, 2, 3"),
+        ([1] * 20 + [0], "line 22, column cycle: 0 is no cycle"),
+    ],
+)
+def test_cycles_that_fall_are_blamed_where_the_wrong_one_stands(files: Files, cycle: list[int], said: str) -> None:
+    assert said in files.fault(labelled("cycle", cycle))
