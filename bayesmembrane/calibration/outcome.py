@@ -128,7 +128,7 @@ def walk_answer(sampled: Sampled, names: Sequence[str], wanted: float) -> dict[s
     c = sampled.convergence
     return {
         "status": sampled.status,
-        "sampler": "emcee" if sampled.chains.mixture is None else "mixture",
+        "sampler": sampler_of(sampled.chains),
         "ess_bulk": float(np.min(c.ess)),
         "ess_wanted": wanted,
         "r_hat": float(np.max(c.r_hat)),
@@ -141,6 +141,11 @@ def walk_answer(sampled: Sampled, names: Sequence[str], wanted: float) -> dict[s
         "seconds": sampled.chains.seconds,
         "tally": dict(sampled.chains.counts),
     }
+
+
+def sampler_of(chains: Chains) -> str:
+    """What made the draws."""
+    return "emcee" if chains.mixture is None else "mixture"
 
 
 def _importance(chains: Chains, mass: Mass) -> dict[str, float] | None:

@@ -10,7 +10,6 @@ However a joint run ends, the next call with the same folder goes on after its l
 from __future__ import annotations
 
 import platform
-import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -20,23 +19,21 @@ import numpy as np
 from bayesmembrane.calibration.fingerprint import code_of
 from bayesmembrane.calibration.joint.claim import WALK, Joint
 from bayesmembrane.calibration.joint.posterior import JointPosterior
-from bayesmembrane.calibration.joint.starts import joint_starts
-from bayesmembrane.calibration.outcome import MOST_DRAWS, marginal, outcome, walk_answer
+from bayesmembrane.calibration.joint.starts import try_jointly
+from bayesmembrane.calibration.outcome import MOST_DRAWS, marginal, outcome, sampler_of, walk_answer
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.resume import check_same
 from bayesmembrane.calibration.ruled_out import ruled_out_gain
 from bayesmembrane.calibration.run import Run, RunSettings, predictions_of
-from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.growing import changed
 from bayesmembrane.calibration.sampling.segments import Segments
 from bayesmembrane.calibration.sampling.walk import (
     Callback,
     Meanwhile,
     Sampled,
-    begun,
     run_ensembles,
-    walkers_of,
+    started,
 )
 from bayesmembrane.calibration.store import ASKED, HOW_LONG, claimed, describe, write_run
 from bayesmembrane.ground.errors import StorageError
@@ -183,19 +180,11 @@ def _walked(
     if chains is not None and segments is not None:
         check_same(target, chains, segments.run)
     else:
-        chains = _begun(posterior, how)
+        chains = started(target, settings, how.seed, try_jointly)
         if segments is not None:
             segments.write(chains)
     meanwhile = Meanwhile(stop=stop) if segments is None else Meanwhile(segments.write, stop)
     return run_ensembles(target, settings, how.seed, progress, chains, meanwhile)
-
-
-def _begun(posterior: JointPosterior, how: RunSettings) -> Chains:
-    began, counts, settings = time.perf_counter(), Outcomes(), how.sampling
-    target = cast(Posterior, posterior)
-    rng = np.random.default_rng(np.random.SeedSequence(how.seed).spawn(settings.ensembles + 1)[-1])
-    x = joint_starts(posterior, rng, settings.ensembles, walkers_of(target, settings), counts)
-    return replace(begun(target, x, how.seed), counts=counts, seconds=time.perf_counter() - began)
 
 
 # ---- what came out ---------------------------------------------------------------------------------------------------
@@ -234,6 +223,7 @@ def _part_run(
     data, status = outcome(posterior.parts[number], _seen_from(joint, number, sampled), how.sampling.ess, how.seed)
     own = describe(part.measurement, part.hypothesis, how.sampling, how.seed)
     mark = digest({"joint": asked["fingerprint"], "label": part.label})
+    status["sampler"] = sampler_of(sampled.chains)
     own |= {"fingerprint": mark, "walk": mark, "joint": {"label": part.label, "tests": list(joint.labels)}}
     if folder is None:
         return Run(part.label, None, own, status, data)
@@ -252,7 +242,8 @@ def _seen_from(joint: Joint, number: int, sampled: Sampled) -> Sampled:
     at, c = joint.places[number], sampled.convergence
     own = replace(c, tau=c.tau[at], ess=c.ess[at], r_hat=c.r_hat[at])
     x = changed(sampled.chains.x, lambda part: joint.of(number, part))
-    chains = replace(sampled.chains, x=x, counts=Outcomes(dict(sampled.chains.counts)))
+    # What a mixture proposed, and its weights, are those of all tests.
+    chains = replace(sampled.chains, x=x, counts=Outcomes(dict(sampled.chains.counts)), mixture=None, offered=None)
     return replace(sampled, chains=chains, convergence=own)
 
 

@@ -22,22 +22,30 @@ def joint_starts(
 ) -> Array:
     """Starting points (E, W, K), all possible and all different, drawn without replacement from p(x | y)^b.
 
-    Candidates are draws around the valleys that joint least squares, with the prior beside it, finds from many starts,
-    and what differential evolution makes of the better ones; b <= 1 is the largest power at which they are worth more
-    than the walkers. Raises `SettingsError` if next to no admissible parameters reach the data.
+    b <= 1 is the largest power at which what `try_jointly` found is worth more than the walkers; it raises what that
+    raises.
+    """
+    return try_jointly(posterior, rng, ensembles * walkers, counts).starts(rng, ensembles, walkers)
+
+
+def try_jointly(posterior: JointPosterior, rng: np.random.Generator, count: int, counts: Outcomes) -> Tried:
+    """``count`` possible points or more: draws around the valleys that joint least squares, with the prior beside it,
+    finds from many starts, and what differential evolution makes of the better ones.
+
+    Raises `SettingsError` if next to no admissible parameters reach the data.
     """
     tried = Tried.of(posterior, _around(posterior, rng), counts)
     for _ in range(ROUNDS):
         good = tried.possible
         more = posterior.prior.draw(rng, EACH) if len(good.x) < 4 else _better(good, rng)
         tried = tried.joined(Tried.of(posterior, more, counts))
-    if len(tried.possible.x) < ensembles * walkers:
+    if len(tried.possible.x) < count:
         raise SettingsError(
             f"next to no {posterior.joint.label()} films that meet the convexity prior "
             f'"{posterior.joint.convexity}" fit every test',
             remedy="use shorter ranges, another material or another convexity prior",
         )
-    return tried.starts(rng, ensembles, walkers)
+    return tried
 
 
 def _around(posterior: JointPosterior, rng: np.random.Generator) -> Array:

@@ -22,7 +22,7 @@ from bayesmembrane.calibration.sampling.leaps import BLOCK, blocks, leap, offers
 from bayesmembrane.calibration.sampling.proposals.independent import Independent, independent
 from bayesmembrane.calibration.sampling.proposals.learned import learn, next_lesson
 from bayesmembrane.calibration.sampling.weights import Worth
-from bayesmembrane.calibration.starts import try_points
+from bayesmembrane.calibration.starts import Tried, try_points
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.interrupts import Stop, StopAsked, deferred, never
 from bayesmembrane.ground.parameters import Array
@@ -141,7 +141,7 @@ def run_ensembles(
     with the status "interrupted". A second signal ends the step, too.
     """
     fresh = chains is None
-    chains = _start(posterior, settings, seed) if chains is None else chains
+    chains = started(posterior, settings, seed) if chains is None else chains
     walk = _Walk(posterior, beside, chains)
     target, status = chains.look or max(settings.chunk, chains.steps), "interrupted"
     with deferred(beside.stop) as asked, suppress(KeyboardInterrupt):
@@ -222,12 +222,16 @@ def walkers_of(posterior: Posterior, settings: Settings) -> int:
     return settings.walkers or 16 * -(-4 * posterior.size // 16)
 
 
-def _start(posterior: Posterior, settings: Settings, seed: int) -> Chains:
+Search = Callable[[Any, np.random.Generator, int, Outcomes], Tried]
+"""What finds so many possible points of a posterior or more, and counts what became of all."""
+
+
+def started(posterior: Posterior, settings: Settings, seed: int, search: Search = try_points) -> Chains:
     """Ensembles at different overdispersed starts, or at draws of a mixture that is close to the posterior."""
     began, counts = time.perf_counter(), Outcomes()
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(settings.ensembles + 1)[-1])
     shape = settings.ensembles, walkers_of(posterior, settings)
-    found = try_points(posterior, rng, shape[0] * shape[1], counts)
+    found = search(posterior, rng, shape[0] * shape[1], counts)
     x, close = found.starts(rng, *shape), None
     if settings.sampler == "auto":
         close = independent(posterior, found, rng.spawn(1)[0], counts)

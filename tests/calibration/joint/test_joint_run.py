@@ -90,10 +90,29 @@ def small() -> Joint:
     return joint(tests, hypothesis("neo_hookean", ["zero_offset"]))
 
 
-def test_a_run_that_was_stopped_ends_with_the_same_draws(tmp_path: Path) -> None:
-    whole = sample_jointly(small(), RunSettings(settings=FEW))
-    left = iter(range(30))
-    how = RunSettings(settings=FEW, out=tmp_path, predictions=False)
+def test_a_mixture_equals_ensembles() -> None:
+    """Means and standard deviations by both, in standard errors of independent draws."""
+    settings = {"ess": 3000.0, "ensembles": 2}
+    runs = [
+        sample_jointly(small(), RunSettings(seed=7, settings=Settings(sampler=s, **settings), predictions=False))  # type: ignore[arg-type]
+        for s in ("auto", "emcee")
+    ]
+    assert [r.status["sampler"] for r in runs] == ["mixture", "emcee"]
+    (a, b), n = (r.draws() for r in runs), 3000
+    sd = np.hypot(np.std(a, axis=0), np.std(b, axis=0))
+    assert np.all(np.abs(np.mean(a, axis=0) - np.mean(b, axis=0)) < 5.5 * sd / np.sqrt(n))
+    # ln of a standard deviation of n normal draws is off by 1 / sqrt(2 n); tails of noises are longer.
+    assert np.all(np.abs(np.log(np.std(a, axis=0) / np.std(b, axis=0))) < 8 / np.sqrt(n))
+
+
+@pytest.mark.parametrize(("sampler", "asked"), [("emcee", 30), ("auto", 1)])
+def test_a_run_that_was_stopped_ends_with_the_same_draws(tmp_path: Path, sampler: str, asked: int) -> None:
+    """Ensembles are asked after every step, a mixture after every block of them."""
+    few = replace(FEW, sampler=sampler)
+    whole = sample_jointly(small(), RunSettings(settings=few))
+    assert whole.status["sampler"] == ("emcee" if sampler == "emcee" else "mixture")
+    left = iter(range(asked))
+    how = RunSettings(settings=few, out=tmp_path, predictions=False)
     stopped = sample_jointly(small(), how, stop=lambda: next(left, None) is None)
     assert stopped.interrupted
     assert 0 < stopped.status["steps"] < whole.status["steps"]
