@@ -273,17 +273,26 @@ class Strip(Homogeneous, ABC):
 
 def _check_sides(deflection: Array, force: Array, places: Sequence[str]) -> None:
     """Raise `DataError` for a side of rest, pulled or pressed, on which every stress (N,) has the wrong sign."""
+    found = wrong_side(deflection, force)
+    if found is None:
+        return
+    side, row = found
+    where, wrong, done = ("above", "negative", "pulled") if side > 0 else ("below", "positive", "pressed")
+    fault = f"every stress {where} a stretch of 1, where the specimen is {done}, is {wrong}"
+    remedy = "in a test that goes both ways write the stress positive where it pulls and negative where it pushes"
+    raise DataError(fault, places[row], remedy)
+
+
+def wrong_side(deflection: Array, force: Array) -> tuple[int, int] | None:
+    """(1 or -1, first row) of a side of rest on which every force (N,) that counts is against the deflection (N,)."""
     told = np.abs(force) > 0.01 * np.max(np.abs(force))
-    for side, where, wrong, done in ((1, "above", "negative", "pulled"), (-1, "below", "positive", "pressed")):
+    for side in (1, -1):
         there = told & (side * deflection > 0)
         far = np.max(side * deflection) > SIDE * np.max(np.abs(deflection))
         carries = np.sum(there) > 0.5 * np.sum(side * deflection > 0)
         if far and carries and np.all(side * force[there] < 0):
-            fault = f"every stress {where} a stretch of 1, where the specimen is {done}, is {wrong}"
-            remedy = (
-                "in a test that goes both ways write the stress positive where it pulls and negative where it pushes"
-            )
-            raise DataError(fault, places[int(np.argmax(there))], remedy)
+            return side, int(np.argmax(there))
+    return None
 
 
 def only_pressed(stretch: Array) -> bool:

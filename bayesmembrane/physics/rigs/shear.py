@@ -16,7 +16,7 @@ from bayesmembrane.ground.units import FORCE, RATIO, STRESS
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics.shear_law import ShearLaw, shear_curves, stretched
 from bayesmembrane.physics.mechanics.solution import Curves
-from bayesmembrane.physics.rigs.base import STATES, Films, Homogeneous, Trial
+from bayesmembrane.physics.rigs.base import STATES, Films, Homogeneous, Trial, wrong_side
 
 
 @dataclass(frozen=True)
@@ -73,6 +73,10 @@ class Shear(Homogeneous):
         if np.sum(against) > 0.5 * x.size:
             fault = "at most points the stress is against the shear"
             raise DataError(fault, places[int(np.argmax(against))], "change the sign of one column")
+        if (found := wrong_side(x, force)) is not None:
+            side, row = found
+            fault = f"every stress of a {'positive' if side > 0 else 'negative'} shear is against it"
+            raise DataError(fault, places[row], "write both with one sign where the block is sheared the other way")
         check_deviations(columns, places)
 
     def to_columns(self, arrays: Mapping[str, Array], thickness: float) -> dict[str, Array]:

@@ -183,6 +183,10 @@ def test_what_no_press_gives_is_one_sentence(tmp_path: Path) -> None:
         written(tmp_path, "compression", STRETCH - 0.55, PUSH)
     with pytest.raises(DataError, match="at most points the stress is against the shear"):
         written(tmp_path, "shear", SHEAR, -SHEAR, "shear,shear_stress_MPa")
+    both = np.linspace(-1.5, 1.8, 24)
+    with pytest.raises(DataError, match="line 2: every stress of a negative shear is against it"):
+        written(tmp_path, "shear", both, np.abs(both), "shear,shear_stress_MPa")
+    assert len(written(tmp_path, "shear", both, both, "shear,shear_stress_MPa")) == both.size
     with pytest.raises(DataError, match="change the signs of shear and stress"):
         written(tmp_path, "shear", -SHEAR, -SHEAR, "shear,shear_stress_MPa")
 
