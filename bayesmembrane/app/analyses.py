@@ -39,7 +39,6 @@ from bayesmembrane.diagnosis.joint.diagnose import JointDiagnosis, diagnose_join
 from bayesmembrane.diagnosis.loop import Loop, LoopSettings
 from bayesmembrane.diagnosis.loop import loop as run_loop
 from bayesmembrane.diagnosis.result import Diagnosis
-from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.interrupts import Stop, never
 from bayesmembrane.ground.jobs import Submit, Tell, silent
 from bayesmembrane.ground.parameters import Array
@@ -203,14 +202,12 @@ def compare_joint(claims: Sequence[Joint], work: Work) -> Answer[dict[str, Compa
 
 
 def population(runs: Sequence[Run], work: Work, *, pool: Sequence[str] = ()) -> Answer[Population]:
-    """The population behind the specimens of several runs; raises `SettingsError` without any."""
-    if not runs:
-        raise SettingsError("there is no run to make a population of", remedy="name at least two")
+    """The population behind the specimens of several runs; raises what `population_of_runs` raises."""
+    found = population_of_runs(runs, pool, work.seed)
     settings = {"seed": work.seed, "pool": list(pool), "draws": [run.draws_name for run in runs]}
     by, tests = population_of_runs, [r.measurement for r in runs]
     what = asked("population", by, tests, [r.hypothesis for r in runs], settings)
     model = runs[0].hypothesis.label()
-    found = by(runs, pool, work.seed)
     named = replace(what, specimen="-".join(found.specimens.labels), model=model, end=float("nan"))
     return kept("population", found, document(found), named, work.out)
 

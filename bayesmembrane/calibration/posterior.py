@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
 from typing import Protocol, runtime_checkable
@@ -16,6 +16,7 @@ from bayesmembrane.calibration.prior import JointPrior
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.convexity import FREE
 from bayesmembrane.physics.form_error import traces
 from bayesmembrane.physics.forward import AT_ONCE, Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -147,6 +148,12 @@ class Posterior:
     @cached_property
     def noise(self) -> NoiseLikelihood:
         return self.hypothesis.noise.bind(self.measurement)
+
+    @property
+    def without_convexity(self) -> Posterior | None:
+        """The same with a convexity prior that asks nothing; None if its own does not, either."""
+        h = self.hypothesis
+        return replace(self, hypothesis=replace(h, convexity=FREE)) if h.convexity.restricts else None
 
     @property
     def size(self) -> int:

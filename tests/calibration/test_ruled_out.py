@@ -65,3 +65,12 @@ def test_a_prior_that_asks_nothing_rules_nothing_out(two: bool) -> None:
     other = sheet(0.16, 0.04, seed=75)
     posterior = JointPosterior(joint({"one": m, "two": other}, claim)) if two else Posterior(claim, m)
     assert ruled_out_gain(posterior, np.zeros((8, posterior.size)), seed=1) is None
+
+
+def test_draws_that_fill_no_volume_are_asked_all_the_same() -> None:
+    """All alike, or all on a line: nothing has to be inverted."""
+    m, claim = sheet(0.2, 0.0005, seed=76), hypothesis("mooney_rivlin")
+    posterior, at = Posterior(claim, m), coordinates(claim, 0.01, 2e-3 * float(np.max(m.force)))
+    assert ruled_out_gain(posterior, np.tile(at, (8, 1)), seed=1) == 0.0
+    line = at + np.linspace(-1e-3, 1e-3, 40)[:, None] * np.array([1.0, 0.0, 0.0])
+    assert ruled_out_gain(posterior, line, seed=1) is not None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import cast
 
@@ -15,6 +15,7 @@ from bayesmembrane.calibration.posterior import Evaluation, Outcome, Posterior
 from bayesmembrane.calibration.prior import SCRAMBLES, JointPrior, Scrambled
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.sobol import scrambled_sobol
+from bayesmembrane.physics.convexity import FREE
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -53,6 +54,14 @@ class JointPosterior:
     @cached_property
     def prior(self) -> SharedPrior:
         return SharedPrior(cast(Hypothesis, self.joint))
+
+    @property
+    def without_convexity(self) -> JointPosterior | None:
+        """The same with a convexity prior that asks nothing; None if its own does not, either."""
+        if not self.joint.convexity.restricts:
+            return None
+        parts = [replace(p, hypothesis=replace(p.hypothesis, convexity=FREE)) for p in self.joint.parts]
+        return replace(self, joint=replace(self.joint, parts=tuple(parts)))
 
     @property
     def size(self) -> int:

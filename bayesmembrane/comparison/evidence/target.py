@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -45,12 +46,12 @@ class Target(Protocol):
     def prior_transform(self, u: Array) -> Array: ...
 
 
-class _Evaluated:
+class _Evaluated(ABC):
     """A `Target` whose two logarithms come out of one computation."""
 
+    @abstractmethod
     def evaluate(self, x: Array) -> Densities:
         """Both at once, from one solution of the film."""
-        raise NotImplementedError
 
     def log_prior(self, x: Array) -> Array:
         return np.asarray(self.evaluate(x).log_prior)
