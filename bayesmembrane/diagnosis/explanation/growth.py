@@ -39,7 +39,7 @@ class Grown:
         """Keep the better of two fits of one hypothesis."""
         if candidate is None:
             return
-        key = _key(candidate)
+        key = key_of(candidate)
         if key not in self.found or candidate.log_evidence > self.found[key].log_evidence:
             self.found[key] = candidate
 
@@ -79,7 +79,7 @@ class Grown:
         """The best of each set of this size searched on with its own form error: all that may matter."""
         every = self.best_of_each_set(size)[: GROWTH.polished]
         near = [c for c in every if every[0].log_evidence - c.log_evidence < GROWTH.polish_reach]
-        self.found |= {_key(c): c for c in self.search.all_polished(near)}
+        self.found |= {key_of(c): c for c in self.search.all_polished(near)}
 
     def renew(self) -> None:
         """Noise from the best candidate, and all of them weighed under it."""
@@ -88,7 +88,8 @@ class Grown:
         self.found = {key: self.search.weighed_anew(c) for key, c in self.found.items()}
 
 
-def _key(candidate: Candidate) -> Key:
+def key_of(candidate: Candidate) -> Key:
+    """Its energy, and all its effects."""
     return candidate.hypothesis.material.name, frozenset(candidate.names)
 
 
@@ -192,7 +193,9 @@ def _search_on(out: Grown, steps: Sequence[tuple[Hypothesis, Array]]) -> None:
     """From the best of these places for each hypothesis, where it is worth it."""
     best, starts = out.best.log_evidence, dict[Key, Candidate]()
     for start in out.search.placed(steps):
-        if start is not None and ((key := _key(start)) not in starts or start.log_evidence > starts[key].log_evidence):
+        if start is not None and (
+            (key := key_of(start)) not in starts or start.log_evidence > starts[key].log_evidence
+        ):
             starts[key] = start
     near = [start for key, start in starts.items() if _worth_a_search(out, key, start, best)]
     for c in out.search.all_polished(near):
@@ -258,7 +261,7 @@ def _promising_pairs(out: Grown, bases: Sequence[Candidate]) -> list[frozenset[s
     """Sets that nobody fitted of one of ``bases`` and two effects more, by what they promise to first order."""
     tried, promised = {names for _, names in out.found}, dict[frozenset[str], float]()
     for base in bases:
-        here = out.found[_key(base)]
+        here = out.found[key_of(base)]
         rest = [e for e in out.case.visible if e.name not in here.names]
         for pair, gain in gains_of_pairs(out.search, here, rest).items():
             names = frozenset(here.names) | pair

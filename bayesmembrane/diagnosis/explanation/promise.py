@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
+from bayesmembrane.diagnosis.explanation.visible import Ratio
+from bayesmembrane.diagnosis.reference.noise import orthonormal
 from bayesmembrane.diagnosis.thresholds import GROWTH
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
@@ -27,6 +29,23 @@ def first_order(search: Weighing, base: Candidate, effect: Effect) -> float:
     """
     slopes = _slopes(search, base, [effect])
     return max((float(np.max(_gains(f))) - f.cost for f in _freed(search, base, slopes)), default=-np.inf)
+
+
+def promised(search: Weighing, base: Candidate, effect: Effect, counts: float = 1.0) -> float:
+    """`first_order`, of which a part ``counts``, and what ln Z gains where effects that could not be seen are absent.
+
+    The second by the normal posterior (s.r) / (s.s + 1), 1 / (s.s + 1) of the size, in units of what is expected.
+    """
+    slopes, best = _slopes(search, base, [effect]), -np.inf
+    own = orthonormal(search.noise.white(base.slopes))
+    lengths = np.linalg.norm(slopes.white - own @ (own.T @ slopes.white), axis=0)
+    for f in _freed(search, base, slopes):
+        along, square, allowed = _allowed(f)
+        means, sds = np.abs(along * allowed) / (square + 1), 1 / np.sqrt(square + 1)
+        for gain, mean, sd, length in zip(_gains(f), means, sds, lengths * f.left, strict=True):
+            ratio = Ratio(float(mean * length), float(sd * length), float(length), effect.size.one_sided)
+            best = max(best, counts * (float(gain) - f.cost) + ratio.log_seen)
+    return best
 
 
 def gains_of_pairs(search: Weighing, base: Candidate, effects: Sequence[Effect]) -> dict[Pair, float]:
@@ -106,9 +125,14 @@ def _freed(search: Weighing, base: Candidate, slopes: _Slopes) -> Iterator[_Free
 
 def _gains(f: _Freed) -> Array:
     """(m,) ln K of each slope; only its cost where it would have the wrong sign, 0 where nothing is left of it."""
-    along, square = np.where(f.left, f.along, 0.0), np.where(f.left, np.diagonal(f.product), 0.0)
-    allowed = (f.slopes.sides == 0) | (f.slopes.sides * along > 0)
+    along, square, allowed = _allowed(f)
     return np.asarray(0.5 * along**2 / (square + 1) * allowed - 0.5 * np.log1p(square))
+
+
+def _allowed(f: _Freed) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """s.r, s.s, and whether it has a sign that is allowed, of each slope (m,); zeros where nothing is left of it."""
+    along, square = np.where(f.left, f.along, 0.0), np.where(f.left, np.diagonal(f.product), 0.0)
+    return along, square, (f.slopes.sides == 0) | (f.slopes.sides * along > 0)
 
 
 def _gains_of_two(f: _Freed) -> Array:

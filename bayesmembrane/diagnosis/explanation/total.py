@@ -13,10 +13,11 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
-from bayesmembrane.diagnosis.explanation.growth import Grown
-from bayesmembrane.diagnosis.explanation.promise import first_order
+from bayesmembrane.diagnosis.explanation.growth import Grown, key_of
+from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
 from bayesmembrane.diagnosis.explanation.unfitted import Key, unfitted
+from bayesmembrane.diagnosis.explanation.visible import log_seen
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
 
@@ -108,10 +109,12 @@ def summed(grown: Grown) -> Total:
     given = case.null.names
     every, counts = list(grown.found.values()), grown.counts
 
-    def own(c: Candidate) -> float:
-        return counts * c.log_evidence + grown.believed(c)
+    seen = _seen(grown)
 
-    others = _other_energies(grown)
+    def own(c: Candidate) -> float:
+        return counts * c.log_evidence + grown.believed(c) + seen[key_of(c)]
+
+    others = _other_energies(grown, seen)
     raised = _raised(grown, {id(c): own(c) for c in every}, others)
 
     def weight(c: Candidate) -> float:
@@ -122,9 +125,9 @@ def summed(grown: Grown) -> Total:
     kinds = kinds_of(found)
     nothing = BELIEFS.log_foreign(0) if kinds else 0.0
     terms = [(c, NOTHING, weight(c) + nothing) for c in every]
-    # What the data do not speak for is neither seen nor excluded, like a further effect that is idle.
-    seen = [f for f in found if f.counted(counts) > BELIEFS.supported]
-    terms += [(f.base, f.kind, own(f.base) + f.counted(counts) + BELIEFS.log_foreign(kinds)) for f in seen]
+    # What the data do not speak for is neither seen nor excluded.
+    told = [f for f in found if f.counted(counts) > BELIEFS.supported]
+    terms += [(f.base, f.kind, own(f.base) + f.counted(counts) + BELIEFS.log_foreign(kinds)) for f in told]
     guessed = [(key, w + raised[key[1]] + nothing) for key, w in others.items()]
     p = _normalised(np.array([*(w for _, _, w in terms), *(w for _, w in guessed)]))
     judged = [
@@ -132,13 +135,11 @@ def summed(grown: Grown) -> Total:
         for (c, kind, _), q in zip(terms, p[: len(terms)], strict=True)
         if kind == NOTHING
     ]
-    owners = _owners(grown, [c for c, kind, _ in terms if kind == NOTHING])
     parts = [(c.hypothesis.material.name, set_name(c, given), kind) for c, kind, _ in terms]
     parts += [(energy, _joined(names - set(given)), NOTHING) for (energy, names), _ in guessed]
     joint, energies = defaultdict[tuple[str, str], float](float), defaultdict[str, float](float)
     for (energy, name, kind), q in zip(parts, p.tolist(), strict=True):
-        joint[owners[name], kind] += BELIEFS.unseen * q
-        joint[name, kind] += (1.0 - BELIEFS.unseen) * q
+        joint[name, kind] += q
         energies[energy] += q
     for name, q in _untried(grown, every, joint).items():
         joint[name, NOTHING] += q
@@ -163,7 +164,7 @@ def _untried(grown: Grown, every: Sequence[Candidate], joint: Mapping[tuple[str,
                 continue
             visible = [v.odds for v in case.visible]
             prior = BELIEFS.log_set([*odds, e.odds], visible) - BELIEFS.log_set(odds, visible)
-            gain = min(grown.counts * first_order(grown.search, base, e), BELIEFS.supported)
+            gain = min(promised(grown.search, base, e, grown.counts), BELIEFS.supported)
             q = BELIEFS.untried * joint[own, NOTHING] * float(np.exp(prior + gain))
             if q > 0:
                 name = _joined(names - given)
@@ -179,11 +180,34 @@ def _leaders(every: Sequence[Candidate]) -> list[Candidate]:
     return list(first.values())
 
 
-def _other_energies(grown: Grown) -> dict[Key, float]:
-    """ln weight of the energies that a set was not fitted with."""
+def _seen(grown: Grown) -> dict[Key, float]:
+    """What ln Z of each hypothesis gains where effects below what can be seen count as absent.
+
+    A set that is far behind with every energy has no share in the sum, and is left as it is.
+    """
+    given, out = set(grown.case.null.names), {}
+    weights = {key: grown.counts * c.log_evidence + grown.believed(c) for key, c in grown.found.items()}
+    first = max(weights.values())
+    squares: dict[frozenset[str], float] = {}
+    for (_, names), c in grown.found.items():
+        squares[names] = min(squares.get(names, np.inf), grown.search.excess(c))
+    for key, c in grown.found.items():
+        without = {e: squares[key[1] - {e}] for e in key[1] if key[1] - {e} in squares}
+        near = first - weights[key] < BELIEFS.behind
+        out[key] = log_seen(grown.search, c, given, without) if near else 0.0
+    return out
+
+
+def _other_energies(grown: Grown, seen: Mapping[Key, float]) -> dict[Key, float]:
+    """ln weight of the energies that a set was not fitted with, in which its effects are seen as with its best one."""
     foretold = unfitted({key: c.log_evidence for key, c in grown.found.items()})
-    some = {names: c for (_, names), c in grown.found.items()}
-    return {key: grown.counts * z + grown.believed(some[key[1]], key[0]) for key, z in foretold.items()}
+    best: dict[frozenset[str], Candidate] = {}
+    for c in sorted(grown.found.values(), key=lambda c: c.log_evidence):
+        best[frozenset(c.names)] = c
+    return {
+        (energy, names): grown.counts * z + grown.believed(best[names], energy) + seen[key_of(best[names])]
+        for (energy, names), z in foretold.items()
+    }
 
 
 def _raised(grown: Grown, weights: Mapping[int, float], others: Mapping[Key, float]) -> dict[frozenset[str], float]:
@@ -244,32 +268,6 @@ def _summed_out(joint: Mapping[tuple[str, str], float], kept: int) -> dict[str, 
     for key, q in joint.items():
         out[key[kept]] += q
     return _falling(out)
-
-
-def _owners(grown: Grown, every: Sequence[Candidate]) -> dict[str, str]:
-    """{set of effects: the part of it that the data speak for}.
-
-    A further effect that the data do not support, and that takes nothing away, is not seen to be there, nor seen to be
-    absent: such a set says little more than the set without it (`BELIEFS.unseen`).
-    """
-    given = set(grown.case.null.names)
-    best: dict[frozenset[str], Candidate] = {}
-    for c in every:
-        own = frozenset(c.names) - given
-        if own not in best or c.log_evidence > best[own].log_evidence:
-            best[own] = c
-    squares = {own: grown.search.excess(c) for own, c in best.items()}
-    out: dict[frozenset[str], frozenset[str]] = {}
-    for own in sorted(best, key=len):
-        smaller = [own - {e} for e in own if own - {e} in best]
-        out[own] = own
-        if smaller:
-            less = max(smaller, key=lambda s: best[s].log_evidence)
-            gain = best[own].log_evidence - best[less].log_evidence
-            idle = grown.counts * gain < BELIEFS.supported
-            if idle and squares[less] - squares[own] < BELIEFS.takes:
-                out[own] = out[less]
-    return {_joined(own): _joined(owner) for own, owner in out.items()}
 
 
 def _joined(names: frozenset[str]) -> str:

@@ -11,7 +11,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
-from bayesmembrane.diagnosis.explanation.promise import first_order
+from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, Total, set_name
 from bayesmembrane.diagnosis.thresholds import GROWTH, VERDICT
 
@@ -123,14 +123,11 @@ def _first_order(case: DiagnosisCase, found: Sequence[Foreign]) -> Probabilities
     nothing = BELIEFS.log_set((), odds)
     sets, energies = {NOTHING: none + nothing}, {n: [w] for n, w in plain.items()}
     for e in case.visible:
-        beside = {n: plain[n] + first_order(case.search, case.plain[n], e) for n in near}
+        beside = {n: plain[n] + promised(case.search, case.plain[n], e) for n in near}
         together, prior = float(np.logaddexp.reduce(list(beside.values()))), BELIEFS.log_set((e.odds,), odds)
         for n, w in beside.items():
             energies[n].append(w + prior - nothing)
         weight = together + prior
-        if together - none <= BELIEFS.supported:  # neither seen nor excluded
-            sets[NOTHING] = float(np.logaddexp(sets[NOTHING], weight + np.log(BELIEFS.unseen)))
-            weight += np.log(1 - BELIEFS.unseen)
         if np.isfinite(weight):
             sets[e.name] = weight
     summed = {n: float(np.logaddexp.reduce(w)) for n, w in energies.items()}

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.evidence import Block, extended
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
-from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pairs
+from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pairs, promised
+from bayesmembrane.diagnosis.explanation.visible import log_seen
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -55,6 +56,18 @@ def test_two_promise_more_than_either_where_each_hides_the_other(fitted: tuple[S
     search, base = fitted
     (together,) = gains_of_pairs(search, base, OFFSETS).values()
     assert together > max(first_order(search, base, e) for e in OFFSETS)
+
+
+def test_what_is_promised_is_what_the_fitted_set_keeps(fitted: tuple[Search, Candidate]) -> None:
+    """By being seen, which counts whole, beside a part of what its trace takes away."""
+    search, base = fitted
+    for effect in OFFSETS:
+        start = np.concatenate([base.x, effect.null])
+        more = search.fit(with_effects(base.hypothesis, [effect]), [start])
+        assert more is not None
+        gain, seen = first_order(search, base, effect), log_seen(search, more, (), {})
+        for counts in (0.0, 0.5, 1.0):
+            assert promised(search, base, effect, counts) == pytest.approx(counts * gain + seen, abs=1.0)
 
 
 def test_an_effect_alone_is_no_pair(fitted: tuple[Search, Candidate]) -> None:

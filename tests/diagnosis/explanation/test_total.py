@@ -1,6 +1,6 @@
-"""The sum over hypotheses: what a further effect that the data do not speak for is worth."""
+"""The sum over hypotheses: what a further effect that could not be seen is worth, and one that nobody fitted."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -28,16 +28,28 @@ def candidate(*effects: str, log_evidence: float, energy: str = "gent") -> Candi
 
 
 def effects(
-    monkeypatch: pytest.MonkeyPatch, takes: float, gain: float, untried: Sequence[Any] = (), promised: float = -np.inf
+    monkeypatch: pytest.MonkeyPatch, seen: float, gain: float, untried: Sequence[Any] = (), promised: float = -np.inf
 ) -> dict[str, float]:
-    """Probabilities where friction explains the curve, and Mullins beside it ``takes`` squares and ``gain`` in ln Z.
+    """Probabilities where friction explains the curve, and Mullins beside it has a ``gain`` in ln Z.
 
-    Of four effects that can be seen some may be ``untried``, where traces of those that were not fitted have a
-    ``promised`` ln of the Bayes factor.
+    That changes by ``seen`` where what could not be seen counts as absent. Of four effects that can be seen some may be
+    ``untried``, where traces of those that were not fitted have a ``promised`` ln of the Bayes factor.
     """
+    takes = {
+        frozenset({"friction"}): {"friction": LEFT},
+        frozenset({"friction", "mullins"}): {"mullins": 20.0},
+        frozenset(): {},
+    }
+
+    def visible(_: Search, c: Candidate, given: Collection[str], without: dict[str, float]) -> float:
+        assert not given
+        assert without == takes[frozenset(c.names)]
+        return seen if "mullins" in c.names else 0.0
+
     monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
-    monkeypatch.setattr(total, "first_order", lambda *_: promised)
-    squares = {frozenset(): LEFT, frozenset({"friction"}): 20.0, frozenset({"friction", "mullins"}): 20.0 - takes}
+    monkeypatch.setattr(total, "promised", lambda *_: promised)
+    monkeypatch.setattr(total, "log_seen", visible)
+    squares = {frozenset(): LEFT, frozenset({"friction"}): 20.0, frozenset({"friction", "mullins"}): 17.0}
     search = SimpleNamespace(
         excess=lambda c: squares[frozenset(c.names)], expected_sizes=lambda e: np.array([e.size.scale])
     )
@@ -61,32 +73,25 @@ def effects(
     return dict(total.summed(grown).probabilities.effects)
 
 
-def test_an_effect_that_is_not_seen_keeps_a_part_of_its_probability(monkeypatch: pytest.MonkeyPatch) -> None:
-    p = effects(monkeypatch, takes=0.5, gain=0.0)
-    odds = np.exp(BELIEFS.log_set((1.0,) * 2, FOUR) - BELIEFS.log_set((1.0,), FOUR))
-    alone = odds / (1 + odds)
-    assert p["friction+mullins"] == pytest.approx((1 - BELIEFS.unseen) * alone, rel=1e-6)
-    assert p["friction"] == pytest.approx(1 - p["friction+mullins"], abs=1e-9)
-
-
-@pytest.mark.parametrize(("takes", "gain"), [(0.5, 2 * BELIEFS.supported), (1.1 * BELIEFS.takes, 0.0)])
-def test_one_that_is_seen_keeps_all_of_it(monkeypatch: pytest.MonkeyPatch, takes: float, gain: float) -> None:
-    p = effects(monkeypatch, takes, gain)
-    counted = BELIEFS.counts(50.0 + gain) * gain
+@pytest.mark.parametrize("seen", [1.5, 0.0, -25.0])
+def test_a_set_counts_as_far_as_its_effects_can_be_seen(monkeypatch: pytest.MonkeyPatch, seen: float) -> None:
+    """Whole: it is the prior of its sizes that changes, while only a part of a Bayes factor counts."""
+    p = effects(monkeypatch, seen, gain=2.0)
+    counted = BELIEFS.counts(52.0) * 2.0 + seen
     odds = np.exp(counted + BELIEFS.log_set((1.0,) * 2, FOUR) - BELIEFS.log_set((1.0,), FOUR))
     assert p["friction+mullins"] == pytest.approx(odds / (1 + odds), rel=1e-6)
 
 
 def test_probabilities_add_up_to_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert sum(effects(monkeypatch, takes=3.0, gain=-1.0).values()) == pytest.approx(1.0)
+    assert sum(effects(monkeypatch, seen=0.0, gain=-1.0).values()) == pytest.approx(1.0)
 
 
 def test_a_further_effect_that_nobody_fitted_is_not_excluded(monkeypatch: pytest.MonkeyPatch) -> None:
     """It keeps a small part of what its trace promises beside the set, and no more however much that is."""
     unseen = [SimpleNamespace(odds=1.0, name="tearing")]
-    nothing = effects(monkeypatch, takes=3.0, gain=-1.0)
+    nothing = effects(monkeypatch, seen=0.0, gain=-1.0)
     assert "friction+tearing" not in nothing
-    found = {p: effects(monkeypatch, takes=3.0, gain=-1.0, untried=unseen, promised=p) for p in (-2.0, 50.0)}
+    found = {p: effects(monkeypatch, seen=0.0, gain=-1.0, untried=unseen, promised=p) for p in (-2.0, 50.0)}
     assert 0 < found[-2.0]["friction+tearing"] < found[50.0]["friction+tearing"] < BELIEFS.untried * np.e
     assert found[50.0]["friction"] == pytest.approx(nothing["friction"], abs=2 * BELIEFS.untried)
     assert [sum(p.values()) for p in found.values()] == pytest.approx([1.0, 1.0])
@@ -95,7 +100,8 @@ def test_a_further_effect_that_nobody_fitted_is_not_excluded(monkeypatch: pytest
 def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two energies are alike without effects: friction fitted with both has no more than Mullins fitted with one."""
     monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
-    monkeypatch.setattr(total, "first_order", lambda *_: -np.inf)
+    monkeypatch.setattr(total, "promised", lambda *_: -np.inf)
+    monkeypatch.setattr(total, "log_seen", lambda *_: 0.0)
     plain = [candidate(log_evidence=-60.0, energy=name) for name in ("gent", "yeoh")]
     case = SimpleNamespace(
         null=plain[0],

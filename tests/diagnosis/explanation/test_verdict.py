@@ -101,7 +101,7 @@ def test_an_effect_beside_one_energy_is_a_rival_of_another_energy_without_it(mon
     plain = {n: replace(candidate(NOTHING, material=n), log_evidence=z) for n, z in (("ogden", 0.0), ("yeoh", -15.0))}
     drift = SimpleNamespace(name="force_drift", odds=1.0)
     promised = {"ogden": -50.0, "yeoh": 20.0}
-    monkeypatch.setattr(verdicts, "first_order", lambda _, base, __: promised[base.hypothesis.material.name])
+    monkeypatch.setattr(verdicts, "promised", lambda _, base, __: promised[base.hypothesis.material.name])
     search = SimpleNamespace(excess=lambda _: 0.0)
     case = SimpleNamespace(
         null=plain["ogden"],
