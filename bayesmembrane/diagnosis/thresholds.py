@@ -323,6 +323,11 @@ class ForeignThresholds:
     """Readings that share the largest force: as many are no chance."""
     spare: int = 6
     """Readings beyond the parameters that must be left beside those at the limit."""
+    settled: float = 15.0
+    """ln of the Bayes factor by which a limit that leaves noise alone must be ahead of all single effects for sets of
+    several not to be grown."""
+    settled_sd: float = 3.0
+    """Standard deviations of the squares of noise within which what it leaves is noise."""
     ln_unnamed: tuple[float, float] = (-4.6, 1.0)
     """Mean and sd of ln of what is smooth and has no name, in parts of the force: 1 % within a factor of three."""
     bases: int = 3

@@ -155,11 +155,12 @@ def _probabilities(course: Course) -> tuple[str, ...]:
 def _every(course: Course) -> list[str]:
     d = course.telling
     p = d.probabilities
-    most = MOST_TOLD - bool(d.verdict == "ambiguous" and _in_all(d))  # the first screen has room for so much
+    foreign = p.anything_foreign
+    # The first screen has room for so much.
+    most = MOST_TOLD - bool(d.verdict == "ambiguous" and _in_all(d)) - bool(foreign >= WORDS.probable)
     probable = [name for name, q in p.effects.items() if q >= WORDS.probable][:most]
     sizes = np.cumsum([len(name.split("+")) for name in probable])
     told = [_probable_set(d, n, course, bool(k <= MOST_SIZES)) for n, k in zip(probable, sizes, strict=True)]
-    foreign = p.anything_foreign
     if foreign >= WORDS.probable:
         told.insert(0 if foreign > 0.5 else len(told), f"{percent(foreign)} something foreign")
     if d.verdict == "material":

@@ -22,14 +22,12 @@ class Beliefs:
     size, of which some could not be seen."""
     visible: float = 3.0
     """Signal-to-noise ratio of its own trace, free of what the material and other effects absorb, from which on an
-    effect counts as there: a best fit without it is expected to lose 4.5 in ln of the likelihood."""
-    usual: float = 3.0
-    """Times its expected size up to which an effect is as probable on every scale, from where it could be seen. On the
-    calibration half of `make study-reliability` (cases 560 to 779, 132 of them without anything foreign) the sizes of
-    true effects had a tenth beyond 2.5, a tenth below 0.03, and a median of 0.24. With this prior instead of Cauchy's
-    alone and a rule for effects without support, the log score there went from -1.23 to -1.09, the truth was in the
-    95 % set of 126 instead of 117, and 28 of 29 names were right instead of 29 of 30; with 20 instead of 3, -1.11, 124,
-    and 32 of 33."""
+    effect counts as there: a best fit without it is expected to lose 4.5 in ln of the likelihood. From there to its
+    expected size it is as probable on every scale: of the true effects of the calibration half of
+    `make study-reliability` (cases 560 to 779) a tenth was below 0.03 times that size, a tenth above 2.5 times, and the
+    median was 0.24 times. With that instead of Cauchy's prior alone and a rule for effects without support, the log
+    score of 132 cases there went from -1.23 to -1.10, the truth was in the 95 % set of 126 instead of 117, and 29 of 30
+    names were right both times."""
     behind: float = 40.0
     """ln of the odds against the best hypothesis, from which on a set has no share, whatever can be seen of it."""
     plain_gain: float = 25.0

@@ -15,7 +15,7 @@ from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pairs
 from bayesmembrane.diagnosis.explanation.twins import swapped
 from bayesmembrane.diagnosis.explanation.unfitted import Key
-from bayesmembrane.diagnosis.thresholds import GROWTH, SAMPLED, TWINS
+from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED, TWINS
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -27,6 +27,7 @@ class Grown:
 
     starts : by energy, draws of its prior brought to their best modulus
     followed : sets of effects that larger ones were grown from
+    limited : True where a load cell at its limit, beside an energy without effects, leaves nothing to be explained
     """
 
     case: DiagnosisCase
@@ -34,6 +35,7 @@ class Grown:
     found: dict[Key, Candidate] = field(default_factory=dict)
     starts: dict[str, list[Array]] = field(default_factory=dict)
     followed: set[frozenset[str]] = field(default_factory=set)
+    limited: bool = False
 
     def add(self, candidate: Candidate | None) -> None:
         """Keep the better of two fits of one hypothesis."""
@@ -102,12 +104,13 @@ def grown(case: DiagnosisCase) -> Grown:
     for c in case.plain.values():
         out.add(c)
     _grow(out)
-    _with_less(out)
-    if _grow(out):
+    if not out.limited:
         _with_less(out)
-    _with_exchanged(out)
-    _with_pairs(out)
-    _with_twins(out)
+        if _grow(out):
+            _with_less(out)
+        _with_exchanged(out)
+        _with_pairs(out)
+        _with_twins(out)
     _with_parts(out)
     _checked(out)
     return out
@@ -148,9 +151,18 @@ def _grow(out: Grown) -> bool:
             out.renew()
             _with_other_energies(out, size)
             out.polish(size)
-        if not _worth_more(out, size):
+        out.limited = out.limited or (size == 1 and _limited(out))
+        if out.limited or not _worth_more(out, size):
             break
     return any_new
+
+
+def _limited(out: Grown) -> bool:
+    """True where a limit explains much better what the most probable set so far does not, and leaves noise alone.
+
+    Effects that are put together to follow a force that stops rising are hard to fit, and none of that is needed.
+    """
+    return out.case.limited(out.search, list(out.case.plain.values())) > out.best.log_evidence + FOREIGN.settled
 
 
 def _with_less(out: Grown) -> None:

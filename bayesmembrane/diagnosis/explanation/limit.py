@@ -54,6 +54,16 @@ def limit_of(search: Search, base: Candidate, before: Limit | None = None) -> Li
     return None if found is None else _with_evidence(search, base, found, at, flat.force, constant)
 
 
+def explained(search: Search, base: Candidate) -> float:
+    """ln Z of a limit beside ``base`` that leaves noise alone; -inf if there is none, or more is left."""
+    found = limit_of(search, base)
+    if found is None:
+        return -np.inf
+    white = search.noise.white(base.residual - found.trace)
+    noise = white.size + FOREIGN.settled_sd * float(np.sqrt(2 * white.size))
+    return base.log_evidence + found.gain if float(white @ white) < noise else -np.inf
+
+
 def _before_the_converter(search: Search, base: Candidate, before: Limit | None) -> Limit | None:
     """A limit that readings scatter about."""
     found = saturated(search, base, None if before is None else before.law)

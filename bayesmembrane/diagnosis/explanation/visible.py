@@ -47,14 +47,15 @@ class Ratio:
 
         Fits are weighed with p(r) = 2 / (pi R (1 + (r / R)^2)), R being what is expected: they may be of no size. What
         could not be seen, below r0 = `Beliefs.visible`, counts as absent, and what could is as probable on every scale
-        up to r1 = `Beliefs.usual` times R: q(r) = 1 / (r ln(r1 / r0)) from r0 on. An R below r0 is taken to be r0.
+        up to R, with the same tail beyond: q(r) = min(1 / r, R / r^2) / (1 + ln(R / r0)) from r0 on. An R below r0 is
+        taken to be r0.
         """
         r = np.abs(self.mean + self.sd * DEVIATES)
         weight = np.exp(-0.5 * DEVIATES**2)
         if self.one_sided:
             weight[self.mean + self.sd * DEVIATES < 0] = 0.0
-        usual, there = max(self.expected, BELIEFS.visible), r >= BELIEFS.visible
-        q = there / (np.maximum(r, BELIEFS.visible) * np.log(BELIEFS.usual * usual / BELIEFS.visible))
+        usual, there = max(self.expected, BELIEFS.visible), np.maximum(r, BELIEFS.visible)
+        q = np.minimum(1 / there, usual / there**2) / (1 + np.log(usual / BELIEFS.visible)) * (r >= BELIEFS.visible)
         p = 2 / (np.pi * usual * (1 + (r / usual) ** 2))
         return float(np.log(max(float(np.sum(weight * q / p) / np.sum(weight)), LEAST)))
 

@@ -66,6 +66,10 @@ class JointCase(DiagnosisCase):
                     out[frozenset(own)] = near
         return out
 
+    def limited(self, search: Weighing, bases: Sequence[Candidate]) -> float:
+        """No test speaks for the others: what is foreign in one of them is looked for when all is known."""
+        return -np.inf
+
     def foreign(self, search: Weighing, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
         """What is foreign in one of the tests, weighed in that test alone."""
         assert isinstance(search, JointSearch)

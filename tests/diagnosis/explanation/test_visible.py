@@ -19,7 +19,6 @@ from tests.generator.film import Film
 
 SD = 0.004
 OFFSET = components("effects")["force_offset"]()
-TOP = BELIEFS.usual
 
 
 def evidence(density: object, centre: float, ends: tuple[float, float]) -> float:
@@ -38,8 +37,10 @@ def test_it_is_what_evidence_gains_by_the_other_prior(centre: float, expected: f
         return 2 / sides / (np.pi * expected * (1 + (r / expected) ** 2))
 
     def uniform(r: float) -> float:
-        return 1 / sides / (r * np.log(TOP * expected / BELIEFS.visible))
+        return min(1 / r, expected / r**2) / sides / (1 + np.log(expected / BELIEFS.visible))
 
+    whole = sides * quad(uniform, BELIEFS.visible, np.inf, limit=400)[0]
+    assert whole == pytest.approx(1.0, rel=1e-3)
     before = evidence(cauchy, centre, (low, centre + 12))
     after = evidence(uniform, centre, (BELIEFS.visible, centre + 12))
     ends = (low, centre + 12)
