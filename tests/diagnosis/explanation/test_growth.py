@@ -18,7 +18,7 @@ from bayesmembrane.diagnosis.explanation.growth import (
     _with_less,
     _with_parts,
 )
-from bayesmembrane.diagnosis.thresholds import GROWTH
+from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 
@@ -186,3 +186,36 @@ def test_pairs_that_nobody_fitted_are_asked_for_by_what_they_promise(monkeypatch
     grown = several(((), -90.0), (("friction", "mullins"), -41.0))
     (plain,) = grown.of_size(0)
     assert _promising_pairs(grown, [plain]) == [{"mullins", "tearing"}, {"tearing", "clamp_slip"}]
+
+
+@pytest.mark.parametrize("limit", [-np.inf, -80.0, 10.0])
+def test_nothing_grows_where_a_limit_leaves_noise_alone(monkeypatch: pytest.MonkeyPatch, limit: float) -> None:
+    """Single effects are fitted, and the sum is told of them: sets of several only if none explains all so well."""
+    grew: list[int] = []
+
+    def add(out: Grown, pairs: list[Any]) -> None:
+        grew.append(len(pairs))
+        out.add(candidate(claim("friction"), -50.0))
+
+    for step in ("_with_less", "_with_exchanged", "_with_pairs", "_with_twins"):
+        monkeypatch.setattr(growth, step, lambda *_, step=step: grew.append(step))
+    for step in ("_with_parts", "_checked", "_with_other_energies"):
+        monkeypatch.setattr(growth, step, lambda *_: None)
+    monkeypatch.setattr(growth, "_add_effects", add)
+    monkeypatch.setattr(growth, "_worth_more", lambda *_: False)
+    monkeypatch.setattr(Grown, "renew", lambda _: None)
+    monkeypatch.setattr(Grown, "polish", lambda *_: None)
+    plain = candidate(claim(), -100.0)
+    case = SimpleNamespace(
+        null=plain,
+        best_plain=plain,
+        plain={"gent": plain},
+        visible=[components("effects")["friction"]()],
+        question=SimpleNamespace(quick=False),
+        limited=lambda *_: limit,
+        search=None,
+    )
+    out = growth.grown(cast(OpenCase, case))
+    assert out.limited == (limit > -50.0 + FOREIGN.settled)
+    assert grew[0] == 1
+    assert ("_with_pairs" in grew) is not out.limited

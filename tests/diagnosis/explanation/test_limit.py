@@ -7,7 +7,8 @@ import pytest
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
-from bayesmembrane.diagnosis.explanation.limit import limit_of
+from bayesmembrane.diagnosis.explanation.limit import explained, limit_of
+from bayesmembrane.diagnosis.thresholds import FOREIGN
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -47,3 +48,24 @@ def test_a_peak_is_no_limit(seed: int) -> None:
     search, base, _ = fitted(2.0, True, seed)
     found = limit_of(search, base)
     assert found is None or found.gain < 0.0
+
+
+@pytest.mark.parametrize("noise_first", [True, False])
+def test_a_limit_that_leaves_noise_explains_all_of_a_clipped_film(noise_first: bool) -> None:
+    search, base, _ = fitted(SHARE, noise_first, 4121)
+    found = limit_of(search, base)
+    assert found is not None
+    assert explained(search, base) == pytest.approx(base.log_evidence + found.gain)
+
+
+def test_one_that_leaves_more_does_not() -> None:
+    """A wave of five standard deviations of the noise beside the limit; and a film without one."""
+    search, base, _ = fitted(SHARE, False, 4122)
+    wave = 5 * SD * np.sin(np.arange(240) / 3)
+    m = replace(search.measurement, force=search.measurement.force + wave)
+    moved = Search(m, white_noise(m), 0, api.solve)
+    again = moved.fit(CLAIM, [base.x])
+    assert again is not None
+    assert explained(moved, again) == -np.inf
+    plain, film, _ = fitted(2.0, True, 4110)
+    assert explained(plain, film) < film.log_evidence + FOREIGN.settled
