@@ -369,9 +369,8 @@ class VerdictThresholds:
     """How probable an answer must be."""
 
     sure: float = 0.95
-    """From which an answer is given; sets of an ambiguous one hold as much together."""
-    doubted: float = 0.5
-    """Of no effect, to first order: where it is less probable, all are weighed although no test sees a misfit."""
+    """From which an answer is given; sets of an ambiguous one hold as much together. Where no effect and
+    nothing foreign is less probable to first order, all are weighed although no test sees a misfit."""
     most_members: int = 6
     """Of an ambiguous answer; if more are needed and no effect is more probable than not, nothing can be told. Only so
     many are held against each other when further tests are looked for."""
