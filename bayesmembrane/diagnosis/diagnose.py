@@ -55,7 +55,7 @@ def _diagnosed(case: OpenCase) -> Diagnosis:
     if case.detection.adequate and (case.null is case.best_plain or case.tested(case.best_plain).adequate):
         found = adequate(case)
         p = found.probabilities
-        if min(p.effects[NOTHING], p.foreign[NOTHING]) > VERDICT.sure:
+        if min(p.effects[NOTHING], p.foreign[NOTHING]) > VERDICT.doubted:
             return _concluded(case, case.search, found)
     every = grown(case)
     assert isinstance(every.search, Search)

@@ -159,7 +159,7 @@ def _decided(case: JointCase) -> tuple[JointSearch, Verdict]:
     ):
         found = adequate(case)
         p = found.probabilities
-        if min(p.effects[NOTHING], p.foreign[NOTHING]) > VERDICT.sure:
+        if min(p.effects[NOTHING], p.foreign[NOTHING]) > VERDICT.doubted:
             return case.search, found
     every = grown(case)
     assert isinstance(every.search, JointSearch)
