@@ -371,9 +371,9 @@ class VerdictThresholds:
     sure: float = 0.95
     """From which an answer is given; sets of an ambiguous one hold as much together."""
     doubted: float = 0.85
-    """Of no effect, and of nothing foreign, to first order: where one is less probable, all are weighed although no test
-    sees a misfit. Of 104 plain films (`make study-loop`, seeds 300000 to 300159) 2 have less, and 12 less than 0.95; of
-    five films with effects of ratios 3 to 8 that no test saw, on both generators, three."""
+    """Of no effect, and of nothing foreign, to first order: where one is less probable, all are weighed although no
+    test sees a misfit. Of 104 plain films (`make study-loop`, seeds 300000 to 300159) 2 have less, and 12 less than
+    0.95; of five films with effects of ratios 3 to 8 that no test saw, on both generators, three."""
     most_members: int = 6
     """Of an ambiguous answer; if more are needed and no effect is more probable than not, nothing can be told. Only so
     many are held against each other when further tests are looked for."""
