@@ -151,7 +151,7 @@ def _grow(out: Grown) -> bool:
             out.renew()
             _with_other_energies(out, size)
             out.polish(size)
-        out.limited = out.limited or (size == 1 and _limited(out))
+            out.limited = size == 1 and _limited(out)
         if out.limited or not _worth_more(out, size):
             break
     return any_new
@@ -162,7 +162,8 @@ def _limited(out: Grown) -> bool:
 
     Effects that are put together to follow a force that stops rising are hard to fit, and none of that is needed.
     """
-    return out.case.limited(out.search, list(out.case.plain.values())) > out.best.log_evidence + FOREIGN.settled
+    plain = [out.found[key_of(c)] for c in out.case.plain.values()]  # weighed under the noise that the best is
+    return out.case.limited(out.search, plain) > out.best.log_evidence + FOREIGN.settled
 
 
 def _with_less(out: Grown) -> None:

@@ -203,16 +203,26 @@ def test_nothing_grows_where_a_limit_leaves_noise_alone(monkeypatch: pytest.Monk
         monkeypatch.setattr(growth, step, lambda *_: None)
     monkeypatch.setattr(growth, "_add_effects", add)
     monkeypatch.setattr(growth, "_worth_more", lambda *_: False)
-    monkeypatch.setattr(Grown, "renew", lambda _: None)
     monkeypatch.setattr(Grown, "polish", lambda *_: None)
     plain = candidate(claim(), -100.0)
+    anew = candidate(claim(), -90.0)
+
+    def renewed(out: Grown) -> None:
+        """Under another noise everything has another ln Z."""
+        out.add(anew)
+
+    def limited(_: Any, bases: list[Candidate]) -> float:
+        assert bases == [anew]
+        return limit
+
+    monkeypatch.setattr(Grown, "renew", renewed)
     case = SimpleNamespace(
         null=plain,
         best_plain=plain,
         plain={"gent": plain},
         visible=[components("effects")["friction"]()],
         question=SimpleNamespace(quick=False),
-        limited=lambda *_: limit,
+        limited=limited,
         search=None,
     )
     out = growth.grown(cast(OpenCase, case))
