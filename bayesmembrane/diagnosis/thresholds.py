@@ -227,7 +227,7 @@ class GrowthThresholds:
     refit_reach: float = 40.0
     """ln of the Bayes factor that a trace may promise less than the best one, and still be fitted."""
     promise: float = 0.0
-    """ln of the Bayes factor that a trace must promise: what promises less counts as the set without it."""
+    """ln of the Bayes factor that a trace must promise for a fit, and an effect must bring for further energies."""
     least_refits: int = 2
     """Effects that are fitted beside each of these sets none the less, for a trace is that of a little effect."""
     with_other_energies: int = 3
@@ -262,6 +262,8 @@ class GrowthThresholds:
     """Sets of each size that are searched for from all of their parts."""
     again_reach: float = 12.0
     """ln of the Bayes factor, as far as factors count, behind the best of all, beyond which they are not."""
+    share_reach: float = 40.0
+    """ln of the odds against the most probable hypothesis, beyond which one has no share in the sum."""
     worth: float = 1e-3
     """Of the probability of all smaller sets: below it, larger sets are not looked at."""
     round_off: float = 3e-6

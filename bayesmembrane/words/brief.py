@@ -156,12 +156,12 @@ def _every(course: Course) -> list[str]:
     d = course.telling
     p = d.probabilities
     foreign = p.anything_foreign
-    # The first screen has room for so much.
-    most = MOST_TOLD - bool(d.verdict == "ambiguous" and _in_all(d)) - bool(foreign >= WORDS.probable)
+    strange = foreign >= WORDS.probable
+    most = MOST_TOLD - strange - bool(d.verdict == "ambiguous" and _in_all(d))  # a first screen has room for so much
     probable = [name for name, q in p.effects.items() if q >= WORDS.probable][:most]
     sizes = np.cumsum([len(name.split("+")) for name in probable])
     told = [_probable_set(d, n, course, bool(k <= MOST_SIZES)) for n, k in zip(probable, sizes, strict=True)]
-    if foreign >= WORDS.probable:
+    if strange:
         told.insert(0 if foreign > 0.5 else len(told), f"{percent(foreign)} something foreign")
     if d.verdict == "material":
         told.append(f"{percent(p.energies.get(d.material, 0.0))} the energy {d.best.hypothesis.material.title}")

@@ -28,8 +28,6 @@ class Beliefs:
     median was 0.24 times. With that instead of Cauchy's prior alone and a rule for effects without support, the log
     score of 132 cases there went from -1.23 to -1.10, the truth was in the 95 % set of 126 instead of 117, and 29 of 30
     names were right both times."""
-    behind: float = 40.0
-    """ln of the odds against the best hypothesis, from which on a set has no share, whatever can be seen of it."""
     plain_gain: float = 25.0
     """ln of the Bayes factor of the best explanation over none, from which on factors count much less than they say:
     real laws differ from the library's in more ways than the form error knows, which matters the more the larger the
@@ -46,7 +44,7 @@ class Beliefs:
     that was never fitted."""
     untried: float = 0.1
     """Part of what a trace promises, that a set keeps which was never fitted: nothing is excluded that nobody looked
-    at. On the cases of `usual` any part from 0.02 to 0.3 gave the same log score to 0.01; with 0.02 the truth was in
+    at. On the cases of `visible` any part from 0.02 to 0.3 gave the same log score to 0.01; with 0.02 the truth was in
     the 95 % set of 125, with 0.1 of 126, with 0.3 there was one name less."""
     apart: float = 4.0
     """Times by which one of two sets may be more probable than the other where they differ by effects that the test

@@ -18,7 +18,7 @@ from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.detection.detect import Detection, detect
 from bayesmembrane.diagnosis.detection.scores import Signature
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside
-from bayesmembrane.diagnosis.explanation.limit import explained
+from bayesmembrane.diagnosis.explanation.limit import log_evidence_alone
 from bayesmembrane.diagnosis.explanation.twins import Pairs, twins, twins_in_time
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.noise import Whitened, orthonormal, whitened
@@ -122,7 +122,7 @@ class DiagnosisCase(ABC):
         """What is foreign beside the ``bases``, and a limit beside the ``others`` too; the most probable first."""
 
     @abstractmethod
-    def limited(self, search: Weighing, bases: Sequence[Candidate]) -> float:
+    def log_evidence_of_limit(self, search: Weighing, bases: Sequence[Candidate]) -> float:
         """ln Z of a limit of the load cell beside one of the ``bases`` that leaves noise alone; -inf if none does."""
 
 
@@ -150,9 +150,9 @@ class OpenCase(DiagnosisCase):
         assert isinstance(search, Search)
         return beside(search, bases, others)
 
-    def limited(self, search: Weighing, bases: Sequence[Candidate]) -> float:
+    def log_evidence_of_limit(self, search: Weighing, bases: Sequence[Candidate]) -> float:
         assert isinstance(search, Search)
-        return max(explained(search, base) for base in bases)
+        return max(log_evidence_alone(search, base) for base in bases)
 
 
 def opened(measurement: Measurement, question: Question, seed: int, solve: Solve, tell: Tell) -> OpenCase:

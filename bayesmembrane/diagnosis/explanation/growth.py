@@ -163,7 +163,7 @@ def _limited(out: Grown) -> bool:
     Effects that are put together to follow a force that stops rising are hard to fit, and none of that is needed.
     """
     plain = [out.found[key_of(c)] for c in out.case.plain.values()]  # weighed under the noise that the best is
-    return out.case.limited(out.search, plain) > out.best.log_evidence + FOREIGN.settled
+    return out.case.log_evidence_of_limit(out.search, plain) > out.best.log_evidence + FOREIGN.settled
 
 
 def _with_less(out: Grown) -> None:
@@ -181,7 +181,7 @@ def _with_less(out: Grown) -> None:
 def _with_parts(out: Grown) -> None:
     """What has a share in the sum without each of its effects, where that was not fitted with this energy.
 
-    An effect of no size would count as seen where the energy beside it is what explains the curve.
+    An effect of no size would seem to matter where the energy beside it is what explains the curve.
     """
     shares = _shares(out)
     near = [out.found[key] for key, share in shares.items() if share > np.log(SAMPLED.decides)]
@@ -364,7 +364,7 @@ def _bases(out: Grown, base: Candidate) -> list[Array]:
 def _with_other_energies(out: Grown, size: int) -> None:
     """The most probable sets with every other energy, from that energy's own fit and the effects of the set's.
 
-    Sets that are no better than without one of their effects count as those, whatever the energy.
+    Sets that are no better than without one of their effects have no further energy tried.
     """
     names = list(out.case.plain)
     tried = [c for c in out.best_of_each_set(size) if size == 1 or _gains(out, c)]

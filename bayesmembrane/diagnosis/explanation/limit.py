@@ -54,7 +54,7 @@ def limit_of(search: Search, base: Candidate, before: Limit | None = None) -> Li
     return None if found is None else _with_evidence(search, base, found, at, flat.force, constant)
 
 
-def explained(search: Search, base: Candidate) -> float:
+def log_evidence_alone(search: Search, base: Candidate) -> float:
     """ln Z of a limit beside ``base`` that leaves noise alone; -inf if there is none, or more is left."""
     found = limit_of(search, base)
     if found is None:

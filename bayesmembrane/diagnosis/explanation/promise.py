@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
-from bayesmembrane.diagnosis.explanation.visible import Ratio
-from bayesmembrane.diagnosis.reference.noise import orthonormal
+from bayesmembrane.diagnosis.explanation.visible import Ratio, own_lengths
 from bayesmembrane.diagnosis.thresholds import GROWTH
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
@@ -37,8 +36,7 @@ def promised(search: Weighing, base: Candidate, effect: Effect, counts: float = 
     The second by the normal posterior (s.r) / (s.s + 1), 1 / (s.s + 1) of the size, in units of what is expected.
     """
     slopes, best = _slopes(search, base, [effect]), -np.inf
-    own = orthonormal(search.noise.white(base.slopes))
-    lengths = np.linalg.norm(slopes.white - own @ (own.T @ slopes.white), axis=0)
+    lengths = own_lengths(slopes.white, search.noise.white(base.slopes))
     for f in _freed(search, base, slopes):
         along, square, allowed = _allowed(f)
         means, sds = np.abs(along * allowed) / (square + 1), 1 / np.sqrt(square + 1)

@@ -183,7 +183,7 @@ def _leaders(every: Sequence[Candidate]) -> list[Candidate]:
 def _seen(grown: Grown) -> dict[Key, float]:
     """What ln Z of each hypothesis gains where effects below what can be seen count as absent.
 
-    A set that is far behind with every energy has no share in the sum, and is left as it is.
+    One that is far behind has no share in the sum, and is left as it is.
     """
     given, out = set(grown.case.null.names), {}
     weights = {key: grown.counts * c.log_evidence + grown.believed(c) for key, c in grown.found.items()}
@@ -192,9 +192,10 @@ def _seen(grown: Grown) -> dict[Key, float]:
     for (_, names), c in grown.found.items():
         squares[names] = min(squares.get(names, np.inf), grown.search.excess(c))
     for key, c in grown.found.items():
-        without = {e: squares[key[1] - {e}] for e in key[1] if key[1] - {e} in squares}
-        near = first - weights[key] < BELIEFS.behind
-        out[key] = log_seen(grown.search, c, given, without) if near else 0.0
+        own = grown.search.excess(c)
+        takes = {e: squares[key[1] - {e}] - own for e in key[1] if key[1] - {e} in squares}
+        near = first - weights[key] < GROWTH.share_reach
+        out[key] = log_seen(grown.search, c, given, takes) if near else 0.0
     return out
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from math import inf, sqrt
+from math import sqrt
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.reference.noise import orthonormal
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.effects.base import Effect
 
 DEVIATES = np.linspace(-6.0, 6.0, 241)
 """At which the posterior of a ratio is integrated."""
@@ -60,35 +59,35 @@ class Ratio:
         return float(np.log(max(float(np.sum(weight * q / p) / np.sum(weight)), LEAST)))
 
 
-def log_seen(search: Weighing, candidate: Candidate, given: Collection[str], without: dict[str, float]) -> float:
+def log_seen(search: Weighing, candidate: Candidate, given: Collection[str], takes: Mapping[str, float]) -> float:
     """What ln Z gains where effects below what can be seen count as absent: the sum over its effects but those given.
 
-    ``without`` : squares beyond noise of the fits without one effect, by its name, as far as there are any. A trace
-    that is bent may be absorbed nearby though no fit without it comes near: where not even its expected size could be
-    seen, the squares that it takes away say how large it is.
+    ``takes`` : {effect: squares that it takes away beside the fit without it}, as far as there is one. A trace that is
+    bent may be absorbed nearby though no fit without it comes near: where not even its expected size could be seen,
+    these say how large it is.
     """
     if not set(candidate.names) - set(given):
         return 0.0
-    covariance, own = search.covariance(candidate), search.excess(candidate)
+    covariance, white = search.covariance(candidate), search.noise.white(candidate.slopes)
     whole, position = 0.0, candidate.hypothesis.material_size
     for effect in candidate.hypothesis.effects:
         if effect.name not in given:
-            ratio = _ratio(search, candidate, effect, position, covariance)
+            others = np.delete(white, range(position, position + len(effect.coordinates)), axis=1)
+            own = [position + i for i in effect.sizes]
+            lengths = own_lengths(white[:, own], others)
+            sizes = np.abs(candidate.x[own] - [effect.coordinates[i].null or 0.0 for i in effect.sizes])
+            sds, expected = np.sqrt(np.maximum(np.diagonal(covariance)[own], 0.0)), search.expected_sizes(effect)
+            first = int(np.argmax(sizes * lengths))  # of several sizes the one that is seen best
+            mean, sd, usual = (float(v[first] * lengths[first]) for v in (sizes, sds, expected))
+            ratio = Ratio(mean, sd, usual, effect.coordinates[effect.sizes[first]].one_sided)
             if ratio.expected < BELIEFS.visible:
-                ratio = ratio.at_least(sqrt(max(without.get(effect.name, -inf) - own, 0.0)))
+                ratio = ratio.at_least(sqrt(max(takes.get(effect.name, 0.0), 0.0)))
             whole += ratio.log_seen
         position += len(effect.coordinates)
     return whole
 
 
-def _ratio(search: Weighing, candidate: Candidate, effect: Effect, position: int, covariance: Array) -> Ratio:
-    """That of one effect of a candidate, whose coordinates begin at ``position``; of several sizes the largest."""
-    white, own = search.noise.white(candidate.slopes), range(position, position + len(effect.coordinates))
-    others = orthonormal(np.delete(white, list(own), axis=1))
-    found = []
-    for i, expected in zip(effect.sizes, search.expected_sizes(effect).tolist(), strict=True):
-        slope, p = white[:, own[i]], effect.coordinates[i]
-        length = float(np.linalg.norm(slope - others @ (others.T @ slope)))
-        size, sd = abs(candidate.x[own[i]] - (p.null or 0.0)), sqrt(max(covariance[own[i], own[i]], 0.0))
-        found.append(Ratio(float(size) * length, sd * length, expected * length, p.one_sided))
-    return max(found, key=lambda r: r.mean)
+def own_lengths(white: Array, others: Array) -> Array:
+    """(m,) of columns (N, m), freed of noise, what is left once ``others`` (N, p) have taken what they can."""
+    basis = orthonormal(others)
+    return np.asarray(np.linalg.norm(white - basis @ (basis.T @ white), axis=0))

@@ -66,7 +66,7 @@ class JointCase(DiagnosisCase):
                     out[frozenset(own)] = near
         return out
 
-    def limited(self, search: Weighing, bases: Sequence[Candidate]) -> float:
+    def log_evidence_of_limit(self, search: Weighing, bases: Sequence[Candidate]) -> float:
         """No test speaks for the others: what is foreign in one of them is looked for when all is known."""
         return -np.inf
 

@@ -191,7 +191,7 @@ def test_pairs_that_nobody_fitted_are_asked_for_by_what_they_promise(monkeypatch
 @pytest.mark.parametrize("limit", [-np.inf, -80.0, 10.0])
 def test_nothing_grows_where_a_limit_leaves_noise_alone(monkeypatch: pytest.MonkeyPatch, limit: float) -> None:
     """Single effects are fitted, and the sum is told of them: sets of several only if none explains all so well."""
-    grew: list[int] = []
+    grew: list[Any] = []
 
     def add(out: Grown, pairs: list[Any]) -> None:
         grew.append(len(pairs))
@@ -211,7 +211,7 @@ def test_nothing_grows_where_a_limit_leaves_noise_alone(monkeypatch: pytest.Monk
         """Under another noise everything has another ln Z."""
         out.add(anew)
 
-    def limited(_: Any, bases: list[Candidate]) -> float:
+    def with_limit(_: Any, bases: list[Candidate]) -> float:
         assert bases == [anew]
         return limit
 
@@ -222,7 +222,7 @@ def test_nothing_grows_where_a_limit_leaves_noise_alone(monkeypatch: pytest.Monk
         plain={"gent": plain},
         visible=[components("effects")["friction"]()],
         question=SimpleNamespace(quick=False),
-        limited=limited,
+        log_evidence_of_limit=with_limit,
         search=None,
     )
     out = growth.grown(cast(OpenCase, case))

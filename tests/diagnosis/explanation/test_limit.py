@@ -7,7 +7,7 @@ import pytest
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
-from bayesmembrane.diagnosis.explanation.limit import explained, limit_of
+from bayesmembrane.diagnosis.explanation.limit import limit_of, log_evidence_alone
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -54,7 +54,7 @@ def test_a_limit_that_leaves_noise_explains_all_of_a_clipped_film(noise_first: b
     search, base, _ = fitted(SHARE, noise_first, 4121)
     found = limit_of(search, base)
     assert found is not None
-    assert explained(search, base) == pytest.approx(base.log_evidence + found.gain)
+    assert log_evidence_alone(search, base) == pytest.approx(base.log_evidence + found.gain)
 
 
 def test_one_that_leaves_more_does_not() -> None:
@@ -65,6 +65,6 @@ def test_one_that_leaves_more_does_not() -> None:
     moved = Search(m, white_noise(m), 0, api.solve)
     again = moved.fit(CLAIM, [base.x])
     assert again is not None
-    assert explained(moved, again) == -np.inf
+    assert log_evidence_alone(moved, again) == -np.inf
     plain, film, _ = fitted(2.0, True, 4110)
-    assert explained(plain, film) == -np.inf
+    assert log_evidence_alone(plain, film) == -np.inf

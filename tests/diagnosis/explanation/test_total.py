@@ -36,14 +36,14 @@ def effects(
     ``untried``, where traces of those that were not fitted have a ``promised`` ln of the Bayes factor.
     """
     takes = {
-        frozenset({"friction"}): {"friction": LEFT},
-        frozenset({"friction", "mullins"}): {"mullins": 20.0},
+        frozenset({"friction"}): {"friction": LEFT - 20.0},
+        frozenset({"friction", "mullins"}): {"mullins": 3.0},
         frozenset(): {},
     }
 
-    def visible(_: Search, c: Candidate, given: Collection[str], without: dict[str, float]) -> float:
+    def visible(_: Search, c: Candidate, given: Collection[str], found: dict[str, float]) -> float:
         assert not given
-        assert without == takes[frozenset(c.names)]
+        assert found == takes[frozenset(c.names)]
         return seen if "mullins" in c.names else 0.0
 
     monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
