@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
-from bayesmembrane.diagnosis.explanation.visible import Ratio, own_lengths
+from bayesmembrane.diagnosis.explanation.visible import Ratio, freed
 from bayesmembrane.diagnosis.thresholds import GROWTH
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
@@ -31,18 +32,19 @@ def first_order(search: Weighing, base: Candidate, effect: Effect) -> float:
 
 
 def promised(search: Weighing, base: Candidate, effect: Effect, counts: float = 1.0) -> float:
-    """`first_order`, of which a part ``counts``, and what ln Z gains where effects that could not be seen are absent.
+    """ln of the weight of a little of ``effect`` beside ``base``, to first order, at the best of several shapes.
 
-    The second by the normal posterior (s.r) / (s.s + 1), 1 / (s.s + 1) of the size, in units of what is expected.
+    c (s.r)^2 / (s.s) / 2 + ln int q L^c, with the slope s as in `first_order`, of whose likelihood a part c =
+    ``counts`` counts, and `Ratio.log_part`: effects that could not be seen are absent.
     """
     slopes, best = _slopes(search, base, [effect]), -np.inf
-    lengths = own_lengths(slopes.white, search.noise.white(base.slopes))
+    lengths = np.linalg.norm(freed(slopes.white, search.noise.white(base.slopes)), axis=0)
     for f in _freed(search, base, slopes):
-        along, square, allowed = _allowed(f)
-        means, sds = np.abs(along * allowed) / (square + 1), 1 / np.sqrt(square + 1)
-        for gain, mean, sd, length in zip(_gains(f), means, sds, lengths * f.left, strict=True):
-            ratio = Ratio(float(mean * length), float(sd * length), float(length), effect.size.one_sided)
-            best = max(best, counts * (float(gain) - f.cost) + ratio.log_seen)
+        for i in np.flatnonzero(f.left):
+            along, square, length = float(f.along[i]), float(f.product[i, i]), float(lengths[i])
+            toward = along * slopes.sides[i] if slopes.sides[i] else abs(along)
+            ratio = Ratio(toward / square * length, length / sqrt(square), length, effect.size.one_sided)
+            best = max(best, counts * (0.5 * along**2 / square - f.cost) + ratio.log_part(counts))
     return best
 
 
@@ -123,14 +125,9 @@ def _freed(search: Weighing, base: Candidate, slopes: _Slopes) -> Iterator[_Free
 
 def _gains(f: _Freed) -> Array:
     """(m,) ln K of each slope; only its cost where it would have the wrong sign, 0 where nothing is left of it."""
-    along, square, allowed = _allowed(f)
-    return np.asarray(0.5 * along**2 / (square + 1) * allowed - 0.5 * np.log1p(square))
-
-
-def _allowed(f: _Freed) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """s.r, s.s, and whether it has a sign that is allowed, of each slope (m,); zeros where nothing is left of it."""
     along, square = np.where(f.left, f.along, 0.0), np.where(f.left, np.diagonal(f.product), 0.0)
-    return along, square, (f.slopes.sides == 0) | (f.slopes.sides * along > 0)
+    allowed = (f.slopes.sides == 0) | (f.slopes.sides * along > 0)
+    return np.asarray(0.5 * along**2 / (square + 1) * allowed - 0.5 * np.log1p(square))
 
 
 def _gains_of_two(f: _Freed) -> Array:

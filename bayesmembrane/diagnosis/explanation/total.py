@@ -195,7 +195,7 @@ def _seen(grown: Grown) -> dict[Key, float]:
         own = grown.search.excess(c)
         takes = {e: squares[key[1] - {e}] - own for e in key[1] if key[1] - {e} in squares}
         near = first - weights[key] < GROWTH.share_reach
-        out[key] = log_seen(grown.search, c, given, takes) if near else 0.0
+        out[key] = log_seen(grown.search, c, given, takes, grown.counts) if near else 0.0
     return out
 
 

@@ -41,8 +41,9 @@ def effects(
         frozenset(): {},
     }
 
-    def visible(_: Search, c: Candidate, given: Collection[str], found: dict[str, float]) -> float:
+    def visible(_: Search, c: Candidate, given: Collection[str], found: dict[str, float], counts: float) -> float:
         assert not given
+        assert counts == BELIEFS.counts(50.0 + max(gain, 0.0))
         assert found == takes[frozenset(c.names)]
         return seen if "mullins" in c.names else 0.0
 

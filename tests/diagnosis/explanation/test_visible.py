@@ -10,7 +10,7 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.visible import LEAST, Ratio, log_seen
+from bayesmembrane.diagnosis.explanation.visible import LEAST, Ratio, log_seen, own_ratio
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
@@ -21,15 +21,23 @@ SD = 0.004
 OFFSET = components("effects")["force_offset"]()
 
 
-def evidence(density: object, centre: float, ends: tuple[float, float]) -> float:
-    """The integral of a prior ``density`` times a likelihood N(centre, 1) between ``ends``, by another quadrature."""
-    return float(quad(lambda r: density(r) * np.exp(-0.5 * (r - centre) ** 2), *ends, limit=400, points=[centre])[0])  # type: ignore[operator]
+def evidence(density: object, centre: float, ends: tuple[float, float], counts: float) -> float:
+    """int density(r) exp(-c (r - centre)^2 / 2) dr between ``ends``, by another quadrature."""
+    cuts = [p for p in (centre, -BELIEFS.visible, BELIEFS.visible) if ends[0] < p < ends[1]]
+    whole = quad(lambda r: density(r) * np.exp(-0.5 * counts * (r - centre) ** 2), *ends, limit=400, points=cuts)  # type: ignore[operator]
+    return float(whole[0])
 
 
+COUNTS = (1.0, 0.5)
+
+
+@pytest.mark.parametrize("counts", COUNTS)
 @pytest.mark.parametrize("one_sided", [True, False])
-@pytest.mark.parametrize(("centre", "expected"), [(30.0, 80.0), (6.0, 80.0), (4.0, 20.0)])
-def test_it_is_what_evidence_gains_by_the_other_prior(centre: float, expected: float, one_sided: bool) -> None:
-    """Likelihoods N(centre, 1) of a ratio under Cauchy's prior and under the ln-uniform one."""
+@pytest.mark.parametrize(("centre", "expected"), [(30.0, 80.0), (6.0, 80.0), (4.0, 20.0), (-1.0, 20.0)])
+def test_it_is_what_a_weight_gains_by_the_other_prior(
+    centre: float, expected: float, one_sided: bool, counts: float
+) -> None:
+    """Likelihoods N(centre, 1) of a ratio under Cauchy's prior, and a part of them under the ln-uniform one."""
     sides = 1 if one_sided else 2
     low = 0.0 if one_sided else centre - 12
 
@@ -37,24 +45,34 @@ def test_it_is_what_evidence_gains_by_the_other_prior(centre: float, expected: f
         return 2 / sides / (np.pi * expected * (1 + (r / expected) ** 2))
 
     def uniform(r: float) -> float:
-        return min(1 / r, expected / r**2) / sides / (1 + np.log(expected / BELIEFS.visible))
+        own = min(1 / abs(r), expected / r**2) if abs(r) >= BELIEFS.visible else 0.0
+        return own / sides / (1 + np.log(expected / BELIEFS.visible))
 
-    whole = sides * quad(uniform, BELIEFS.visible, np.inf, limit=400)[0]
-    assert whole == pytest.approx(1.0, rel=1e-3)
-    before = evidence(cauchy, centre, (low, centre + 12))
-    after = evidence(uniform, centre, (BELIEFS.visible, centre + 12))
-    ends = (low, centre + 12)
-    mean = evidence(lambda r: r * cauchy(r), centre, ends) / before
-    sd = np.sqrt(evidence(lambda r: (r - mean) ** 2 * cauchy(r), centre, ends) / before)
-    found = Ratio(mean, float(sd), expected, one_sided).log_seen
-    assert found == pytest.approx(np.log(after / before), abs=0.03)
+    assert sides * quad(uniform, BELIEFS.visible, np.inf, limit=400)[0] == pytest.approx(1.0, rel=1e-3)
+    before = evidence(cauchy, centre, (low, centre + 12), 1.0)
+    after = evidence(uniform, centre, (low, centre + 12 / np.sqrt(counts)), counts)
+    found = Ratio(centre, 1.0, expected, one_sided)
+    assert found.log_part(counts) == pytest.approx(np.log(after), abs=0.03)
+    assert found.log_seen(counts) == pytest.approx(np.log(after) - counts * np.log(before), abs=0.03)
 
 
-def test_what_cannot_be_seen_counts_as_absent() -> None:
-    assert Ratio(0.4, 0.2, 50.0, True).log_seen == pytest.approx(np.log(LEAST))
-    assert Ratio(0.0, 0.0, 0.0, True).log_seen == pytest.approx(np.log(LEAST))
-    rising = [Ratio(m, 1.0, 50.0, True).log_seen for m in (0.0, 1.0, 2.0, 3.0, 4.0)]
+@pytest.mark.parametrize("counts", COUNTS)
+def test_what_cannot_be_seen_counts_as_absent(counts: float) -> None:
+    assert Ratio(0.0, 0.1, 50.0, True).log_seen(counts) == pytest.approx(np.log(LEAST))
+    assert Ratio(0.0, 0.0, 0.0, True).log_seen(counts) == pytest.approx(np.log(LEAST))
+    rising = [Ratio(m, 1.0, 50.0, True).log_seen(counts) for m in (-1.0, 0.0, 1.0, 2.0, 3.0, 4.0)]
     assert np.all(np.diff(rising) > 0)
+
+
+@pytest.mark.parametrize("expected", [5.0, 50.0, 5000.0])
+@pytest.mark.parametrize("counts", [1.0, 0.5, 0.2])
+def test_no_effect_gains_more_than_its_likelihood_says(expected: float, counts: float) -> None:
+    """However much its size cost before the data: beside one that does nothing for the fit a set has less weight."""
+    centre = 1.0
+    ratio = Ratio(centre, 1.0, expected, True)
+    log_z = np.log(evidence(lambda r: 2 / (np.pi * expected * (1 + (r / expected) ** 2)), centre, (0.0, 13.0), 1.0))
+    taken = 0.5 * centre**2  # by the best size from the squares of a fit without it, in ln of the likelihood
+    assert counts * (log_z + taken) + ratio.log_seen(counts) < 0.0
 
 
 def test_the_size_that_is_expected_is_no_tuning() -> None:
@@ -62,7 +80,7 @@ def test_the_size_that_is_expected_is_no_tuning() -> None:
 
     Under Cauchy's prior ln Z differs by ln 10, nearly.
     """
-    gained = {e: Ratio(8.0, 1.0, e, True).log_seen for e in (20.0, 200.0)}
+    gained = {e: Ratio(8.0, 1.0, e, True).log_seen(1.0) for e in (20.0, 200.0)}
     log_z = {e: -np.log(e * (1 + (8.0 / e) ** 2)) for e in gained}
     whole = {e: log_z[e] + gained[e] for e in gained}
     assert log_z[20.0] - log_z[200.0] > 2.0
@@ -100,8 +118,8 @@ def test_the_square_of_a_ratio_is_what_chi_square_loses_without_the_effect(film:
 
     size, sd = abs(found.x[-1]), np.sqrt(search.covariance(found)[-1, -1])
     expected = Ratio(ratio(size), ratio(sd), ratio(float(search.expected_sizes(OFFSET)[0])), False)
-    assert log_seen(search, found, (), {}) == pytest.approx(expected.log_seen, rel=1e-6)
-    assert log_seen(search, found, ("force_offset",), {}) == 0.0
+    assert log_seen(search, found, (), {}, 0.5) == pytest.approx(expected.log_seen(0.5), rel=1e-6)
+    assert log_seen(search, found, ("force_offset",), {}, 0.5) == 0.0
 
 
 def test_a_bent_trace_is_as_large_as_what_a_fit_without_it_leaves(film: tuple[Search, float]) -> None:
@@ -109,11 +127,11 @@ def test_a_bent_trace_is_as_large_as_what_a_fit_without_it_leaves(film: tuple[Se
     search, _ = film
     found = fitted(search)
     faint = replace(found, slopes=np.column_stack([found.slopes[:, :-1], 1e-3 * found.slopes[:, -1]]))
-    absorbed = log_seen(search, faint, (), {})
-    seen = [log_seen(search, faint, (), {"force_offset": r**2}) for r in (1.0, 2.0, 4.0)]
+    absorbed = log_seen(search, faint, (), {}, 1.0)
+    seen = [log_seen(search, faint, (), {"force_offset": r**2}, 1.0) for r in (1.0, 2.0, 4.0)]
     assert absorbed == pytest.approx(np.log(LEAST))
     assert np.all(np.diff([absorbed, *seen]) > 0)
-    assert log_seen(search, found, (), {"force_offset": 1e6}) == log_seen(search, found, (), {})
+    assert log_seen(search, found, (), {"force_offset": 1e6}, 1.0) == log_seen(search, found, (), {}, 1.0)
 
 
 def test_ratios_are_raised_and_never_lowered() -> None:
@@ -121,3 +139,18 @@ def test_ratios_are_raised_and_never_lowered() -> None:
     assert here.at_least(1.0) == here
     assert here.at_least(8.0) == Ratio(8.0, 1.0, 16.0, True)
     assert Ratio(0.0, 0.5, 4.0, True).at_least(8.0) == Ratio(0.0, 0.5, 4.0, True)
+
+
+def test_one_size_in_each_of_several_tests_has_the_ratio_of_the_whole_trace() -> None:
+    """Two tests of readings of their own: squares add up, and what is sure in one alone counts as far as it does."""
+    traces = np.zeros((20, 2))
+    traces[:10, 0], traces[10:, 1] = 3.0, 2.0
+    sizes, covariance = np.array([0.2, -0.5]), np.diag([0.01, 0.04])
+    lengths = np.linalg.norm(traces, axis=0)
+    found = own_ratio(traces, sizes, covariance, np.array([1.0, 2.0]), one_sided=False)
+    each = sizes * lengths
+    assert found.mean == pytest.approx(np.linalg.norm(each))
+    assert found.expected == pytest.approx(np.linalg.norm(lengths * [1.0, 2.0]))
+    part = each / np.linalg.norm(each)
+    assert found.sd == pytest.approx(np.sqrt(np.sum((part * lengths) ** 2 * np.diag(covariance))))
+    assert own_ratio(traces, np.zeros(2), covariance, np.array([1.0, 2.0]), one_sided=False).mean == 0.0
