@@ -13,21 +13,21 @@ ROUNDS, POINTS, LEAST, READINGS = 4, 128, 16, 50_000
 WIDER = 1.5
 
 
-def ruled_out_gain(posterior: Posterior | JointPosterior, x: Array, seed: int) -> float | None:
+def ruled_out_gain(posterior: Posterior | JointPosterior, x: Array, log_posterior: Array, seed: int) -> float | None:
     """By how much ln p(x | y) is larger, at least, at a film that convexity rules out than at the best draw.
 
-    x (B, k) are draws. Films are tried around the best one, as far apart as the draws are, then around the best of
-    them, without the convexity prior. 0 if none is better; None where that prior asks nothing.
+    x (B, k) are draws, with ``log_posterior`` (B,). Films are tried around the best one, as far apart as the draws are,
+    then around the best of them, without the convexity prior. 0 if none is better; None where that prior asks nothing.
     """
     free = posterior.without_convexity
     if free is None:
         return None
     rng, count = np.random.default_rng([seed, 3]), max(LEAST, min(POINTS, READINGS // posterior.readings))
-    some = x[rng.integers(len(x), size=4 * count)]
+    chosen = rng.integers(len(x), size=4 * count)
+    some = x[chosen]
     apart = WIDER * (some - some.mean(axis=0)) / np.sqrt(len(some))  # z @ apart has the covariance of the draws
-    lp = weighed(free, some).log_posterior
-    best, within = some[int(np.argmax(lp))], float(np.max(lp))
-    highest = within
+    best = some[int(np.argmax(log_posterior[chosen]))]
+    highest = within = float(weighed(free, best[None]).log_posterior[0])
     for _ in range(ROUNDS):
         tried = best + rng.standard_normal((count, len(some))) @ apart
         lp = weighed(free, tried).log_posterior

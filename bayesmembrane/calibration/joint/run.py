@@ -196,13 +196,12 @@ def _made(
     joint = posterior.joint
     x, lp = sampled.draws(MOST_DRAWS)
     parts = tuple(_part_run(posterior, i, how, asked, sampled, folder) for i in range(len(joint.parts)))
+    beyond = ruled_out_gain(posterior, x.reshape(-1, x.shape[-1]), lp.ravel(), how.seed)
     return JointRun(
         joint=joint,
         x=x,
         log_posterior=lp,
-        status=_status(joint, x, lp, sampled, how)
-        | {"walk": asked["walk"]}
-        | {"checks": {"ruled_out": ruled_out_gain(posterior, x.reshape(-1, x.shape[-1]), how.seed)}},
+        status=_status(joint, x, lp, sampled, how) | {"walk": asked["walk"]} | {"checks": {"ruled_out": beyond}},
         parts=parts,
         mass=posterior.prior.mass(posterior.inside, how.seed),
         fingerprint=str(asked["fingerprint"]),

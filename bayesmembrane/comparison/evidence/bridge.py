@@ -16,6 +16,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 
 PROPOSED, PILOT = 4000, 1000
+FEWEST_PROPOSED, FOR_A_DRAW = 1000, 2.0  # proposals: more than so many for what draws are worth change little
 FITTED, USED = 4000, 6000  # most draws of a half that a mixture is fitted to, and that the bridge stands on
 WALKERS, SNAPSHOTS = 500, 6
 SERIES = 50  # steps from which on autocorrelation along them can be seen
@@ -157,14 +158,14 @@ def _laid_out(x: Array) -> Array:
 
 def _bridged(problem: Problem, fitted: _Half, compared: _Half, rng: np.random.Generator) -> tuple[float, float]:
     """(ln Z, standard error) with g from one half and the draws of the other."""
-    g = _proposal(problem, fitted, rng)
-    y = g.draw(rng, PROPOSED)
+    g, n1 = _proposal(problem, fitted, rng), compared.worth()
+    y = g.draw(rng, int(np.clip(FOR_A_DRAW * n1, FEWEST_PROPOSED, PROPOSED)))
     at_proposals = problem.log_posterior(y) - g.log_density(y)
     if not np.any(np.isfinite(at_proposals)):
         return np.nan, np.inf
     flat = compared.x.reshape(-1, problem.size)
     at_draws = compared.log_p - g.log_density(flat).reshape(compared.log_p.shape)
-    n1, n2 = compared.worth(), float(PROPOSED)
+    n2 = float(len(y))
     log_z = _fixed_point(at_draws.ravel(), at_proposals, n1, n2)
     # f1 = p / (s1 p + s2 Z g) over the proposals, f2 = g / (the same) over the draws; with p / (Z g) = exp(d).
     s1, s2 = n1 / (n1 + n2), n2 / (n1 + n2)
