@@ -83,6 +83,12 @@ def say_thinning(measurement: Measurement) -> None:
         note(thinning_sentence(found).replace("were diagnosed", "are diagnosed"))
 
 
+def _row_name(row: dict[str, Any], several: bool) -> str:
+    """Effects, which lines may break between, and the energy where there are ``several``."""
+    effects = str(row["effect"]).replace("+", " + ")
+    return f"{effects} with {row['material']}" if several and effects != row["material"] else effects
+
+
 def show(document: dict[str, Any], measurement: Measurement) -> None:
     """A diagnosis on the terminal, in the units of the rig."""
     factor, unit = measurement.rig.shown(measurement.specimen.thickness)["N"]
@@ -90,8 +96,8 @@ def show(document: dict[str, Any], measurement: Measurement) -> None:
     several = len({r["material"] for r in document["ranking"]}) > 1
     rows = [
         [
-            f"{r['effect']} with {r['material']}" if several and r["effect"] != r["material"] else r["effect"],
-            f"{r['probability']:.3f}",
+            _row_name(r, several),
+            f"{100 * r['probability']:.1f} %",
             f"{r['log_bayes_factor']:.1f}",
             f"{100 * r['unexplained']:.0f} %",
             ", ".join(f"{k.split('.')[-1]} {v:.4g}" for k, v in r["parameters"].items()),
