@@ -6,7 +6,7 @@ out beside all that the model can follow.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -15,7 +15,7 @@ from scipy.special import expit
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
-from bayesmembrane.diagnosis.candidates.evidence import Block, extended, weighed
+from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, extended, weighed
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation.limit import Limit, limit_of
 from bayesmembrane.diagnosis.reference.inferred import own_noise
@@ -25,6 +25,8 @@ from bayesmembrane.ground.parameters import Array
 
 SUDDEN, WAVE, PLAY, CLIPPED, UNNAMED = "sudden_change", "ripple", "play", "clipped", "unnamed"
 KINDS = (SUDDEN, WAVE, PLAY, CLIPPED, UNNAMED)
+PIECE = 2**18
+"""Numbers of traces that are weighed at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +95,12 @@ class _Family:
     told: Callable[[Foreign, int, float], Foreign]
     width: int = 1
 
+    def pieces(self) -> Iterator[Array]:
+        """The traces some groups at a time: with what is made of them, those of a long test fill the memory."""
+        step = max(PIECE // len(self.traces) // self.width, 1) * self.width
+        for first in range(0, self.traces.shape[1], step):
+            yield self.traces[:, first : first + step]
+
 
 def foreign(search: Search, base: Candidate) -> list[Foreign]:
     """Every kind that can be looked for beside ``base``."""
@@ -140,13 +148,11 @@ def _of_family(base: Candidate, family: _Family, search: Search, _before: Foreig
     model = search.linear(base)
     # Beside noise and form error as they are expected: what is foreign has driven the fitted ones up.
     plain = np.minimum(base.theta, model.priors[:, 0])
-    white = search.noise.white(family.traces)
-    freed = model.freed(plain, white)
-    gains = _gains(freed, white, freed.T @ model.data, family.width)
+    gains = np.concatenate([_gains(search, model, plain, part, family.width) for part in family.pieces()])
     best = int(np.argmax(gains))
     members = slice(best * family.width, (best + 1) * family.width)
     spread = float(np.logaddexp.reduce(gains) - np.log(gains.size) - gains[best])
-    wider = extended(model, [Block(white[:, members])])
+    wider = extended(model, [Block(search.noise.white(family.traces[:, members]))])
     z = weighed(wider, base.theta)
     mean = wider.mean(z.theta)
     own = mean[-family.width :]
@@ -156,10 +162,12 @@ def _of_family(base: Candidate, family: _Family, search: Search, _before: Foreig
     return family.told(found, best, float(own[0]))
 
 
-def _gains(freed: Array, white: Array, along: Array, width: int) -> Array:
+def _gains(search: Search, model: Linear, theta: Array, traces: Array, width: int) -> Array:
     """(m,) ln K of each group of ``width`` columns s: r^T P s (1 + s^T P s)^-1 s^T P r / 2 - ln |1 + s^T P s| / 2."""
-    n, count = white.shape
-    a = along.reshape(count // width, width)
+    n, count = traces.shape
+    white = search.noise.white(traces)
+    freed = model.freed(theta, white)
+    a = (freed.T @ model.data).reshape(count // width, width)
     f, w = (v.reshape(n, count // width, width) for v in (freed, white))
     gram = np.einsum("nmi,nmj->mij", w, f) + np.eye(width)
     solved = np.linalg.solve(gram, a[:, :, None])[:, :, 0]
