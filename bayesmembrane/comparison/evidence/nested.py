@@ -24,8 +24,7 @@ from bayesmembrane.ground.parameters import Array
 PILOT_LIVE, PILOT_PER_DIMENSION = 150, 30
 LEAST_LIVE, PER_DIMENSION, MOST_LIVE = 80, 15, 4000
 TOLERANCE, LEAST_SD = 0.13, 1e-3
-PILOTS, THEN, MOST_RUNS = 2, 1, 12
-FROM_DRAWS = 3  # runs at least, where none climbs from the prior: their scatter says what H / N leaves out
+PILOTS, LEAST_RUNS, MOST_RUNS = 2, 3, 12  # of the least all count but pilots that missed a mode
 REMAINING, NEAR = 0.2, 0.5  # ln Z that may be left in the live points when they are added: from the prior, and from q
 QUEUE = 0.25  # of the live points are proposed at once: those that fall behind meanwhile are lost
 SHRINK = 0.3  # of ln(volume) between two fits of the bounds
@@ -86,7 +85,6 @@ def nested(
     searched, took = problem.evaluations, problem.seconds
     climbs = _Climbs(problem, rngs, keep)
     found: list[ARun] = []
-    least = PILOTS + THEN if around is None else FROM_DRAWS
     if around is None:
         from_prior = max(PILOT_LIVE, PILOT_PER_DIMENSION * problem.size)
         pilots = [climbs.run(i, problem, from_prior, REMAINING) for i in range(PILOTS)]
@@ -102,7 +100,7 @@ def nested(
         value, sd = _together(found)
         if tell is not None:
             tell(f"nested sampling, run {len(found)}: {value:.2f} +- {sd:.2f}")
-        if len(found) >= least and sd <= tolerance:
+        if len(found) >= LEAST_RUNS and sd <= tolerance:
             break
     # Weighed draws of the modes are an estimate of their own that is never too high: a gross difference is an error.
     sd = max(sd, 0.5 * modes.beyond(value, sd))

@@ -29,7 +29,7 @@ class Beliefs:
     plain_gain: float = 50.0
     """ln of the Bayes factor of the best explanation over none, from which on likelihoods count much less than they
     say: real laws differ from the library's in more ways than the form error knows, which matters the more the larger
-    the effects are. Of the prior of the sizes that is whole (`visible.Ratio.log_seen`). On the cases of `visible`, with
+    the effects are. The prior of the sizes counts whole (`visible.Ratio.log_seen`). On the cases of `visible`, with
     `least_counts`: log score -1.06 and 33 names of which one is wrong; with 25 and 0.3 -1.16, 29 and one, with 100 and
     0.4 -1.05, 38 and two, but the truth is in the 95 % set of 123 instead of 126."""
     least_counts: float = 0.4
@@ -57,7 +57,7 @@ class Beliefs:
         return len(self.effects) - 1
 
     def counts(self, gain: float) -> float:
-        """What part of every ln Bayes factor counts where the best explanation has ln K = ``gain`` over none."""
+        """What part of every likelihood counts where the best explanation has ln K = ``gain`` over none."""
         return max(1.0 / sqrt(1.0 + max(gain, 0.0) / self.plain_gain), self.least_counts)
 
     def log_set(self, odds: Sequence[float], visible: Sequence[float]) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pairs
 from bayesmembrane.diagnosis.explanation.twins import swapped
 from bayesmembrane.diagnosis.explanation.unfitted import Key
+from bayesmembrane.diagnosis.explanation.visible import all_seen
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED, TWINS
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
@@ -52,7 +53,7 @@ class Grown:
 
     @property
     def counts(self) -> float:
-        """What part of every ln Bayes factor counts, with the gain of the best so far."""
+        """What part of every likelihood counts, with the gain of the best so far."""
         best = max(c.log_evidence for c in self.found.values())
         return BELIEFS.counts(best - self.of_size(0)[0].log_evidence)
 
@@ -62,6 +63,11 @@ class Grown:
         of_set = BELIEFS.log_set(own, [e.odds for e in self.case.visible])
         of = energy or candidate.hypothesis.material.name
         return of_set + BELIEFS.log_energy(of, self.case.question.energy, len(self.case.plain))
+
+    def seen(self) -> dict[Key, float]:
+        """What the weight of each gains where effects below what can be seen count as absent."""
+        weights = {key: self.counts * c.log_evidence + self.believed(c) for key, c in self.found.items()}
+        return all_seen(self.search, self.found, weights, self.case.null.names, self.counts)
 
     def of_size(self, size: int) -> list[Candidate]:
         """Those with so many effects beyond the given ones, the most probable first."""
@@ -124,8 +130,9 @@ def _checked(out: Grown) -> None:
     rest = dict(out.found)
     out.case.tell("checking what decides by importance sampling")
     null = (out.case.null.hypothesis.material.name, frozenset(out.case.null.names))
+    seen = out.seen()
     for _ in range(SAMPLED.most):
-        shares = _shares(out)
+        shares = _shares(out, seen)
         key = null if null in rest else max(rest, key=shares.__getitem__, default=null)
         if key not in rest or (key != null and shares[key] < np.log(SAMPLED.decides)):
             break
@@ -183,7 +190,7 @@ def _with_parts(out: Grown) -> None:
 
     An effect of no size would seem to matter where the energy beside it is what explains the curve.
     """
-    shares = _shares(out)
+    shares = _shares(out, out.seen())
     near = [out.found[key] for key, share in shares.items() if share > np.log(SAMPLED.decides)]
     steps = [(c, name) for c in near for name in _own(out, c)]
     new = [(c, n) for c, n in steps if (c.hypothesis.material.name, frozenset(c.names) - {n}) not in out.found]
@@ -195,9 +202,10 @@ def _own(out: Grown, c: Candidate) -> list[str]:
     return [n for n in c.names if n not in out.case.null.names]
 
 
-def _shares(out: Grown) -> dict[Key, float]:
-    """ln of the part that each hypothesis has in the sum of all that were fitted."""
-    weights = {key: out.counts * c.log_evidence + out.believed(c) for key, c in out.found.items()}
+def _shares(out: Grown, seen: Mapping[Key, float]) -> dict[Key, float]:
+    """ln of the part that each hypothesis has in the sum of all that were fitted; ``seen`` as `Grown.seen` says."""
+    counts = out.counts
+    weights = {key: counts * c.log_evidence + out.believed(c) + seen[key] for key, c in out.found.items()}
     whole = float(np.logaddexp.reduce(list(weights.values())))
     return {key: w - whole for key, w in weights.items()}
 

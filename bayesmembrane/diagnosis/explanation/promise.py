@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
-from bayesmembrane.diagnosis.explanation.visible import Ratio, freed
+from bayesmembrane.diagnosis.explanation.visible import Ratio, own_traces
 from bayesmembrane.diagnosis.thresholds import GROWTH
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
@@ -35,10 +35,11 @@ def promised(search: Weighing, base: Candidate, effect: Effect, counts: float = 
     """ln of the weight of a little of ``effect`` beside ``base``, to first order, at the best of several shapes.
 
     c (s.r)^2 / (s.s) / 2 + ln int q L^c, with the slope s as in `first_order`, of whose likelihood a part c =
-    ``counts`` counts, and `Ratio.log_part`: effects that could not be seen are absent.
+    ``counts`` counts, and `Ratio.log_part`: effects that could not be seen are absent. So is one whose trace is bent
+    and absorbed nearby, of which only a fit says how large it is.
     """
     slopes, best = _slopes(search, base, [effect]), -np.inf
-    lengths = np.linalg.norm(freed(slopes.white, search.noise.white(base.slopes)), axis=0)
+    lengths = np.linalg.norm(own_traces(slopes.white, search.noise.white(base.slopes)), axis=0)
     for f in _freed(search, base, slopes):
         for i in np.flatnonzero(f.left):
             along, square, length = float(f.along[i]), float(f.product[i, i]), float(lengths[i])

@@ -17,7 +17,6 @@ from bayesmembrane.diagnosis.explanation.growth import Grown, key_of
 from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
 from bayesmembrane.diagnosis.explanation.unfitted import Key, unfitted
-from bayesmembrane.diagnosis.explanation.visible import log_seen
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
 
@@ -109,7 +108,7 @@ def summed(grown: Grown) -> Total:
     given = case.null.names
     every, counts = list(grown.found.values()), grown.counts
 
-    seen = _seen(grown)
+    seen = grown.seen()
 
     def own(c: Candidate) -> float:
         return counts * c.log_evidence + grown.believed(c) + seen[key_of(c)]
@@ -178,25 +177,6 @@ def _leaders(every: Sequence[Candidate]) -> list[Candidate]:
     for c in every:
         first.setdefault(frozenset(c.names), c)
     return list(first.values())
-
-
-def _seen(grown: Grown) -> dict[Key, float]:
-    """What ln Z of each hypothesis gains where effects below what can be seen count as absent.
-
-    One that is far behind has no share in the sum, and is left as it is.
-    """
-    given, out = set(grown.case.null.names), {}
-    weights = {key: grown.counts * c.log_evidence + grown.believed(c) for key, c in grown.found.items()}
-    first = max(weights.values())
-    squares: dict[frozenset[str], float] = {}
-    for (_, names), c in grown.found.items():
-        squares[names] = min(squares.get(names, np.inf), grown.search.excess(c))
-    for key, c in grown.found.items():
-        own = grown.search.excess(c)
-        takes = {e: squares[key[1] - {e}] - own for e in key[1] if key[1] - {e} in squares}
-        near = first - weights[key] < GROWTH.share_reach
-        out[key] = log_seen(grown.search, c, given, takes, grown.counts) if near else 0.0
-    return out
 
 
 def _other_energies(grown: Grown, seen: Mapping[Key, float]) -> dict[Key, float]:

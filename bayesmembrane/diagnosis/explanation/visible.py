@@ -7,20 +7,24 @@ from dataclasses import dataclass
 from math import log, sqrt
 
 import numpy as np
+from scipy.special import logsumexp
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
+from bayesmembrane.diagnosis.explanation.unfitted import Key
 from bayesmembrane.diagnosis.reference.noise import orthonormal
-from bayesmembrane.diagnosis.thresholds import TINY
+from bayesmembrane.diagnosis.thresholds import GROWTH, TINY
 from bayesmembrane.ground.parameters import Array
 
-DEVIATES = np.linspace(-6.0, 6.0, 961)
-"""At which a likelihood is integrated."""
+DEVIATES = np.linspace(-6.0, 6.0, 241)
+"""At which a likelihood is integrated, in its standard deviations."""
+SCALES = np.geomspace(1e-2, 1e2, 81)
+"""At which a prior is, in parts of what is expected."""
 SHARPEST = 1e-9
-"""Standard deviation of a ratio, at least."""
+"""Standard deviation of a ratio, and what is expected of it, at least."""
 LEAST = 1e-11
-"""Part of its evidence that a set keeps whatever the likelihood of a ratio says: a normal one has no tails."""
+"""Part of its weight that a set keeps whatever the likelihood of a ratio says: a normal one has no tails."""
 
 
 @dataclass(frozen=True)
@@ -51,33 +55,69 @@ class Ratio:
         q(r) = min(1 / r, R / r^2) / (1 + ln(R / r0)) from r0 on, half of that for either sign. An R below r0 is taken
         to be r0.
         """
-        usual = max(self.expected, BELIEFS.visible)
+        faintest, usual = BELIEFS.visible, max(self.expected, BELIEFS.visible)
 
-        def q(r: Array) -> Array:
-            there = np.maximum(r, BELIEFS.visible)
-            own = np.minimum(1 / there, usual / there**2) / (1 + np.log(usual / BELIEFS.visible))
-            return np.asarray(own * (r >= BELIEFS.visible))
+        def log_q(r: Array) -> Array:
+            there = np.maximum(r, faintest)
+            own = np.log(np.minimum(1 / there, usual / there**2) / (1 + log(usual / faintest)))
+            return np.where(r >= faintest, own, -np.inf)
 
-        return self._log_integral(q, self.sd / sqrt(counts))
+        places = np.concatenate([[faintest * (1 - 1e-9), faintest], usual * SCALES])
+        return self._log_integral(log_q, places, self.sd / sqrt(counts))
 
-    def log_seen(self, counts: float) -> float:
+    @property
+    def log_before(self) -> float:
+        """ln int p(r) L(r) dr, its part in ln Z: fits are weighed with p(r) = 2 / (pi R (1 + (r / R)^2))."""
+        usual = max(self.expected, SHARPEST)
+        constant = log(2 / (np.pi * usual))
+        return self._log_integral(lambda r: constant - np.log1p((r / usual) ** 2), usual * SCALES, self.sd)
+
+    def log_seen(self, counts: float, squares: float = 0.0) -> float:
         """ln int q(r) L(r)^c dr - c ln int p(r) L(r) dr: what a weight of c ln Z gains where the prior is q, not p.
 
-        Fits are weighed with p(r) = 2 / (pi R (1 + (r / R)^2)): they may be of no size. A part c = ``counts`` of the
-        likelihood speaks for or against an effect, but its prior whole: else a set whose sizes cost much before the
-        data would gain more by q than its likelihood does. With c = 1 it is ln E[q(r) / p(r)] over the posterior.
+        A part c = ``counts`` of the likelihood speaks for or against an effect, but its prior whole: else a set whose
+        sizes cost much before the data would gain more by q than its likelihood does. With c = 1 it is ln E[q(r) /
+        p(r)] over the posterior.
+        ``squares`` : that the effect takes away beside the fit without it. A trace that is bent may be absorbed nearby
+        though no fit without it comes near: where not even its expected size could be seen, these say how large it is.
         """
-        usual = max(self.expected, BELIEFS.visible)
-        before = counts * self._log_integral(lambda r: 2 / (np.pi * usual * (1 + (r / usual) ** 2)), self.sd)
-        return max(self.log_part(counts), before + log(LEAST)) - before
+        before = counts * self.log_before
+        seen = self.at_least(sqrt(max(squares, 0.0))) if self.expected < BELIEFS.visible else self
+        return max(seen.log_part(counts), before + log(LEAST)) - before
 
-    def _log_integral(self, density: Callable[[Array], Array], sd: float) -> float:
-        """ln int density(|r|) exp(-(r - m)^2 / (2 sd^2)) dr, half the density for either sign."""
+    def _log_integral(self, log_density: Callable[[Array], Array], places: Array, sd: float) -> float:
+        """ln int density(|r|) exp(-(r - m)^2 / (2 sd^2)) dr, half the density for either sign, by trapezoids."""
         sd = max(sd, SHARPEST)
-        r = self.mean + sd * DEVIATES
-        weight = np.where(r < 0, 0.0, 1.0) if self.one_sided else np.full(r.size, 0.5)
-        whole = np.sum(weight * density(np.abs(r)) * np.exp(-0.5 * DEVIATES**2)) * (DEVIATES[1] - DEVIATES[0])
-        return float(np.log(max(float(whole) * sd, TINY)))
+        near = np.concatenate([self.mean + sd * DEVIATES, sd * (DEVIATES - DEVIATES[0])])
+        r = np.unique(np.concatenate([[0.0], near[near > 0], places]))
+        log_likelihood = -0.5 * ((r - self.mean) / sd) ** 2
+        if not self.one_sided:
+            log_likelihood = np.logaddexp(log_likelihood, -0.5 * ((r + self.mean) / sd) ** 2) - log(2)
+        step = np.diff(r)
+        share = 0.5 * (np.append(step, 0.0) + np.insert(step, 0, 0.0))
+        return float(logsumexp(log_density(r) + log_likelihood, b=share))
+
+
+def all_seen(
+    search: Weighing,
+    found: Mapping[Key, Candidate],
+    weights: Mapping[Key, float],
+    given: Collection[str],
+    counts: float,
+) -> dict[Key, float]:
+    """`log_seen` of each hypothesis but for the effects ``given``; ``weights`` are those without it.
+
+    One that is far behind has no share in the sum, and is left as it is.
+    """
+    first, squares, out = max(weights.values()), dict[frozenset[str], float](), {}
+    excess = {key: search.excess(c) for key, c in found.items()}
+    for (_, names), own in ((key, excess[key]) for key in found):
+        squares[names] = min(squares.get(names, np.inf), own)
+    for key, c in found.items():
+        takes = {e: squares[key[1] - {e}] - excess[key] for e in key[1] if key[1] - {e} in squares}
+        near = first - weights[key] < GROWTH.share_reach
+        out[key] = log_seen(search, c, given, takes, counts) if near else 0.0
+    return out
 
 
 def log_seen(
@@ -86,51 +126,56 @@ def log_seen(
     """What a weight of ``counts`` ln Z gains where effects below what can be seen count as absent.
 
     The sum over the effects of a candidate but those given.
-    ``takes`` : {effect: squares that it takes away beside the fit without it}, as far as there is one. A trace that is
-    bent may be absorbed nearby though no fit without it comes near: where not even its expected size could be seen,
-    these say how large it is.
+    ``takes`` : {effect: squares that it takes away beside the fit without it}, as far as there is one.
     """
     if not set(candidate.names) - set(given):
         return 0.0
     covariance, white = search.covariance(candidate), search.noise.white(candidate.slopes)
+    unbound = _unbound(search, candidate)
     whole, position = 0.0, candidate.hypothesis.material_size
     for effect in candidate.hypothesis.effects:
         if effect.name not in given:
             others = np.delete(white, range(position, position + len(effect.coordinates)), axis=1)
-            own = [position + i for i in effect.sizes]
-            sizes = candidate.x[own] - [effect.coordinates[i].null or 0.0 for i in effect.sizes]
+            own, one_sided = [position + i for i in effect.sizes], effect.size.one_sided
+            null = np.array([effect.coordinates[i].null or 0.0 for i in effect.sizes])
+            sizes = candidate.x[own] - null
+            if one_sided:  # where one is at its end the likelihood may speak for the other sign
+                sizes = np.where(sizes == 0, np.minimum(unbound[own] - null, 0.0), sizes)
             ratio = own_ratio(
-                freed(white[:, own], others),
+                own_traces(white[:, own], others),
                 sizes,
                 covariance[np.ix_(own, own)],
                 search.expected_sizes(effect),
-                effect.size.one_sided,
+                one_sided,
             )
-            if ratio.expected < BELIEFS.visible:
-                ratio = ratio.at_least(sqrt(max(takes.get(effect.name, 0.0), 0.0)))
-            whole += ratio.log_seen(counts)
+            whole += ratio.log_seen(counts, takes.get(effect.name, 0.0))
         position += len(effect.coordinates)
     return whole
+
+
+def _unbound(search: Weighing, candidate: Candidate) -> Array:
+    """(k,) the coordinates that the linear model would have if nothing stopped it."""
+    mean, _ = search.linear(candidate).first(candidate.theta, candidate.x.size)
+    return candidate.x + (mean - search.coefficients_at(candidate)) * search.steepness(candidate)
 
 
 def own_ratio(own: Array, sizes: Array, covariance: Array, expected: Array, one_sided: bool) -> Ratio:
     """Of the whole trace of an effect with traces ``own`` (N, m) of its ``sizes`` (m,), one in each of several tests.
 
-    covariance : (m, m) of the sizes; expected : (m,) before the data
+    covariance : (m, m) of the sizes; expected : (m,) before the data. The priors of m sizes are in ln Z, and that of
+    the whole trace is exchanged for another one: the others count as ln Z does.
     """
-    signs = np.where(sizes < 0, -1.0, 1.0)
-    along = own @ (sizes if np.any(sizes) else expected)
+    signs = np.where((sizes < 0) & (not one_sided), -1.0, 1.0)
+    usual = own @ (signs * expected)
+    along = own @ sizes if np.any(sizes) else usual
     length = float(np.linalg.norm(along))
     turn = own.T @ along / max(length, TINY)
-    return Ratio(
-        length if np.any(sizes) else 0.0,
-        sqrt(max(float(turn @ covariance @ turn), 0.0)),
-        float(np.linalg.norm(own @ (signs * expected))),
-        one_sided,
-    )
+    mean = float(np.copysign(length, along @ usual)) if np.any(sizes) else 0.0
+    sd = sqrt(max(float(turn @ covariance @ turn), 0.0))
+    return Ratio(mean if one_sided else abs(mean), sd, float(np.linalg.norm(usual)), one_sided)
 
 
-def freed(white: Array, others: Array) -> Array:
+def own_traces(white: Array, others: Array) -> Array:
     """Columns (N, m), freed of noise, less what ``others`` (N, p) can take of them."""
     basis = orthonormal(others)
     return np.asarray(white - basis @ (basis.T @ white))

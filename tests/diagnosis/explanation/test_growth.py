@@ -72,8 +72,9 @@ def test_a_smaller_set_is_searched_for_from_a_larger_one(before: float | None) -
     assert shelf.asked == [FRICTION]
 
 
-def test_what_decides_is_fitted_without_each_of_its_effects() -> None:
+def test_what_decides_is_fitted_without_each_of_its_effects(monkeypatch: pytest.MonkeyPatch) -> None:
     """A set that is fitted with an energy whose part was fitted with others only; one without a share is left alone."""
+    monkeypatch.setattr(growth, "all_seen", lambda _, found, *__: dict.fromkeys(found, 0.0))
     shelf = Shelf({FRICTION: -11.0, MULLINS: -90.0}, {FRICTION: -9.5})
     odds = [SimpleNamespace(odds=1.0) for _ in range(4)]
     plain = candidate(claim(), -60.0)

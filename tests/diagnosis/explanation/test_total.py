@@ -10,10 +10,12 @@ import pytest
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation import total
+from bayesmembrane.diagnosis.explanation import visible as visible_module
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.explanation.growth import Grown
 from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.hypothesis import hypothesis
 
 LEFT = 100.0
@@ -48,8 +50,14 @@ def effects(
         return seen if "mullins" in c.names else 0.0
 
     monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
-    monkeypatch.setattr(total, "promised", lambda *_: promised)
-    monkeypatch.setattr(total, "log_seen", visible)
+
+    def foretold(_: Search, base: Candidate, effect: Effect, counts: float) -> float:
+        assert effect.name not in base.names
+        assert counts == BELIEFS.counts(50.0 + max(gain, 0.0))
+        return promised
+
+    monkeypatch.setattr(total, "promised", foretold)
+    monkeypatch.setattr(visible_module, "log_seen", visible)
     squares = {frozenset(): LEFT, frozenset({"friction"}): 20.0, frozenset({"friction", "mullins"}): 17.0}
     search = SimpleNamespace(
         excess=lambda c: squares[frozenset(c.names)], expected_sizes=lambda e: np.array([e.size.scale])
@@ -76,7 +84,7 @@ def effects(
 
 @pytest.mark.parametrize("seen", [1.5, 0.0, -25.0])
 def test_a_set_counts_as_far_as_its_effects_can_be_seen(monkeypatch: pytest.MonkeyPatch, seen: float) -> None:
-    """Whole: it is the prior of its sizes that changes, while only a part of a Bayes factor counts."""
+    """Whole: it is the prior of its sizes that changes, while only a part of ln Z counts."""
     p = effects(monkeypatch, seen, gain=2.0)
     counted = BELIEFS.counts(52.0) * 2.0 + seen
     odds = np.exp(counted + BELIEFS.log_set((1.0,) * 2, FOUR) - BELIEFS.log_set((1.0,), FOUR))
@@ -93,8 +101,11 @@ def test_a_further_effect_that_nobody_fitted_is_not_excluded(monkeypatch: pytest
     nothing = effects(monkeypatch, seen=0.0, gain=-1.0)
     assert "friction+tearing" not in nothing
     found = {p: effects(monkeypatch, seen=0.0, gain=-1.0, untried=unseen, promised=p) for p in (-2.0, 50.0)}
-    assert 0 < found[-2.0]["friction+tearing"] < found[50.0]["friction+tearing"] < BELIEFS.untried * np.e
-    assert found[50.0]["friction"] == pytest.approx(nothing["friction"], abs=2 * BELIEFS.untried)
+    prior = BELIEFS.log_set((1.0,) * 2, FOUR) - BELIEFS.log_set((1.0,), FOUR)
+    for said, p in found.items():
+        kept = BELIEFS.untried * np.exp(prior + min(said, BELIEFS.supported))
+        assert p["friction+tearing"] / p["friction"] == pytest.approx(kept)
+        assert p["friction+mullins"] / p["friction"] == pytest.approx(nothing["friction+mullins"] / nothing["friction"])
     assert [sum(p.values()) for p in found.values()] == pytest.approx([1.0, 1.0])
 
 
@@ -102,7 +113,7 @@ def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monke
     """Two energies are alike without effects: friction fitted with both has no more than Mullins fitted with one."""
     monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
     monkeypatch.setattr(total, "promised", lambda *_: -np.inf)
-    monkeypatch.setattr(total, "log_seen", lambda *_: 0.0)
+    monkeypatch.setattr(visible_module, "log_seen", lambda *_: 0.0)
     plain = [candidate(log_evidence=-60.0, energy=name) for name in ("gent", "yeoh")]
     case = SimpleNamespace(
         null=plain[0],

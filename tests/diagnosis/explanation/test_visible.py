@@ -1,4 +1,4 @@
-"""Effects count as there where their own trace can be seen: the ratios, and what evidence gains by that prior."""
+"""Effects count as there where their own trace can be seen: the ratios, and what a weight gains by that prior."""
 
 from dataclasses import replace
 
@@ -10,6 +10,7 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
+from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.visible import LEAST, Ratio, log_seen, own_ratio
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -23,7 +24,7 @@ OFFSET = components("effects")["force_offset"]()
 
 def evidence(density: object, centre: float, ends: tuple[float, float], counts: float) -> float:
     """int density(r) exp(-c (r - centre)^2 / 2) dr between ``ends``, by another quadrature."""
-    cuts = [p for p in (centre, -BELIEFS.visible, BELIEFS.visible) if ends[0] < p < ends[1]]
+    cuts = [p for p in (centre, -BELIEFS.visible, 0.0, 0.1, BELIEFS.visible) if ends[0] < p < ends[1]]
     whole = quad(lambda r: density(r) * np.exp(-0.5 * counts * (r - centre) ** 2), *ends, limit=400, points=cuts)  # type: ignore[operator]
     return float(whole[0])
 
@@ -33,34 +34,43 @@ COUNTS = (1.0, 0.5)
 
 @pytest.mark.parametrize("counts", COUNTS)
 @pytest.mark.parametrize("one_sided", [True, False])
-@pytest.mark.parametrize(("centre", "expected"), [(30.0, 80.0), (6.0, 80.0), (4.0, 20.0), (-1.0, 20.0)])
+@pytest.mark.parametrize(
+    ("centre", "expected"),
+    [(30.0, 80.0), (6.0, 80.0), (4.0, 20.0), (-1.0, 20.0), (-8.0, 20.0), (5.0, 0.3), (300.0, 8.0)],
+)
 def test_it_is_what_a_weight_gains_by_the_other_prior(
     centre: float, expected: float, one_sided: bool, counts: float
 ) -> None:
     """Likelihoods N(centre, 1) of a ratio under Cauchy's prior, and a part of them under the ln-uniform one."""
     sides = 1 if one_sided else 2
-    low = 0.0 if one_sided else centre - 12
+    # The likelihood is that of a ratio: what is not allowed, its slope at 0 cuts off.
+    low, high = (0.0 if one_sided else -abs(centre) - 12), abs(centre) + 12
 
     def cauchy(r: float) -> float:
         return 2 / sides / (np.pi * expected * (1 + (r / expected) ** 2))
 
+    usual = max(expected, BELIEFS.visible)
+
     def uniform(r: float) -> float:
-        own = min(1 / abs(r), expected / r**2) if abs(r) >= BELIEFS.visible else 0.0
-        return own / sides / (1 + np.log(expected / BELIEFS.visible))
+        own = min(1 / abs(r), usual / r**2) if abs(r) >= BELIEFS.visible else 0.0
+        return own / sides / (1 + np.log(usual / BELIEFS.visible))
 
     assert sides * quad(uniform, BELIEFS.visible, np.inf, limit=400)[0] == pytest.approx(1.0, rel=1e-3)
-    before = evidence(cauchy, centre, (low, centre + 12), 1.0)
-    after = evidence(uniform, centre, (low, centre + 12 / np.sqrt(counts)), counts)
+    before = evidence(cauchy, centre, (low, high), 1.0)
+    after = evidence(uniform, centre, (low if one_sided else low - 6, high + 6), counts)
     found = Ratio(centre, 1.0, expected, one_sided)
     assert found.log_part(counts) == pytest.approx(np.log(after), abs=0.03)
-    assert found.log_seen(counts) == pytest.approx(np.log(after) - counts * np.log(before), abs=0.03)
+    assert found.log_before == pytest.approx(np.log(before), abs=0.03)
+    gained = np.log(after) - counts * np.log(before)
+    assert found.log_seen(counts) == pytest.approx(max(gained, np.log(LEAST)), abs=0.03)
 
 
 @pytest.mark.parametrize("counts", COUNTS)
 def test_what_cannot_be_seen_counts_as_absent(counts: float) -> None:
     assert Ratio(0.0, 0.1, 50.0, True).log_seen(counts) == pytest.approx(np.log(LEAST))
     assert Ratio(0.0, 0.0, 0.0, True).log_seen(counts) == pytest.approx(np.log(LEAST))
-    rising = [Ratio(m, 1.0, 50.0, True).log_seen(counts) for m in (-1.0, 0.0, 1.0, 2.0, 3.0, 4.0)]
+    assert Ratio(-30.0, 1.0, 50.0, True).log_seen(counts) == pytest.approx(np.log(LEAST))
+    rising = [Ratio(m, 1.0, 50.0, True).log_seen(counts) for m in (-3.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0)]
     assert np.all(np.diff(rising) > 0)
 
 
@@ -73,6 +83,16 @@ def test_no_effect_gains_more_than_its_likelihood_says(expected: float, counts: 
     log_z = np.log(evidence(lambda r: 2 / (np.pi * expected * (1 + (r / expected) ** 2)), centre, (0.0, 13.0), 1.0))
     taken = 0.5 * centre**2  # by the best size from the squares of a fit without it, in ln of the likelihood
     assert counts * (log_z + taken) + ratio.log_seen(counts) < 0.0
+
+
+@pytest.mark.parametrize("mean", [0.3, 1e-4, 1e-9])
+@pytest.mark.parametrize("counts", COUNTS)
+def test_a_raised_ratio_gains_no_more_for_having_been_small(mean: float, counts: float) -> None:
+    """What a fit without it leaves says how large the trace is, and not what its size has cost in ln Z."""
+    small, seen = Ratio(mean, 0.5, 1.0, True), Ratio(4.0, 1.0, 4.0 / mean, True)
+    gained = small.log_seen(counts, squares=16.0)
+    assert gained == pytest.approx(seen.log_part(counts) - counts * small.log_before)
+    assert gained < 0.0
 
 
 def test_the_size_that_is_expected_is_no_tuning() -> None:
@@ -145,12 +165,40 @@ def test_one_size_in_each_of_several_tests_has_the_ratio_of_the_whole_trace() ->
     """Two tests of readings of their own: squares add up, and what is sure in one alone counts as far as it does."""
     traces = np.zeros((20, 2))
     traces[:10, 0], traces[10:, 1] = 3.0, 2.0
-    sizes, covariance = np.array([0.2, -0.5]), np.diag([0.01, 0.04])
+    sizes, usual, covariance = np.array([0.2, 0.5]), np.array([1.0, 2.0]), np.diag([0.01, 0.04])
     lengths = np.linalg.norm(traces, axis=0)
-    found = own_ratio(traces, sizes, covariance, np.array([1.0, 2.0]), one_sided=False)
+    found = own_ratio(traces, sizes, covariance, usual, one_sided=True)
     each = sizes * lengths
     assert found.mean == pytest.approx(np.linalg.norm(each))
-    assert found.expected == pytest.approx(np.linalg.norm(lengths * [1.0, 2.0]))
+    assert found.expected == pytest.approx(np.linalg.norm(lengths * usual))
     part = each / np.linalg.norm(each)
     assert found.sd == pytest.approx(np.sqrt(np.sum((part * lengths) ** 2 * np.diag(covariance))))
-    assert own_ratio(traces, np.zeros(2), covariance, np.array([1.0, 2.0]), one_sided=False).mean == 0.0
+    assert own_ratio(traces, -sizes, covariance, usual, one_sided=True).mean == pytest.approx(-found.mean)
+    assert own_ratio(traces, -sizes, covariance, usual, one_sided=False).mean == pytest.approx(found.mean)
+    assert own_ratio(traces, np.array([0.0, 0.5]), covariance, usual, one_sided=True).mean == pytest.approx(each[1])
+    assert own_ratio(traces, np.zeros(2), covariance, usual, one_sided=True).mean == 0.0
+
+
+def test_a_size_that_is_stopped_at_nothing_is_judged_by_what_the_data_ask_for() -> None:
+    """A loop of the wrong sense: friction is fitted as none, and has the weight that its trace promises."""
+    rng, up = np.random.default_rng(68), np.linspace(0.0, 0.03, 41)[1:]
+    path = np.concatenate([up, up[-2::-1]])
+    force = Film("neo_hookean", (8.0,), 0.010, 0.035, 0.04).force(path)
+    loop = np.where(np.arange(path.size) < up.size, -1.0, 1.0) * 1.2e-3
+    y = force + loop + SD * rng.standard_normal(path.size)
+    m = Measurement(path, y, Annulus(0.010, 0.035), Specimen("film", 5e-5))
+    search, plain, friction = (
+        Search(m, white_noise(m, SD, 80.0)),
+        hypothesis("neo_hookean"),
+        components("effects")["friction"](),
+    )
+    base = search.fit(plain, search.material_starts(plain))
+    assert base is not None
+    start = np.concatenate([base.x, friction.null])
+    found = search.fit(with_effects(plain, [friction]), [start])
+    assert found is not None
+    assert found.x[-2] == 0.0
+    for counts in COUNTS:
+        whole = counts * (found.log_evidence - base.log_evidence) + log_seen(search, found, (), {}, counts)
+        assert whole == pytest.approx(promised(search, base, friction, counts), abs=0.7)
+        assert whole < -4.0
