@@ -111,11 +111,11 @@ def all_seen(
     """
     first, squares, out = max(weights.values()), dict[frozenset[str], float](), {}
     excess = {key: search.excess(c) for key, c in found.items()}
-    for (_, names), own in ((key, excess[key]) for key in found):
+    for (_, names), own in excess.items():
         squares[names] = min(squares.get(names, np.inf), own)
     for key, c in found.items():
-        takes = {e: squares[key[1] - {e}] - excess[key] for e in key[1] if key[1] - {e} in squares}
-        near = first - weights[key] < GROWTH.share_reach
+        names, near = key[1], first - weights[key] < GROWTH.share_reach
+        takes = {e: squares[names - {e}] - excess[key] for e in names if names - {e} in squares}
         out[key] = log_seen(search, c, given, takes, counts) if near else 0.0
     return out
 
