@@ -16,13 +16,15 @@ WIDER = 1.5
 def ruled_out_gain(posterior: Posterior | JointPosterior, x: Array, log_posterior: Array, seed: int) -> float | None:
     """By how much ln p(x | y) is larger, at least, at a film that convexity rules out than at the best draw.
 
-    x (B, k) are draws, with ``log_posterior`` (B,). Films are tried around the best one, as far apart as the draws are,
-    then around the best of them, without the convexity prior. 0 if none is better; None where that prior asks nothing.
+    x (..., k) are draws, with ``log_posterior`` (...). Films are tried around the best one, as far apart as the draws
+    are, then around the best of them, without the convexity prior. 0 if none is better; None where that prior asks
+    nothing.
     """
     free = posterior.without_convexity
     if free is None:
         return None
     rng, count = np.random.default_rng([seed, 3]), max(LEAST, min(POINTS, READINGS // posterior.readings))
+    x, log_posterior = x.reshape(-1, x.shape[-1]), log_posterior.ravel()
     chosen = rng.integers(len(x), size=4 * count)
     some = x[chosen]
     apart = WIDER * (some - some.mean(axis=0)) / np.sqrt(len(some))  # z @ apart has the covariance of the draws

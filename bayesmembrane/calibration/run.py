@@ -242,9 +242,7 @@ class _Work:
         counted = _tally(self.posterior.solve)
         sampled = self._walked(segments)
         data, status = outcome(self.posterior, sampled, self.how.sampling.ess, self.how.seed)
-        x, lp = sampled.draws(MOST_DRAWS)
-        flat = x.reshape(-1, x.shape[-1])
-        status["checks"]["ruled_out"] = ruled_out_gain(self.posterior, flat, lp.ravel(), self.how.seed)
+        status["checks"]["ruled_out"] = ruled_out_gain(self.posterior, *sampled.draws(MOST_DRAWS), self.how.seed)
         if counted is not None and (now := _tally(self.posterior.solve)) is not None:
             status["cache"] = now.since(counted).summary()
         if segments is None:

@@ -196,7 +196,7 @@ def _made(
     joint = posterior.joint
     x, lp = sampled.draws(MOST_DRAWS)
     parts = tuple(_part_run(posterior, i, how, asked, sampled, folder) for i in range(len(joint.parts)))
-    beyond = ruled_out_gain(posterior, x.reshape(-1, x.shape[-1]), lp.ravel(), how.seed)
+    beyond = ruled_out_gain(posterior, x, lp, how.seed)
     return JointRun(
         joint=joint,
         x=x,

@@ -30,8 +30,8 @@ class Beliefs:
     """ln of the Bayes factor of the best explanation over none, from which on likelihoods count much less than they
     say: real laws differ from the library's in more ways than the form error knows, which matters the more the larger
     the effects are. The prior of the sizes counts whole (`visible.Ratio.log_seen`). On the cases of `visible`, with
-    `least_counts`: log score -1.06 and 33 names of which one is wrong; with 25 and 0.3 -1.16, 29 and one, with 100 and
-    0.4 -1.05, 38 and two, but the truth is in the 95 % set of 123 instead of 126."""
+    `least_counts`, reckoned from stored fits: log score -1.06 and 33 names, one of them wrong; with 25 and 0.3 -1.12,
+    25 and one; with 100 and 0.4 -1.05, 38 and two, but the truth in the 95 % set of 123 instead of 126."""
     least_counts: float = 0.4
     """However large that is; reached at a gain of 260. A film that no plain energy comes near has one of 100 000, which
     says nothing of the laws. With 0.3 the log score is -1.07."""

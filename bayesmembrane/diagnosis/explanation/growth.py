@@ -64,10 +64,14 @@ class Grown:
         of = energy or candidate.hypothesis.material.name
         return of_set + BELIEFS.log_energy(of, self.case.question.energy, len(self.case.plain))
 
+    def weights(self) -> dict[Key, float]:
+        """ln of the weight of each in the sum, but for what `seen` adds."""
+        counts = self.counts
+        return {key: counts * c.log_evidence + self.believed(c) for key, c in self.found.items()}
+
     def seen(self) -> dict[Key, float]:
         """What the weight of each gains where effects below what can be seen count as absent."""
-        weights = {key: self.counts * c.log_evidence + self.believed(c) for key, c in self.found.items()}
-        return all_seen(self.search, self.found, weights, self.case.null.names, self.counts)
+        return all_seen(self.search, self.found, self.weights(), self.case.null.names, self.counts)
 
     def of_size(self, size: int) -> list[Candidate]:
         """Those with so many effects beyond the given ones, the most probable first."""
@@ -204,8 +208,7 @@ def _own(out: Grown, c: Candidate) -> list[str]:
 
 def _shares(out: Grown, seen: Mapping[Key, float]) -> dict[Key, float]:
     """ln of the part that each hypothesis has in the sum of all that were fitted; ``seen`` as `Grown.seen` says."""
-    counts = out.counts
-    weights = {key: counts * c.log_evidence + out.believed(c) + seen[key] for key, c in out.found.items()}
+    weights = {key: w + seen[key] for key, w in out.weights().items()}
     whole = float(np.logaddexp.reduce(list(weights.values())))
     return {key: w - whole for key, w in weights.items()}
 

@@ -52,13 +52,13 @@ def limit_of(search: Search, base: Candidate, before: Limit | None = None) -> Li
     found = _limit_of(search, base, before)
     if found is None or found.gain <= BELIEFS.supported:
         return found
-    rest = ~_tops(search.measurement)
-    again = found if np.all(rest) else _limit_of(_part(search, rest), base.at(rest), None)
+    rest = ~_last_of_loadings(search.measurement)
+    again = found if np.all(rest) else _limit_of(_part(search, rest), base.at(rest), found)
     return None if again is None else replace(found, gain=min(found.gain, again.gain))
 
 
-def _tops(m: Measurement) -> NDArray[np.bool_]:
-    """(N,) True for the last reading of each loading that an unloading follows at once."""
+def _last_of_loadings(m: Measurement) -> NDArray[np.bool_]:
+    """(N,) True for the last reading of each loading, where an unloading follows at once."""
     leg = np.sign(m.leg)
     return np.append((leg[:-1] > 0) & (leg[1:] < 0), False)
 

@@ -107,11 +107,10 @@ def summed(grown: Grown) -> Total:
     case = grown.case
     given = case.null.names
     every, counts = list(grown.found.values()), grown.counts
-
-    seen = grown.seen()
+    weights, seen = grown.weights(), grown.seen()
 
     def own(c: Candidate) -> float:
-        return counts * c.log_evidence + grown.believed(c) + seen[key_of(c)]
+        return weights[key_of(c)] + seen[key_of(c)]
 
     others = _other_energies(grown, seen)
     raised = _raised(grown, {id(c): own(c) for c in every}, others)

@@ -165,14 +165,13 @@ def own_ratio(own: Array, sizes: Array, covariance: Array, expected: Array, one_
     covariance : (m, m) of the sizes; expected : (m,) before the data. The priors of m sizes are in ln Z, and that of
     the whole trace is exchanged for another one: the others count as ln Z does.
     """
-    signs = np.where((sizes < 0) & (not one_sided), -1.0, 1.0)
-    usual = own @ (signs * expected)
+    usual = own @ (expected if one_sided else np.copysign(expected, sizes))
     along = own @ sizes if np.any(sizes) else usual
     length = float(np.linalg.norm(along))
     turn = own.T @ along / max(length, TINY)
-    mean = float(np.copysign(length, along @ usual)) if np.any(sizes) else 0.0
     sd = sqrt(max(float(turn @ covariance @ turn), 0.0))
-    return Ratio(mean if one_sided else abs(mean), sd, float(np.linalg.norm(usual)), one_sided)
+    mean = 0.0 if not np.any(sizes) else -length if one_sided and along @ usual < 0 else length
+    return Ratio(mean, sd, float(np.linalg.norm(usual)), one_sided)
 
 
 def own_traces(white: Array, others: Array) -> Array:
