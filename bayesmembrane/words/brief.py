@@ -156,9 +156,9 @@ def _every(course: Course) -> list[str]:
     d = course.telling
     p = d.probabilities
     foreign = p.anything_foreign
-    strange = foreign >= WORDS.probable
-    most = MOST_TOLD - strange - bool(d.verdict == "ambiguous" and _in_all(d))  # a first screen has room for so much
-    probable = [name for name, q in p.effects.items() if q >= WORDS.probable][:most]
+    room = MOST_TOLD - bool(d.verdict == "ambiguous" and _in_all(d))  # a first screen has room for so much
+    strange = foreign >= WORDS.probable and sum(q > foreign for q in p.effects.values()) < room
+    probable = [name for name, q in p.effects.items() if q >= WORDS.probable][: room - strange]
     sizes = np.cumsum([len(name.split("+")) for name in probable])
     told = [_probable_set(d, n, course, bool(k <= MOST_SIZES)) for n, k in zip(probable, sizes, strict=True)]
     if strange:

@@ -97,6 +97,19 @@ def test_an_effect_with_another_energy_keeps_its_name(named: Loop) -> None:
     assert candidate_title(other, d.null) == f"{effect} and the energy Gent"
 
 
+@pytest.mark.parametrize(("foreign", "told"), [(0.02, 0), (0.2, 1), (0.7, 1)])
+def test_what_is_foreign_takes_no_line_from_sets_that_are_more_probable(
+    ambiguous: Loop, foreign: float, told: int
+) -> None:
+    d = only(ambiguous, "ambiguous")
+    sets = {"friction": 0.4, "hysteresis": 0.3, "mullins": 0.15, "friction+mullins": 0.1, "none": 0.05}
+    p = replace(d.probabilities, effects=sets, foreign={"none": 1 - foreign, "play": foreign})
+    lines = of_diagnosis(replace(d, probabilities=p)).probable
+    assert len(lines) == 3
+    assert sum("something foreign" in line for line in lines) == told
+    assert any(line.startswith("40 %") for line in lines)
+
+
 def test_sizes_are_told_in_the_units_that_people_read() -> None:
     told = [size_in_words(*v) for v in ((1.66e-4, "m"), (1.0026, "-"), (0.00348, "-"), (8.8e-4, "m/N"), (-2e-5, "N/s"))]
     assert told == ["0.166 mm", "1.0026", "0.00348", "0.88 mm/N", "-0.02 mN/s"]
