@@ -31,16 +31,40 @@ from bayesmembrane.words.sizes import bound_of_material as _bound
 from bayesmembrane.words.sizes import flagged_size
 from bayesmembrane.words.units import size_in_words
 
-MOST_TOLD = 3
-"""Explanations whose probability is told."""
+ROOM = 82
+"""Words for all sentences: with its table and its picture a first screen stays below 120."""
 TELLING = 0.1
 """By how much an effect must be more probable in all than alone, for both to be told."""
-MOST_SIZES = 3
-"""Effects whose size is told with it; what is not told on the first screen is below."""
 FAR_APART = 10.0
 """Standard deviations from which it is not told by how much a test would tell explanations apart."""
 ANSWERED = ("named", "material", "ambiguous")
 """Verdicts that rest on another model than the one that was given."""
+
+
+@dataclass(frozen=True)
+class Detail:
+    """What is told on a first screen; what is not, is below.
+
+    told, sized : explanations whose probability is told, and effects whose size is told with it
+    places, sums : whether it is told where, and in which laws, something is left; and what is probable in all
+    """
+
+    told: int = 3
+    sized: int = 3
+    places: bool = True
+    sums: bool = True
+
+
+DETAILS = (
+    Detail(),
+    Detail(sized=1),
+    Detail(2, 1),
+    Detail(2, 0),
+    Detail(1, 0),
+    Detail(1, 0, places=False),
+    Detail(1, 0, places=False, sums=False),
+)
+"""The first of these is told for which there is room."""
 
 
 @dataclass(frozen=True)
@@ -75,19 +99,24 @@ class Brief:
         """The sentences."""
         return [self.tested, f"{self.answer}, {self.left}.", self.following]
 
+    @property
+    def fits(self) -> bool:
+        """True if there is room for it."""
+        return len(" ".join(self.lines).split()) <= ROOM
+
 
 @dataclass(frozen=True)
 class Course:
     """The diagnoses that a first screen is about: the ``first``, those that ``named`` something, and the ``last``.
 
-    sized : False: sizes are told elsewhere
+    detail : what is told of them
     sampled : the posterior of the last model, if there is one: its means are the sizes that are told
     """
 
     first: Diagnosis
     named: tuple[Diagnosis, ...]
     last: Diagnosis
-    sized: bool = True
+    detail: Detail = Detail()
     sampled: Run | None = None
 
     @property
@@ -103,14 +132,14 @@ def of_diagnosis(d: Diagnosis) -> Brief:
 
 def of_loop(found: Loop, *, sized: bool = True) -> Brief:
     """Of a closed loop: what all rounds came to, with the sizes of what is probable or without."""
-    course = replace(course_of(found), sized=sized, sampled=found.rounds[-1].before.run)
+    course = replace(course_of(found), sampled=found.rounds[-1].before.run)
     following = _next(course.last)
     before, after = found.rounds[0].before, found.rounds[-1].after
     if course.named and course.last.verdict == "adequate":
         following = _use(before, after)
     elif any(r.changed for r in found.rounds) and course.last.explains:
         following = f"Run the loop on from {spoken(course.last.hypothesis)}: it stopped before the end."
-    return _brief(course, following)
+    return _brief(course, following, sized)
 
 
 def course_of(found: Loop) -> Course:
@@ -119,9 +148,15 @@ def course_of(found: Loop) -> Course:
     return Course(every[0], tuple(d for d in every if d.explains), every[-1])
 
 
-def _brief(course: Course, following: str) -> Brief:
-    d = course.telling
-    return Brief(tested(course.first), _probabilities(course), _ANSWERS[d.verdict](course), left(course), following)
+def _brief(course: Course, following: str, sized: bool = True) -> Brief:
+    """As much as there is room for; ``sized`` is False where sizes are told elsewhere."""
+    of = _ANSWERS[course.telling.verdict]
+    for detail in DETAILS:
+        c = replace(course, detail=detail if sized else replace(detail, sized=0))
+        brief = Brief(tested(c.first), _probabilities(c), of(c), left(c), following)
+        if brief.fits:
+            break
+    return brief
 
 
 # ---- what was tested -------------------------------------------------------------------------------------------------
@@ -147,7 +182,8 @@ def tested(d: Diagnosis) -> str:
 def _probabilities(course: Course) -> tuple[str, ...]:
     """``98 % friction in the guide (level 12 mN)``, ``1 % no effect``: what each round named, then the last answer."""
     d = course.telling
-    earlier = [_probable_set(x, set_name(x.best, x.null.names), course) for x in course.named if x is not d]
+    named, sized = (x for x in course.named if x is not d), course.detail.sized > 0
+    earlier = [_probable_set(x, set_name(x.best, x.null.names), course, sized) for x in named]
     first, *others = _every(course)
     return *earlier, f"then {first}" if earlier else first, *others
 
@@ -156,11 +192,11 @@ def _every(course: Course) -> list[str]:
     d = course.telling
     p = d.probabilities
     foreign = p.anything_foreign
-    room = MOST_TOLD - bool(d.verdict == "ambiguous" and _in_all(d))  # a first screen has room for so much
+    room = max(1, course.detail.told - bool(d.verdict == "ambiguous" and course.detail.sums and _in_all(d)))
     strange = foreign >= WORDS.probable and sum(q > foreign for q in p.effects.values()) < room
     probable = [name for name, q in p.effects.items() if q >= WORDS.probable][: room - strange]
     sizes = np.cumsum([len(name.split("+")) for name in probable])
-    told = [_probable_set(d, n, course, bool(k <= MOST_SIZES)) for n, k in zip(probable, sizes, strict=True)]
+    told = [_probable_set(d, n, course, bool(k <= course.detail.sized)) for n, k in zip(probable, sizes, strict=True)]
     if strange:
         told.insert(0 if foreign > 0.5 else len(told), f"{percent(foreign)} something foreign")
     if d.verdict == "material":
@@ -168,11 +204,11 @@ def _every(course: Course) -> list[str]:
     return told
 
 
-def _probable_set(d: Diagnosis, name: str, course: Course, sized: bool = True) -> str:
+def _probable_set(d: Diagnosis, name: str, course: Course, sized: bool) -> str:
     """A set of effects with its probability; where the answer rests on it with the sizes, as they were fitted last."""
     p = percent(d.probabilities.effects.get(name, 0.0))
     of = next((j.candidate for j in d.members if set_name(j.candidate, d.null.names) == name), None)
-    if of is None or name == NOTHING or not (sized and course.sized):
+    if of is None or name == NOTHING or not sized:
         return f"{p} {set_title(name)}"
     if course.last is not d and set(name.split("+")) <= set(course.last.null.names):
         of = settled(course.last.null, course.sampled)
@@ -210,7 +246,7 @@ def _improbable(d: Diagnosis) -> str:
 
 def _ambiguous(course: Course) -> str:
     d = course.telling
-    sure, among = _certain(d), _in_all(d)
+    sure, among = _certain(d), _in_all(d) if course.detail.sums else ""
     which = f"only {sure} is certain" if sure else f"{among}this curve cannot tell which"
     return f"{which}; the first explains {_explained(d)}{_beside(d)}"
 
@@ -305,8 +341,9 @@ def left(course: Course) -> str:
     if noise_alone(d):
         return "leaving noise alone"
     error, residual = (d.after, d.best.residual) if d.verdict in ANSWERED else (d.before, d.null.residual)
-    place = where(residual_shape(d.measurement, residual))
-    return f"leaving {error.rmse_N / d.noise.sd:.2g} times the noise{f', mostly {place}' if place else ''}, {_kind(d)}"
+    place = where(residual_shape(d.measurement, residual)) if course.detail.places else ""
+    much = f"leaving {error.rmse_N / d.noise.sd:.2g} times the noise{f', mostly {place}' if place else ''}"
+    return f"{much}, {_kind(d, course.detail.places)}"
 
 
 def noise_alone(d: Diagnosis) -> bool:
@@ -317,11 +354,13 @@ def noise_alone(d: Diagnosis) -> bool:
     return d.verdict != "unknown" and r.noise
 
 
-def _kind(d: Diagnosis) -> str:
+def _kind(d: Diagnosis, each: bool) -> str:
+    """What it looks like; with ``each`` law that would have to be in error."""
     r = d.remaining
     if r.carried < VERDICT.form_carries:
         return "of no known kind"
-    laws = [f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in r.law_errors.items() if e > WORDS.law_error]
+    told = [(n, e) for n, e in r.law_errors.items() if each and e > WORDS.law_error]
+    laws = [f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in told]
     return f"smooth as if {listed([f'the energy were {100 * r.energy_error:.2g} %', *laws])} off"
 
 

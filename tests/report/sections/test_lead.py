@@ -86,6 +86,21 @@ def test_a_first_screen_has_fewer_than_120_words_and_begins_with_probabilities(r
         assert lead.brief.following.endswith("."), name
 
 
+def test_what_a_first_screen_has_no_room_for_is_left_to_the_page_below(strip: Diagnosis) -> None:
+    """How many effects are probable, and how long a film's name is, is not ours to choose."""
+    plain, m = lead_of(strip), strip.measurement
+    told = []
+    for more in (0, 4, 12, 20):
+        specimen = replace(m.specimen, name=" ".join([m.specimen.name, *["strip"] * more]))
+        lead = lead_of(replace(strip, measurement=replace(m, specimen=specimen)))
+        assert lead.words < WORDS
+        assert lead.brief.verdict.endswith(plain.brief.verdict.rpartition(" yet ")[2])
+        assert lead.brief.following == plain.brief.following
+        told.append(len(lead.brief.answer.split()))
+    assert told == sorted(told, reverse=True)
+    assert told[-1] < told[0]
+
+
 def test_every_part_of_a_page_is_made_once(named: Loop, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its pictures are what a page takes most of its time for."""
     made: list[str] = []
