@@ -102,8 +102,8 @@ HEAD = """# Effects: what a curve can hold beside the film
 
 Written by `python docs/make_effects.py` from the components themselves; change those, not this page.
 
-Effects act in this order, in whatever order they are named, and each is one file in `bayesmembrane/effects/`
-(`CONTRIBUTING.md` says how to add one):
+Effects act in this order, in whatever order they are named, and each is one file in
+`bayesmembrane/physics/effects/` (`CONTRIBUTING.md` says how to add one):
 
 {stages}
 
@@ -119,6 +119,7 @@ Effects act in this order, in whatever order they are named, and each is one fil
   does not follow the power of a textbook: G = (1 - c) H + c (a + 1) int (x / D)^a dx / D over all loading, with
   H = (1 + s) (m / D)^a / (1 + s (m / D)^a) of the largest deflection m so far. One first loading to D ends at G = 1; c
   is the part that grows on when it is repeated, s says how far growth has saturated (slip and set only).
+  A clamp also slips, and a film tears, at once: `jump` is the part of it that comes at `place`.
 - One-sided effects have their null value as a bound.
 - Not here: the weight of a disc that hangs on the load cell is a constant, `force_offset`. Wrinkling: of 2000 films
   drawn from the priors, clamped with stretch 1 and 1.03, none with a convex energy had a state with P1 > 0 > P2 up to

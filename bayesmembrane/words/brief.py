@@ -20,7 +20,7 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words import language
-from bayesmembrane.words.diagnosis import percent, set_title, why_not
+from bayesmembrane.words.diagnosis import percent, set_title, too_far, why_not
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.moved import MATTERS, modulus_of, settled
@@ -272,6 +272,8 @@ def _unknown(course: Course) -> str:
         return f"nothing{further} is named, for {why_not(d)}"
     if d.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{start}none of the energies has this form"
+    if far := too_far(d):
+        return f"{start}nothing{further} is named, for {far}"
     return f"{start}too many explanations fit, and nothing{further} is named"
 
 

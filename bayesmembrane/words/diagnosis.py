@@ -11,7 +11,7 @@ import numpy as np
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, UNNAMED, WAVE, Foreign
-from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged
+from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, set_name
 from bayesmembrane.diagnosis.left.heldout import HeldOut
 from bayesmembrane.diagnosis.reference.outliers import SetAside
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned
@@ -332,10 +332,26 @@ def _unknown(found: Diagnosis) -> str:
         )
     if found.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{_misses(found)}no effect is needed, and none of the energies has this form. {shape}"
+    if far := too_far(found):
+        return f"{_misses(found)}{_certain(found)}what fits best is no explanation: {far}. {shape}"
     return (
         f"{_misses(found)}{_certain(found)}more explanations are about as probable than this measurement can part. "
         f"{shape}"
     )
+
+
+def too_far(found: Diagnosis) -> str:
+    """Which forms of the most probable explanation are too far off for it to be one, as a clause; "" if none is."""
+    name = next(iter(found.probabilities.effects))
+    first = next((j.candidate for j in found.ranking if set_name(j.candidate, found.null.names) == name), None)
+    if first is None:
+        return ""
+    far = [
+        f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in first.law_errors.items() if e > VERDICT.law_carried
+    ]
+    if first.energy_error > VERDICT.carried:
+        far.insert(0, f"the energy {100 * first.energy_error:.2g} %")
+    return f"{listed(far)} would have to be off" if far else ""
 
 
 def why_not(found: Diagnosis) -> str:

@@ -103,7 +103,7 @@ def test_relaxation_is_the_convolution() -> None:
 
 def test_a_softened_film_unloads_below_and_rejoins() -> None:
     m = measured(staircase((0.03, 0.03, 0.05)))
-    f, plain = force(m, "mullins"), force(m)
+    f, plain = force(m, "mullins", x=np.array([0.2, 0.5, 1.0, 2.0, 0.0])), force(m)
     first, again, third = (m.cycle == i for i in (1, 2, 3))
     up, down = m.leg > 0, m.leg < 0
     assert f[first & up] == pytest.approx(plain[first & up], rel=1e-12)
@@ -116,6 +116,16 @@ def test_a_softened_film_unloads_below_and_rejoins() -> None:
     assert f[beyond] == pytest.approx(plain[beyond], rel=1e-12)
 
 
+def test_continuum_damage_softens_first_loading_too_and_is_the_same_wherever_the_film_is() -> None:
+    """F / F0 is a function of the largest deflection alone."""
+    m = measured(staircase((0.03, 0.03, 0.05)))
+    part = force(m, "mullins", x=np.array([0.2, 0.5, 1.0, 2.0, 1.0])) / force(m)
+    most = np.maximum.accumulate(m.deflection) / m.full_range
+    lost = np.expm1(-(most**2) / 0.5) / np.expm1(-1 / 0.5)
+    pulled = m.deflection > 2e-3
+    assert part[pulled] == pytest.approx(1 - 0.2 * lost[pulled], rel=1e-5)
+
+
 @pytest.mark.parametrize("name", ["clamp_slip", "permanent_set", "tearing"])
 def test_what_grows_never_shrinks(name: str) -> None:
     """At the same deflection on loading the force falls from cycle to cycle, or stays."""
@@ -125,6 +135,21 @@ def test_what_grows_never_shrinks(name: str) -> None:
     loading = [np.interp(d, m.deflection[c], f[c]) for c in ((m.cycle == i) & (m.leg > 0) for i in range(1, 6))]
     assert np.all(np.diff(loading) < 1e-5 * max(loading))
     assert loading[-1] < 0.99 * loading[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "x"), [("clamp_slip", [0.03, 2.0, 0.0, 0.0, 1.0, 0.5]), ("tearing", [0.1, 2.0, 0.0, 1.0, 0.5])]
+)
+def test_what_comes_at_once_comes_at_its_place_and_stays(name: str, x: list[float]) -> None:
+    """As a clamp that sticks until it slips: nothing before that deflection is reached for the first time."""
+    m = measured(staircase((0.02, 0.06, 0.02), 400))
+    f, plain = force(m, name, x=np.array(x)), force(m)
+    first, last = m.cycle == 1, m.cycle == 3
+    over = (m.cycle == 2) & (m.leg > 0) & (m.deflection > 0.034)
+    assert f[first] == pytest.approx(plain[first], rel=1e-2)
+    assert np.all(f[over] < 0.98 * plain[over])
+    well = last & (m.deflection > 0.012)
+    assert np.all(f[well] < 0.98 * plain[well])
 
 
 def test_slip_of_a_longer_film_is_a_film_of_that_length() -> None:
@@ -146,10 +171,25 @@ def test_slip_of_a_longer_film_is_a_film_of_that_length() -> None:
 
 def test_friction_changes_sign_at_each_turn() -> None:
     m = measured()
-    extra = force(m, "friction", x=np.array([0.02, 1e-4])) - force(m)
+    extra = force(m, "friction", x=np.array([0.02, 1e-4, 0.0])) - force(m)
     settled = np.abs(np.gradient(m.leg)) == 0
     assert extra[settled & (m.leg > 0)][3:] == pytest.approx(0.02, rel=0.01)
     assert extra[settled & (m.leg < 0)] == pytest.approx(-0.02, rel=0.01)
+
+
+def test_a_guide_rubs_the_more_the_farther_the_disc_is_lifted() -> None:
+    m = measured()
+    plain, part = force(m), m.deflection / m.full_range
+    level, more = (force(m, "friction", x=np.array([0.02, 1e-4, grows])) - plain for grows in (0.0, 1.5))
+    assert more == pytest.approx(level * (1 + 1.5 * part), rel=1e-9, abs=1e-12)
+
+
+def test_a_drift_comes_to_rest() -> None:
+    m = measured()
+    t = m.path.clock
+    steady, soon = (force(m, "force_drift", x=np.array([1e-3, 1.0, rest])) - force(m) for rest in (1e7, 50.0))
+    assert steady == pytest.approx(1e-3 * t, rel=1e-4, abs=1e-12)
+    assert soon == pytest.approx(1e-3 * t / (1 + t / 50.0), rel=1e-6, abs=1e-12)
 
 
 def test_speed_counts_as_a_power() -> None:

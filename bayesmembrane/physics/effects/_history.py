@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import expit
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.compiling import compiled
@@ -22,6 +23,12 @@ REPEATED = EffectParameter(
     Uniform(0.0, 1.0),
     (0.0, 1.0),
 )
+JUMP = EffectParameter("jump", "-", "part of it that comes at once", Uniform(0.0, 1.0), (0.0, 1.0))
+PLACE = EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1))
+WIDTH = 0.015
+"""Of the full range, in which a jump comes."""
+JUMPS = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+"""Places of a jump to begin with: it is found from nearby only."""
 
 
 def growth(exponent: Array, repeated: Array, deflection: Array, path: Motion, saturation: Array | float = 0.0) -> Array:
@@ -40,6 +47,14 @@ def growth(exponent: Array, repeated: Array, deflection: Array, path: Motion, sa
     power = np.maximum(x, 0.0) ** (exponent + 1)
     step = np.maximum(np.diff(power, axis=-1, prepend=0.0), 0.0)
     return np.asarray((1 - repeated) * first + repeated * np.cumsum(step, axis=-1))
+
+
+def jumped(jump: Array, place: Array, slow: Array, reached: Array, path: Motion) -> Array:
+    """(B, N) (1 - jump) G + jump / (1 + exp((place - m / D) / w)), w = 0.015: what grows little by little and at once.
+
+    G (B, N) is ``slow``, m (B, N) ``reached``, the largest deflection so far; ``jump`` and ``place`` are (B, 1).
+    """
+    return np.asarray((1 - jump) * slow + jump * expit((reached / path.full_range - place) / WIDTH))
 
 
 def follow(values: Array, gap: Array, start: Array) -> Array:

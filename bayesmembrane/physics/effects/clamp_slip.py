@@ -7,15 +7,17 @@ from typing import ClassVar
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal
-from bayesmembrane.physics.effects._history import EXPONENT, REPEATED, SATURATION, growth
-from bayesmembrane.physics.effects.base import EffectParameter, Slack
+from bayesmembrane.physics.effects._history import EXPONENT, JUMP, JUMPS, PLACE, REPEATED, SATURATION, growth, jumped
+from bayesmembrane.physics.effects.base import EffectParameter, Slack, running_max
 
 
 @dataclass(frozen=True)
 class ClampSlip(Slack):
-    """Free length L (1 + slip G), with the growth G of the test (1 after a first loading to its full range).
+    """Free length L (1 + slip [(1 - jump) G + jump / (1 + exp((place - m / D) / w))]), w = 0.015.
 
-    What has slid out stays out: the film is slack until the longer film is taut.
+    G is the growth law of the test (1 after a first loading to its full range D), m the largest deflection so far: a
+    film creeps out of its clamp, and sticks until it slips at once. What has slid out stays out: the film is slack
+    until the longer film is taut.
     On an annulus of 10 and 35 mm a length s that slides out of the outer clamp acts as slip = 0.80 s / L, to a tenth of
     its effect (Yeoh film, 12 to 70 mm, against the exact solution: tests/reference/test_slip.py).
     """
@@ -34,7 +36,15 @@ class ClampSlip(Slack):
         EXPONENT,
         REPEATED,
         SATURATION,
+        JUMP,
+        PLACE,
     )
 
+    @property
+    def starts(self) -> list[dict[str, float]]:
+        return [{"jump": 0.0, "place": 0.5}, *({"jump": 0.6, "place": place} for place in JUMPS)]
+
     def excess(self, p: Array, deflection: Array, path: Motion) -> Array:
-        return p[:, :1] * growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4])
+        slow = growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4])
+        reached = running_max(deflection)
+        return p[:, :1] * jumped(p[:, 4:5], p[:, 5:6], slow, reached, path)

@@ -14,10 +14,10 @@ from bayesmembrane.physics.effects.base import EffectParameter, Sensor
 
 @dataclass(frozen=True)
 class ForceDrift(Sensor):
-    """F_read = F + rate T (t / T)^exponent, with the time t since the start and T its end.
+    """F_read = F + rate T (t / T)^exponent / (1 + t / rest), with the time t since the start and T its end.
 
-    ``rate`` is the mean over the test; a cell that warms up drifts quickly at first (exponent below 1). Without times
-    the clock is the distance travelled at 1 mm/s.
+    ``rate`` is the mean over the test if it goes on; a cell that warms up drifts quickly at first (exponent below 1)
+    and comes to rest. Without times the clock is the distance travelled at 1 mm/s.
     """
 
     name: ClassVar[str] = "force_drift"
@@ -30,8 +30,16 @@ class ForceDrift(Sensor):
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("rate", "N/s", "mean change of the zero with time", Normal(0.0, 3e-4), (-1.0, 1.0), 0.0),
         EffectParameter("exponent", "-", "power of the time with which it goes on", LogNormal(1.0, 0.28), (0.4, 3.0)),
+        EffectParameter(
+            "rest",
+            "s",
+            "time after which half of it has come, where it comes to rest",
+            LogNormal(1e3, 1.5),
+            (1e-2, 1e7),
+        ),
     )
 
     def read(self, p: Array, force: Array, path: Motion) -> Array:
         end = max(float(path.clock[-1]), 1e-12)
-        return np.asarray(force + p[:, :1] * end * (path.clock / end) ** p[:, 1:2])
+        share = (path.clock / end) ** p[:, 1:2] / (1 + path.clock / p[:, 2:3])
+        return np.asarray(force + p[:, :1] * end * share)

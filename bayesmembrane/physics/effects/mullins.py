@@ -8,17 +8,19 @@ from typing import ClassVar
 import numpy as np
 from scipy.special import erf
 
-from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 
 
 @dataclass(frozen=True)
 class Mullins(Carried):
-    """F = F0 (1 - softening erf((1 - (delta / m)^power) / w) / erf(1 / width)), w = width (D / m)^fading.
+    """F = F0 (1 - softening [(1 - damage) erf((1 - (delta / m)^power) / w) / erf(1 / width) + damage H(m) / H(D)]).
 
-    m is the largest deflection so far and D the full range of the test. (delta / m)^power stands for the stored energy
-    relative to its maximum W_m: the reference's erf((W_m - W) / (a + b W_m)) with b = 0 is fading = power, with a = 0
-    it is fading = 0. Unloading runs below loading, and reloading rejoins at m.
+    With w = width (D / m)^fading and H(m) = 1 - exp(-(m / D)^power / width), where m is the largest deflection so far
+    and D the full range of the test. (delta / m)^power stands for the stored energy relative to its maximum W_m: the
+    reference's erf((W_m - W) / (a + b W_m)) with b = 0 is fading = power, with a = 0 it is fading = 0. Unloading runs
+    below loading, and reloading rejoins at m. ``damage`` is the part of continuum damage, 1 - exp(-W_m / c), which
+    softens first loading, too (J. C. Simo, Comput. Methods Appl. Mech. Eng. 60 (1987) 153).
     """
 
     name: ClassVar[str] = "mullins"
@@ -51,12 +53,21 @@ class Mullins(Carried):
         EffectParameter(
             "power", "-", "power of the deflection with which the energy grows", LogNormal(2.0, 0.4), (0.5, 8.0)
         ),
+        EffectParameter(
+            "damage", "-", "part that first loading loses, too, as it goes on", Uniform(0.0, 1.0), (0.0, 1.0)
+        ),
     )
+
+    @property
+    def starts(self) -> list[dict[str, float]]:
+        return [{"damage": 0.0}, {"damage": 1.0}]
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         m, full = state.reached, state.path.full_range
         with np.errstate(all="ignore"):
             part = np.where(m > 0, np.maximum(state.deflection, 0.0) / m, 1.0)
             wide = p[:, 1:2] * (full / np.maximum(m, 1e-6 * full)) ** p[:, 2:3]
-        lost = erf((1.0 - part ** p[:, 3:4]) / wide) / erf(1.0 / p[:, 1:2])
+        back = erf((1.0 - part ** p[:, 3:4]) / wide) / erf(1.0 / p[:, 1:2])
+        ever = np.expm1(-((np.maximum(m, 0.0) / full) ** p[:, 3:4]) / p[:, 1:2]) / np.expm1(-1.0 / p[:, 1:2])
+        lost = (1.0 - p[:, 4:5]) * back + p[:, 4:5] * ever
         return np.asarray(force * np.maximum(1.0 - p[:, :1] * lost, 0.0))

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.special import expit
 
-from bayesmembrane.ground.parameters import Array, HalfNormal, Uniform
-from bayesmembrane.physics.effects._history import EXPONENT, REPEATED, growth
+from bayesmembrane.ground.parameters import Array, HalfNormal
+from bayesmembrane.physics.effects._history import EXPONENT, JUMP, JUMPS, PLACE, REPEATED, growth, jumped
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
-
-WIDTH = 0.015  # of the full range
 
 
 @dataclass(frozen=True)
@@ -36,18 +33,14 @@ class Tearing(Carried):
         ),
         EXPONENT,
         REPEATED,
-        EffectParameter("jump", "-", "part of the loss that comes at once", Uniform(0.0, 1.0), (0.0, 1.0)),
-        EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1)),
+        JUMP,
+        PLACE,
     )
-
-    jumps: ClassVar[tuple[float, ...]] = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 
     @property
     def starts(self) -> list[dict[str, float]]:
-        """A jump is found from nearby only."""
-        return [{"jump": 0.6, "place": place} for place in self.jumps]
+        return [{"jump": 0.6, "place": place} for place in JUMPS]
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         slow = growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path)
-        quick = expit((state.reached / state.path.full_range - p[:, 4:5]) / WIDTH)
-        return np.asarray(force * np.exp(-p[:, :1] * ((1 - p[:, 3:4]) * slow + p[:, 3:4] * quick)))
+        return np.asarray(force * np.exp(-p[:, :1] * jumped(p[:, 3:4], p[:, 4:5], slow, state.reached, state.path)))
