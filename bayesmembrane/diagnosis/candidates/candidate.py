@@ -102,14 +102,25 @@ def without_effect(candidate: Candidate, name: str) -> tuple[Hypothesis, Array]:
 
 def available(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
     """Effects of the library that can be seen in this test, can be told from the material, and are not there yet."""
-    thin, returns = measurement.specimen.thickness, bool(np.any(measurement.leg < 0))
+    thin = measurement.specimen.thickness
     possible = [e for e in _possible(measurement, hypothesis) if not e.absorbed and not e.negligible(thin)]
-    return [e for e in possible if returns or not e.needs_return]
+    return [e for e in possible if _shows(e, measurement)]
+
+
+def hidden(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
+    """Effects that another energy takes for its own in this test, and that further tests of the material may show."""
+    return [e for e in _possible(measurement, hypothesis) if e.absorbed or not _shows(e, measurement)]
 
 
 def absorbed(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
     """Effects that the material absorbs without trace."""
     return [e for e in _possible(measurement, hypothesis) if e.absorbed]
+
+
+def _shows(effect: Effect, m: Measurement) -> bool:
+    """True if the motion is such that it is no matter of the energy alone."""
+    returns, rests = bool(np.any(m.leg < 0)), bool(m.time is not None and m.holds)
+    return returns or not effect.needs_return or (rests and effect.shows_at_rest)
 
 
 def _possible(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:

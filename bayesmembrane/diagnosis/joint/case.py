@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, hidden
 from bayesmembrane.diagnosis.candidates.sampled import checked
 from bayesmembrane.diagnosis.candidates.signatures import signatures
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
@@ -133,8 +133,8 @@ def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Q
 
 def _possible(case: OpenCase) -> dict[str, Effect]:
     """Effects that could be at work in one of several tests: those, too, that its own film would absorb alone."""
-    hidden = absorbed(case.measurement, case.question.hypothesis)
-    return {e.name: e for e in (*case.effects, *hidden)}
+    further = hidden(case.measurement, case.question.hypothesis)
+    return {e.name: e for e in (*case.effects, *further)}
 
 
 def _energies(

@@ -69,6 +69,7 @@ class Effect(ABC):
     needs_clamp : True if it only occurs on rigs that clamp the film all round
     needs_time : True if it means nothing without times
     needs_return : True if a test that only goes one way shows nothing of it that an energy could not: not sought there
+    shows_at_rest : True if a hold shows it as well as a return does
     absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
     exact : True if it has no law that could be off: an offset is an offset
     remembers : False if it changes the curve by a function of the deflection alone, alike on every leg
@@ -88,6 +89,7 @@ class Effect(ABC):
     needs_clamp: ClassVar[bool] = False
     needs_time: ClassVar[bool] = False
     needs_return: ClassVar[bool] = False
+    shows_at_rest: ClassVar[bool] = False
     absorbed: ClassVar[str] = ""
     exact: ClassVar[bool] = False
     remembers: ClassVar[bool] = True

@@ -23,8 +23,8 @@ class Hysteresis(Carried):
     u = t a. The length is t = travel ((1 - similar) D + similar A), with A the length of the leg before the reversal
     (D, the full range, for the first loading): the same in all cycles, or small in small cycles. z = 0 at the start.
 
-    The reference's friction is constant in N; that of a filled rubber grows with the force that it carries (grows = 0),
-    or, where the film lags behind the disc by a length, with the slope of the curve (about -1).
+    That of a filled rubber grows with the force that it carries (grows = 0); where the film lags behind the disc by a
+    length, with the slope of the curve (about -1); and the reference's friction is constant in N (-1 to -3).
     """
 
     name: ClassVar[str] = "hysteresis"
@@ -56,8 +56,8 @@ class Hysteresis(Carried):
             "grows",
             "-",
             "power of the deflection by which the width grows beyond its proportion to the force",
-            Normal(-0.3, 0.4),
-            (-1.6, 1.0),
+            Normal(-0.4, 0.7),
+            (-3.0, 2.0),
         ),
     )
 

@@ -31,6 +31,7 @@ class Mullins(Carried):
         "other; the curve rejoins first loading where the previous maximum is passed."
     )
     of_the_material = True
+    needs_return: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "softening",

@@ -30,6 +30,7 @@ class PermanentSet(Deflection):
     )
     rank: ClassVar[int] = 1
     of_the_material = True
+    needs_return: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "set", "m", "deflection at which the film is slack after the test", HalfNormal(1e-3), (0.0, 2e-2), 0.0

@@ -36,6 +36,8 @@ class Viscoelastic(Memory):
     )
     of_the_material = True
     constant = True
+    needs_return: ClassVar[bool] = True
+    shows_at_rest: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "strength", "-", "part of the instantaneous force that relaxes", HalfNormal(0.2), (0.0, 0.98), 0.0

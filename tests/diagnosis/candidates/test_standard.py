@@ -36,7 +36,7 @@ def test_absence_is_at_zero_and_its_side_is_kept(name) -> None:
 
 
 def test_pulls_are_roots_of_the_prior_and_local_normals_have_its_value_and_slope() -> None:
-    axes = standard(Hypothesis(materials()["gent"], (components("effects")["friction"](),)), CURVE)
+    axes = standard(Hypothesis(materials()["gent"], (components("effects")["machine_compliance"](),)), CURVE)
     u = np.array([0.4, -1.2, 3.0, 0.7])
     pull, steep = axes.pull(u)
     log_prior = np.where(axes.heavy, cauchy.logpdf(u), norm.logpdf(u))
@@ -52,7 +52,7 @@ def test_pulls_are_roots_of_the_prior_and_local_normals_have_its_value_and_slope
 @pytest.mark.parametrize("at", [0.0, 0.6, 4.0])
 def test_a_size_is_integrated_under_its_own_prior(at, sd) -> None:
     """Of a normal likelihood of one size, against the integral."""
-    axes = standard(Hypothesis(materials()["neo_hookean"], (components("effects")["friction"](),)), CURVE)
+    axes = standard(Hypothesis(materials()["neo_hookean"], (components("effects")["machine_compliance"](),)), CURVE)
     u = np.array([0.0, at, 0.0])
     s = axes.local(u)
     precision = 1 / s**2 + np.array([0.0, 1 / sd**2, 0.0])

@@ -197,7 +197,7 @@ def test_a_size_that_is_stopped_at_nothing_is_judged_by_what_the_data_ask_for() 
     start = np.concatenate([base.x, friction.null])
     found = search.fit(with_effects(plain, [friction]), [start])
     assert found is not None
-    assert found.x[-2] == 0.0
+    assert found.parameters["friction.level"] == 0.0
     for counts in COUNTS:
         whole = counts * (found.log_evidence - base.log_evidence) + log_seen(search, found, (), {}, counts)
         assert whole == pytest.approx(promised(search, base, friction, counts), abs=0.7)
