@@ -1,6 +1,7 @@
 """`make study-reliability`: are the probabilities of a diagnosis right, and its names; docs/studies/reliability.md.
 
 `make study-second` asks the same of the second generator (`--generator second`), once; docs/studies/second.md.
+`make study-third` asks it of the third (`--generator third`), which has 120 cases for each `--seed`.
 Each case is one line of a JSON-lines file, written as soon as it is done; cases that stand there are skipped, so that
 the study can be interrupted and goes on where it was. `--first 0 --count 40 --half calibration --results FILE` runs a
 part and prints a line for each case; `--summary FILE` prints the tables of what is there.
@@ -32,6 +33,8 @@ from bayesmembrane.words.diagnosis import document
 from tests.generator.datasets import Dataset, generate
 from tests.generator.film import NoSolutionError
 from tests.generator.protocols import Protocol
+from tests.generator_three.datasets import Dataset as ThirdDataset
+from tests.generator_three.elements import NoBalanceError
 from tests.generator_two.datasets import Dataset as SecondDataset
 from tests.generator_two.membrane import LockedError
 from tests.studies import reliability_plan, second_plan
@@ -45,6 +48,7 @@ ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "reports" / "study-reliability"
 DECLARED, NONE = "declared", "none"
 ENERGIES = {"declared": (DECLARED,), "none": (NONE,), "both": (DECLARED, NONE)}
+AnyDataset = Dataset | SecondDataset | ThirdDataset
 
 
 @dataclass(frozen=True)
@@ -54,11 +58,11 @@ class Source:
     half: str
     seed: int
     plan: Callable[[str, int], Iterator[Case]]
-    measured: Callable[[Case], Dataset | SecondDataset]
+    measured: Callable[[Case], AnyDataset]
     title: str
 
 
-OWN, SECOND = "own", "second"
+OWN, SECOND, THIRD = "own", "second", reliability_plan.THIRD
 SOURCES = {
     OWN: Source("test", reliability_plan.SEED, reliability_plan.plan, reliability_plan.measured, "Reliability"),
     SECOND: Source(
@@ -68,6 +72,13 @@ SOURCES = {
         second_plan.measured,
         "Reliability on the second generator, looked at once",
     ),
+    THIRD: Source(
+        THIRD,
+        reliability_plan.THIRD_SEED,
+        reliability_plan.third_plan,
+        reliability_plan.third_measured,
+        "Reliability on the third generator",
+    ),
 }
 
 
@@ -76,16 +87,17 @@ def run_case(case: Case, energy: str, source: str, half: str) -> Row:
     head = {**asdict(case), "half": half, "energy": energy, "key": key(case, energy)}
     try:
         data = SOURCES[source].measured(case)
-    except (NoSolutionError, LockedError) as error:
+    except (NoSolutionError, LockedError, NoBalanceError) as error:
         return head | {"skipped": str(error)}
     head |= truth_row(data.truth, data.identifiable if isinstance(data, Dataset) else None) | {
-        "protocol": data.truth["protocol"]
+        "protocol": data.truth["protocol"],
+        "material": data.truth.get("declared", case.material),
     }
     with tempfile.TemporaryDirectory() as folder:
         measurement = read_measurement(*data.write(Path(folder)))
     begun = time.process_time()
     try:
-        found = diagnosed(measurement, None if energy == NONE else case.material)
+        found = diagnosed(measurement, None if energy == NONE else head["material"])
     except BayesmembraneError as error:
         return head | {"verdict": "error", "effects": [], "sentence": str(error), "probabilities": None}
     row = head | {"seconds": time.process_time() - begun} | answer_row(document(found)) | {"terms": terms(found)}
@@ -107,7 +119,7 @@ def terms(found: Diagnosis) -> list[tuple[str, str, float]]:
     ]
 
 
-def intervals(row: Row, found: Diagnosis, data: Dataset | SecondDataset) -> dict[str, Any]:
+def intervals(row: Row, found: Diagnosis, data: AnyDataset) -> dict[str, Any]:
     """Whether the 90 % intervals hold the film that was put in, where the truth is named with its energy."""
     if not right_name(row) or found.best.hypothesis.material.name != row["family"]:
         return {}
@@ -147,12 +159,14 @@ def _one(item: tuple[Case, str], source: str, half: str) -> Row:
 def main(arguments: list[str] | None = None) -> int:
     """Run, and write or print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--generator", choices=tuple(SOURCES), default=OWN, help="the second one is for the end")
+    parser.add_argument("--generator", choices=tuple(SOURCES), default=OWN, help="the others are for the end")
     parser.add_argument("--half", choices=tuple(HALVES), default=None, help="of the own generator; test by default")
     parser.add_argument("--energy", choices=tuple(ENERGIES), default=DECLARED, help="what is declared")
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
     parser.add_argument("--count", type=int, default=None, help="so many cases; all that follow by default")
-    parser.add_argument("--seed", type=int, default=None, help="base of the seeds, an even number")
+    parser.add_argument(
+        "--seed", type=int, default=None, help="base of the seeds, an even number; of the third generator the seed"
+    )
     parser.add_argument("--seconds", type=float, default=float("inf"), help="begin no case after this time")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--results", type=Path, default=None, help="JSON lines, one a case")
@@ -175,7 +189,7 @@ def main(arguments: list[str] | None = None) -> int:
     have = stored(results)
     rows = [have[key(*item)] for item in todo if key(*item) in have]
     told = "" if asked.count is None else f" --first {asked.first} --count {asked.count}"
-    which = f"--generator {SECOND}" if asked.generator == SECOND else f"--half {half}"
+    which = f"--half {half}" if asked.generator == OWN else f"--generator {asked.generator}"
     what = f"{which} --energy {asked.energy} --seed {seed}{told}"
     text = report(rows, f"python -m tests.studies.reliability {what}", len(todo), source.title)
     if asked.table is not None:

@@ -4,13 +4,15 @@ A case's measurement follows from its kind, declared energy, strengths and seed 
 half, odd seeds the test half: what has to be chosen in the diagnosis (widths of priors, scales of the form error) is
 chosen on the first, and what is reported is measured on the second. The two halves share the kinds of their cases, and
 nothing that is drawn.
+
+At the end stands the plan of `make study-third`, whose cases are those of the third generator, 120 for each seed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, islice
 
 import numpy as np
 
@@ -20,6 +22,9 @@ from tests.generator.energies import DECLARED
 from tests.generator.energies import OUTSIDE as FOREIGN_ENERGIES
 from tests.generator.film import NoSolutionError
 from tests.generator.setups import setup
+from tests.generator_three.datasets import Dataset as ThirdDataset
+from tests.generator_three.datasets import generate as generate_third
+from tests.generator_three.recipes import Recipe, recipes
 
 SEED = 400_000
 HALVES = {"calibration": 0, "test": 1}
@@ -122,3 +127,30 @@ def _strengths(kind: str, group: str, seed: int) -> tuple[float, ...]:
         weaker[rng.integers(len(faults))] = 1.0
     by = dict(zip(faults, top * weaker / UNIT, strict=True))
     return tuple(round(float(by.get(n, 1.0)), 4) for n in names)
+
+
+# ---- the third generator ---------------------------------------------------------------------------------------------
+
+THIRD, THIRD_SEED = "third", 20_260_723
+OF_THE_FILM = "of the film"
+"""What stands for the declared energy in the plan of the third generator, where it is drawn with the film: ``declared``
+of its truth."""
+
+
+def third_plan(half: str = THIRD, base: int = THIRD_SEED) -> Iterator[Case]:
+    """The cases of the third generator, in order; ``base`` is the seed of all of them, and they differ by number."""
+    if half != THIRD:
+        raise ValueError(f"the third generator has no half {half!r}: nothing is tuned on it")
+    for recipe in recipes(base):
+        yield Case(recipe.number, _third_group(recipe), f"{recipe.group} {recipe.number}", OF_THE_FILM, (), base)
+
+
+def third_measured(case: Case) -> ThirdDataset:
+    """The measurement of a case. Raises `NoBalanceError` if no film can be found for it."""
+    return generate_third(next(islice(recipes(case.seed), case.number, None)))
+
+
+def _third_group(recipe: Recipe) -> str:
+    """Name in `GROUPS`; pairs and triples are so called whatever their energy."""
+    none, one = ("null", "single") if recipe.common_energy else ("energy", "mixed")
+    return {"none": none, "one": one, "two": "pair", "three": "triple", "foreign": "foreign"}[recipe.group]

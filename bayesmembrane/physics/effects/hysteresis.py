@@ -10,21 +10,22 @@ from numpy.typing import NDArray
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Uniform
-from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState, running_max
 
 SMALLEST = 1e-4  # of the full range: below it a negative power is without bounds
 
 
 @dataclass(frozen=True)
 class Hysteresis(Carried):
-    """F = F0 (1 + level z |delta / D|^grows), z = z_r + s u a / (t a + u) on each leg: s = +1 loading, -1 unloading.
+    """F = F0 + level z [(1 - steady) F0 |delta / D|^grows + steady max F0], no less than 0.
 
-    u is the way since the reversal, z_r the z there and a = 1 - s z_r what is left to turn; half of it is turned at
-    u = t a. The length is t = travel ((1 - similar) D + similar A), with A the length of the leg before the reversal
-    (D, the full range, for the first loading): the same in all cycles, or small in small cycles. z = 0 at the start.
+    On each leg z = z_r + s u a / (t a + u), with s = +1 loading, -1 unloading, u the way since the reversal, z_r the z
+    there and a = 1 - s z_r what is left to turn; half of it is turned at u = t a. The length is t = travel ((1 -
+    similar) D + similar A), with A the length of the leg before the reversal (D, the full range, for the first
+    loading): the same in all cycles, or small in small cycles. z = 0 at the start, and max F0 is the largest so far.
 
-    That of a filled rubber grows with the force that it carries (grows = 0); where the film lags behind the disc by a
-    length, with the slope of the curve (about -1); and the reference's friction is constant in N (-1 to -3).
+    The reference's friction is constant in N (steady = 1); that of a filled rubber grows with the force that it carries
+    (grows = 0), or, where the film lags behind the disc by a length, with the slope of the curve (about -1).
     """
 
     name: ClassVar[str] = "hysteresis"
@@ -56,14 +57,19 @@ class Hysteresis(Carried):
             "grows",
             "-",
             "power of the deflection by which the width grows beyond its proportion to the force",
-            Normal(-0.4, 0.7),
-            (-3.0, 2.0),
+            Normal(-0.3, 0.4),
+            (-1.6, 1.0),
+        ),
+        EffectParameter(
+            "steady", "-", "part of the width that is as large at any force", Uniform(0.0, 1.0), (0.0, 1.0)
         ),
     )
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         part = np.maximum(np.abs(state.deflection) / state.path.full_range, SMALLEST)
-        return np.asarray(force * (1.0 + p[:, :1] * part ** p[:, 3:4] * turned(p[:, 1:2], p[:, 2:3], state.path)))
+        grown, steady = force * part ** p[:, 3:4], running_max(force)
+        width = (1.0 - p[:, 4:5]) * grown + p[:, 4:5] * steady
+        return np.maximum(force + p[:, :1] * turned(p[:, 1:2], p[:, 2:3], state.path) * width, 0.0)
 
 
 def turned(travel: Array, similar: Array, path: Motion) -> Array:

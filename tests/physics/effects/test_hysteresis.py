@@ -31,13 +31,13 @@ def test_it_is_the_same_at_any_speed() -> None:
 def test_loading_lies_above_and_unloading_below_in_every_cycle() -> None:
     d = staircase()
     m = measured(d)
-    change = force(m, "hysteresis") / force(m) - 1
+    level, travel, similar, grows, _ = Hysteresis().typical
+    change = force(m, "hysteresis", x=np.array([level, travel, similar, grows, 0.0])) / force(m) - 1
     for cycle in range(1, 5):
         deep = (m.cycle == cycle) & (m.deflection < 0.6 * np.max(d[m.cycle == cycle]))
         assert np.all(change[deep & (m.leg < 0)] < 0)
         late = (m.cycle == cycle) & (m.leg > 0) & (m.deflection > 0.5 * np.max(d[m.cycle == cycle]))
         assert np.all(change[late] > 0)
-    level, _, _, grows = Hysteresis().typical
     assert np.all(np.abs(change) <= level * (m.deflection / np.max(m.deflection)) ** grows)
 
 
@@ -84,7 +84,18 @@ def test_the_width_of_a_loop_grows_with_a_power_of_the_deflection(grows: float, 
     """Of a force in proportion to the deflection: with the force, or the same everywhere."""
     d = triangles(0.04, 0.0, points=400)
     at = FilmState(force=d[None], slope=np.ones_like(d)[None], deflection=d[None], path=path(d))
-    p = np.array([[0.1, 2e-3, 0.0, grows]])
+    p = np.array([[0.1, 2e-3, 0.0, grows, 0.0]])
     width = np.abs(Hysteresis().carried(p, d[None], at) - d)[0]
     low, high = (np.argmin(np.abs(d[500:] - x)) + 500 for x in (0.01, 0.03))
     assert width[high] / width[low] == pytest.approx(3.0**power, rel=0.05)
+
+
+def test_a_steady_width_is_a_part_of_the_largest_force_so_far_and_no_film_pushes() -> None:
+    d = triangles(0.02, 0.0, 0.04, 0.0, points=400)
+    at = FilmState(force=d[None], slope=np.ones_like(d)[None], deflection=d[None], path=path(d))
+    f = Hysteresis().carried(np.array([[0.1, 2e-3, 0.0, 0.0, 1.0]]), d[None], at)[0]
+    for leg, largest in ((1, 0.02), (3, 0.04)):
+        part = slice(399 * leg, 399 * (leg + 1))
+        pulled = (d[part] > 0.3 * largest) & (d[part] < 0.6 * largest)
+        assert (d[part] - f[part])[pulled] == pytest.approx(np.full(np.count_nonzero(pulled), 0.1 * largest), rel=0.1)
+    assert np.all(f >= 0)
