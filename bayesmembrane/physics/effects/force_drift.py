@@ -14,17 +14,19 @@ from bayesmembrane.physics.effects.base import EffectParameter, Sensor
 
 @dataclass(frozen=True)
 class ForceDrift(Sensor):
-    """F_read = F + rate T (t / T)^exponent / (1 + t / rest), with the time t since the start and T its end.
+    """F_read = F + rate T (t / T)^exponent (1 + t1 / rest) / (1 + t / rest), with the time t since the start.
 
-    ``rate`` is the mean over the test if it goes on; a cell that warms up drifts quickly at first (exponent below 1)
-    and comes to rest. Without times the clock is the distance travelled at 1 mm/s.
+    T is the end of the test and t1 that of its first leg. A cell that warms up drifts quickly at first (exponent below
+    1) and comes to rest; if it does not, ``rate`` is the mean over the test. Without times the clock is the distance
+    travelled at 1 mm/s.
     """
 
     name: ClassVar[str] = "force_drift"
     title: ClassVar[str] = "drift of the force zero"
     reference: ClassVar[str] = "ISO 376:2011, C.3 (drift of the zero); OIML R 60-1:2021, 3.9"
     signature: ClassVar[str] = (
-        "A force that grows (or falls) steadily with time, whatever the deflection: all cycles shift, slack parts too."
+        "A force that grows (or falls) with time, steadily or until it rests, whatever the deflection: all cycles "
+        "shift, slack parts too."
     )
     rank: ClassVar[int] = 1
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
@@ -34,12 +36,14 @@ class ForceDrift(Sensor):
             "rest",
             "s",
             "time after which half of it has come, where it comes to rest",
-            LogNormal(1e3, 1.5),
+            LogNormal(500.0, 1.6),
             (1e-2, 1e7),
         ),
     )
 
     def read(self, p: Array, force: Array, path: Motion) -> Array:
         end = max(float(path.clock[-1]), 1e-12)
-        share = (path.clock / end) ** p[:, 1:2] / (1 + path.clock / p[:, 2:3])
+        turns = np.flatnonzero(np.diff(path.leg))
+        first = float(path.clock[turns[0] if turns.size else -1])
+        share = (path.clock / end) ** p[:, 1:2] * (p[:, 2:3] + first) / (p[:, 2:3] + path.clock)
         return np.asarray(force + p[:, :1] * end * share)
