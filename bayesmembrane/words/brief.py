@@ -194,7 +194,7 @@ def _every(course: Course) -> list[str]:
     foreign = p.anything_foreign
     room = max(1, course.detail.told - bool(d.verdict == "ambiguous" and course.detail.sums and _in_all(d)))
     strange = foreign >= WORDS.probable and sum(q > foreign for q in p.effects.values()) < room
-    probable = [name for name, q in p.effects.items() if q >= WORDS.probable][: room - strange]
+    probable = [name for name, q in p.effects.items() if q >= WORDS.probable][: max(1, room - strange)]
     sizes = np.cumsum([len(name.split("+")) for name in probable])
     told = [_probable_set(d, n, course, bool(k <= course.detail.sized)) for n, k in zip(probable, sizes, strict=True)]
     if strange:
@@ -248,7 +248,8 @@ def _ambiguous(course: Course) -> str:
     d = course.telling
     sure, among = _certain(d), _in_all(d) if course.detail.sums else ""
     which = f"only {sure} is certain" if sure else f"{among}this curve cannot tell which"
-    return f"{which}; the first explains {_explained(d)}{_beside(d)}"
+    first = "the first" if course.detail.told > 1 else "it"
+    return f"{which}; {first} explains {_explained(d)}{_beside(d)}"
 
 
 def _in_all(d: Diagnosis) -> str:

@@ -333,7 +333,7 @@ def _unknown(found: Diagnosis) -> str:
     if found.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{_misses(found)}no effect is needed, and none of the energies has this form. {shape}"
     if far := too_far(found):
-        return f"{_misses(found)}{_certain(found)}what fits best is no explanation: {far}. {shape}"
+        return f"{_misses(found)}{_certain(found)}what fits best is none: {far}. {shape}"
     return (
         f"{_misses(found)}{_certain(found)}more explanations are about as probable than this measurement can part. "
         f"{shape}"
@@ -342,16 +342,15 @@ def _unknown(found: Diagnosis) -> str:
 
 def too_far(found: Diagnosis) -> str:
     """Which forms of the most probable explanation are too far off for it to be one, as a clause; "" if none is."""
-    name = next(iter(found.probabilities.effects))
-    first = next((j.candidate for j in found.ranking if set_name(j.candidate, found.null.names) == name), None)
+    fitted = {set_name(j.candidate, found.null.names): j.candidate for j in reversed(found.ranking)}
+    first = next((fitted[name] for name in found.probabilities.effects if name in fitted), None)
     if first is None:
         return ""
-    far = [
-        f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in first.law_errors.items() if e > VERDICT.law_carried
-    ]
+    errors = first.law_errors.items()
+    far = [f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in errors if e > VERDICT.law_carried]
     if first.energy_error > VERDICT.carried:
         far.insert(0, f"the energy {100 * first.energy_error:.2g} %")
-    return f"{listed(far)} would have to be off" if far else ""
+    return f"it takes {listed(far)} off" if far else ""
 
 
 def why_not(found: Diagnosis) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,7 +100,8 @@ def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Q
     search = JointSearch(parts, tuple(t / min(thickness) for t in thickness), noise)
     one_clock = len({c.measurement.time is None for c in alone}) == 1
     given = effects_in_tests([{e.name: e for e in c.question.hypothesis.effects} for c in alone], labels, one_clock)
-    effects = tuple(effects_in_tests([_possible(c) for c in alone], labels, one_clock))
+    shown = {e.name for c in alone for e in c.effects}
+    effects = tuple(effects_in_tests([_possible(c, shown) for c in alone], labels, one_clock))
     smooth = np.asarray(block_diag(*(c.smooth for c in alone)))
     rng = np.random.default_rng([alone[0].search.seed, 8])
     plain = {n: checked(search, c, rng) for n, c in _energies(search, alone, question, given, tell).items()}
@@ -131,10 +132,13 @@ def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Q
     )
 
 
-def _possible(case: OpenCase) -> dict[str, Effect]:
-    """Effects that could be at work in one of several tests: those, too, that its own film would absorb alone."""
+def _possible(case: OpenCase, shown: Collection[str]) -> dict[str, Effect]:
+    """Effects that could be at work in one of several tests: those, too, that its own film would absorb alone.
+
+    What only its motion hides counts if another test shows it (``shown``), or if it is a constant of the material.
+    """
     further = hidden(case.measurement, case.question.hypothesis)
-    return {e.name: e for e in (*case.effects, *further)}
+    return {e.name: e for e in (*case.effects, *(e for e in further if e.absorbed or e.constant or e.name in shown))}
 
 
 def _energies(

@@ -30,7 +30,9 @@ class ForceDrift(Sensor):
     )
     rank: ClassVar[int] = 1
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
-        EffectParameter("rate", "N/s", "mean change of the zero with time", Normal(0.0, 3e-4), (-1.0, 1.0), 0.0),
+        EffectParameter(
+            "rate", "N/s", "change of the zero with time, until it comes to rest", Normal(0.0, 3e-4), (-1.0, 1.0), 0.0
+        ),
         EffectParameter("exponent", "-", "power of the time with which it goes on", LogNormal(1.0, 0.28), (0.4, 3.0)),
         EffectParameter(
             "rest",

@@ -41,5 +41,5 @@ class Friction(Sensor):
         # A pull of one per length travelled, and its own relaxation: z = direction (1 - exp(-s / travel)).
         signed = np.cumsum(path.steps * path.leg) / p[:, 1:2]
         z = follow(signed, gap, np.zeros(len(p)))
-        part = np.abs(path.deflection) / path.full_range
+        part = np.minimum(np.abs(path.deflection) / path.full_range, 1.0)
         return np.asarray(force + p[:, :1] * (1.0 + p[:, 2:3] * part) * z)

@@ -10,19 +10,20 @@ from numpy.typing import NDArray
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Uniform
-from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState, running_max
+from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 
+TOE = 10.0  # times the force: a steady width is no wider
 SMALLEST = 1e-4  # of the full range: below it a negative power is without bounds
 
 
 @dataclass(frozen=True)
 class Hysteresis(Carried):
-    """F = F0 + level z [(1 - steady) F0 |delta / D|^grows + steady max F0], no less than 0.
+    """F = F0 + level z [(1 - steady) |F0| |delta / D|^grows + steady min(max |F0|, 10 |F0|)], a pull no less than 0.
 
     On each leg z = z_r + s u a / (t a + u), with s = +1 loading, -1 unloading, u the way since the reversal, z_r the z
     there and a = 1 - s z_r what is left to turn; half of it is turned at u = t a. The length is t = travel ((1 -
     similar) D + similar A), with A the length of the leg before the reversal (D, the full range, for the first
-    loading): the same in all cycles, or small in small cycles. z = 0 at the start, and max F0 is the largest so far.
+    loading): the same in all cycles, or small in small cycles. z = 0 at the start, and max |F0| is the largest so far.
 
     The reference's friction is constant in N (steady = 1); that of a filled rubber grows with the force that it carries
     (grows = 0), or, where the film lags behind the disc by a length, with the slope of the curve (about -1).
@@ -34,8 +35,8 @@ class Hysteresis(Carried):
         "M. Berg, Veh. Syst. Dyn. 30 (1998) 197; M. Sjoberg, L. Kari, Nonlinear Dyn. 33 (2003) 323"
     )
     signature: ClassVar[str] = (
-        "Unloading below loading in every cycle and at any speed: closed loops whose width grows with the force, that "
-        "do not close at rest and do not remember the largest deflection."
+        "Unloading below loading in every cycle and at any speed: closed loops, wider at larger forces or as wide at "
+        "any, that do not close at rest and do not remember the largest deflection."
     )
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ("viscoelastic",)
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("friction",)
@@ -67,9 +68,12 @@ class Hysteresis(Carried):
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         part = np.maximum(np.abs(state.deflection) / state.path.full_range, SMALLEST)
-        grown, steady = force * part ** p[:, 3:4], running_max(force)
-        width = (1.0 - p[:, 4:5]) * grown + p[:, 4:5] * steady
-        return np.maximum(force + p[:, :1] * turned(p[:, 1:2], p[:, 2:3], state.path) * width, 0.0)
+        size = np.abs(force)
+        # In the toe a steady width is no wider than the force: a slack film carries nothing, and none pushes.
+        steady = np.minimum(np.fmax.accumulate(size, axis=-1), TOE * size)
+        width = (1.0 - p[:, 4:5]) * size * part ** p[:, 3:4] + p[:, 4:5] * steady
+        out = force + p[:, :1] * turned(p[:, 1:2], p[:, 2:3], state.path) * width
+        return np.asarray(np.where(force > 0, np.maximum(out, 0.0), out))
 
 
 def turned(travel: Array, similar: Array, path: Motion) -> Array:

@@ -61,7 +61,7 @@ class Mullins(Carried):
 
     @property
     def starts(self) -> list[dict[str, float]]:
-        return [{"damage": 0.0}, {"damage": 1.0}]
+        return [{"damage": 0.05}, {"damage": 0.95}]
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         m, full = state.reached, state.path.full_range
