@@ -20,7 +20,7 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words import language
-from bayesmembrane.words.diagnosis import percent, set_title, too_far, why_not
+from bayesmembrane.words.diagnosis import laws_off, percent, set_title, too_far, why_not
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.moved import MATTERS, modulus_of, settled
@@ -358,12 +358,13 @@ def noise_alone(d: Diagnosis) -> bool:
 
 
 def _kind(d: Diagnosis, each: bool) -> str:
-    """What it looks like; with ``each`` law that would have to be in error."""
+    """What it looks like; whether ``each`` law is told that would have to be in error."""
     r = d.remaining
     if r.carried < VERDICT.form_carries:
         return "of no known kind"
-    told = [(n, e) for n, e in r.law_errors.items() if each and e > WORDS.law_error]
-    laws = [f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in told]
+    laws = laws_off(r.law_errors, WORDS.law_error)
+    if laws and not each:
+        return "smooth as errors of the laws would be"
     return f"smooth as if {listed([f'the energy were {100 * r.energy_error:.2g} %', *laws])} off"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -333,7 +333,7 @@ def _unknown(found: Diagnosis) -> str:
     if found.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{_misses(found)}no effect is needed, and none of the energies has this form. {shape}"
     if far := too_far(found):
-        return f"{_misses(found)}{_certain(found)}what fits best is none: {far}. {shape}"
+        return f"{_misses(found)}{_certain(found)}what fits best is no explanation, for {far}. {shape}"
     return (
         f"{_misses(found)}{_certain(found)}more explanations are about as probable than this measurement can part. "
         f"{shape}"
@@ -346,11 +346,15 @@ def too_far(found: Diagnosis) -> str:
     first = next((fitted[name] for name in found.probabilities.effects if name in fitted), None)
     if first is None:
         return ""
-    errors = first.law_errors.items()
-    far = [f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in errors if e > VERDICT.law_carried]
+    far = laws_off(first.law_errors, VERDICT.law_carried)
     if first.energy_error > VERDICT.carried:
         far.insert(0, f"the energy {100 * first.energy_error:.2g} %")
-    return f"it takes {listed(far)} off" if far else ""
+    return f"it holds only with {listed(far)} off" if far else ""
+
+
+def laws_off(errors: Mapping[str, float], least: float) -> list[str]:
+    """``the law of viscoelastic relaxation 5 %`` of each effect whose law has a larger error than ``least``."""
+    return [f"the law of {effect_title(n)} {100 * e:.2g} %" for n, e in errors.items() if e > least]
 
 
 def why_not(found: Diagnosis) -> str:

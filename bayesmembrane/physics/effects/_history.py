@@ -27,8 +27,8 @@ JUMP = EffectParameter("jump", "-", "part of it that comes at once", Uniform(0.0
 PLACE = EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1))
 WIDTH = 0.015
 """Of the full range, in which a jump comes."""
-JUMPS = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-"""Places of a jump to begin with: it is found from nearby only."""
+JUMPS = tuple({"jump": 0.6, "place": place} for place in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9))
+"""Shapes to begin a search with: a jump is found from nearby only."""
 
 
 def growth(exponent: Array, repeated: Array, deflection: Array, path: Motion, saturation: Array | float = 0.0) -> Array:

@@ -42,7 +42,7 @@ class ClampSlip(Slack):
 
     @property
     def starts(self) -> list[dict[str, float]]:
-        return [{"jump": 0.05, "place": 0.5}, *({"jump": 0.6, "place": place} for place in JUMPS)]
+        return [{"jump": 0.05, "place": 0.5}, *JUMPS]
 
     def excess(self, p: Array, deflection: Array, path: Motion) -> Array:
         slow = growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4])

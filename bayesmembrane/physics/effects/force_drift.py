@@ -14,11 +14,11 @@ from bayesmembrane.physics.effects.base import EffectParameter, Sensor
 
 @dataclass(frozen=True)
 class ForceDrift(Sensor):
-    """F_read = F + rate T (t / T)^exponent (1 + t1 / rest) / (1 + t / rest), with the time t since the start.
+    """F_read = F + rate t1 [(t / t1) (rest + t1) / (rest + t)]^exponent, with the time t since the start.
 
-    T is the end of the test and t1 that of its first leg. A cell that warms up drifts quickly at first (exponent below
-    1) and comes to rest; if it does not, ``rate`` is the mean over the test. Without times the clock is the distance
-    travelled at 1 mm/s.
+    t1 is when the first leg ends, and ``rate`` the mean until then: what comes later does not change what was read. A
+    cell that warms up drifts quickly at first (exponent below 1) and comes to rest (t beyond ``rest``). Without times
+    the clock is the distance travelled at 1 mm/s.
     """
 
     name: ClassVar[str] = "force_drift"
@@ -31,21 +31,20 @@ class ForceDrift(Sensor):
     rank: ClassVar[int] = 1
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
-            "rate", "N/s", "change of the zero with time, until it comes to rest", Normal(0.0, 3e-4), (-1.0, 1.0), 0.0
+            "rate", "N/s", "mean change of the zero with time, on the first leg", Normal(0.0, 3e-4), (-1.0, 1.0), 0.0
         ),
         EffectParameter("exponent", "-", "power of the time with which it goes on", LogNormal(1.0, 0.28), (0.4, 3.0)),
         EffectParameter(
             "rest",
             "s",
-            "time after which half of it has come, where it comes to rest",
+            "time after which it comes to rest",
             LogNormal(500.0, 1.6),
             (1e-2, 1e7),
         ),
     )
 
     def read(self, p: Array, force: Array, path: Motion) -> Array:
-        end = max(float(path.clock[-1]), 1e-12)
         turns = np.flatnonzero(np.diff(path.leg))
-        first = float(path.clock[turns[0] if turns.size else -1])
-        share = (path.clock / end) ** p[:, 1:2] * (p[:, 2:3] + first) / (p[:, 2:3] + path.clock)
-        return np.asarray(force + p[:, :1] * end * share)
+        first = max(float(path.clock[turns[0] if turns.size else -1]), 1e-12)
+        part = path.clock / first * (p[:, 2:3] + first) / (p[:, 2:3] + path.clock)
+        return np.asarray(force + p[:, :1] * first * part ** p[:, 1:2])

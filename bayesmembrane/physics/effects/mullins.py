@@ -69,6 +69,6 @@ class Mullins(Carried):
             part = np.where(m > 0, np.maximum(state.deflection, 0.0) / m, 1.0)
             wide = p[:, 1:2] * (full / np.maximum(m, 1e-6 * full)) ** p[:, 2:3]
         back = erf((1.0 - part ** p[:, 3:4]) / wide) / erf(1.0 / p[:, 1:2])
-        ever = np.expm1(-((np.maximum(m, 0.0) / full) ** p[:, 3:4]) / p[:, 1:2]) / np.expm1(-1.0 / p[:, 1:2])
+        ever = np.expm1(-((m / full) ** p[:, 3:4]) / p[:, 1:2]) / np.expm1(-1.0 / p[:, 1:2])
         lost = (1.0 - p[:, 4:5]) * back + p[:, 4:5] * ever
         return np.asarray(force * np.maximum(1.0 - p[:, :1] * lost, 0.0))

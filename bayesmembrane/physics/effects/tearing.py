@@ -39,7 +39,7 @@ class Tearing(Carried):
 
     @property
     def starts(self) -> list[dict[str, float]]:
-        return [{"jump": 0.6, "place": place} for place in JUMPS]
+        return [*JUMPS]
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         slow = growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path)
