@@ -12,7 +12,7 @@ import numpy as np
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.run import Run, RunSettings, sample
-from bayesmembrane.calibration.sampling.walk import Callback
+from bayesmembrane.calibration.sampling.walk import Callback, Settings
 from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.target import PosteriorTarget
 from bayesmembrane.comparison.leave_out.score import leave_one_out
@@ -177,9 +177,9 @@ class _Closing:
         self.tell(f"sampling {claim.label()}")
         progress = self.watch(claim.label()) if self.watch is not None else None
         s = self.settings
-        run = sample(
-            self.measurement, claim, RunSettings(seed=s.seed, out=s.out, ess=s.ess), progress=progress, solve=s.solve
-        )
+        walk = Settings(ess=s.ess, most_steps=LOOP.most_steps)
+        how = RunSettings(seed=s.seed, out=s.out, ess=s.ess, settings=walk)
+        run = sample(self.measurement, claim, how, progress=progress, solve=s.solve)
         if run.interrupted:
             raise KeyboardInterrupt
         return piece(f"stage-{claim.label()}", lambda: _stage(run, s.solve, s.seed))

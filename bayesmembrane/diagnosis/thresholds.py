@@ -468,6 +468,9 @@ class OtherTestsThresholds:
 class LoopThresholds:
     """The closed loop."""
 
+    most_steps: int = 4000
+    """Of each ensemble of walkers: where a curve leaves shapes of a law open, they would walk for a quarter of an hour
+    (Ogden with Mullins on the synthetic film). The run says that it ended there, and its effective sample size."""
     most_rounds: int = 3
     """Two added effects are as many as a curve can carry; the third round says that nothing more is missing."""
     leaders: int = 0
