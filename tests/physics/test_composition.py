@@ -80,25 +80,27 @@ def test_the_frame_takes_its_part(exponent: float) -> None:
     assert again == pytest.approx(total, rel=1e-12)
 
 
-def test_relaxation_is_the_convolution() -> None:
-    """Against direct quadrature of int G(t - s) dF(s), with the force linear between points."""
+@pytest.mark.parametrize("measure", [0.0, -2.0])
+def test_relaxation_is_the_convolution(measure: float) -> None:
+    """Against direct quadrature of int (1 - G(t - s)) d(F / w^m)(s), with F / w^m linear between points."""
     d = staircase((0.03, 0.05), 15)
     rng = np.random.default_rng(3)
     time = np.cumsum(rng.uniform(0.2, 8.0, d.size))
     m = measured(d, time)
     g, tau, decades = 0.4, 12.0, 1.5
-    f, pushed = (force(m, "viscoelastic", x=np.array([g, tau, decades, withstood])) for withstood in (0.0, 1.0))
-    clock = m.path.clock
-    knots, values = np.concatenate([[0.0], clock]), np.concatenate([[0.0], direct("yeoh", d)])
+    f, pushed = (force(m, "viscoelastic", x=np.array([g, tau, decades, part, measure])) for part in (0.0, 1.0))
+    clock, whole, weight = m.path.clock, direct("yeoh", d), (1 + d / np.max(d)) ** measure
+    knots, values = np.concatenate([[0.0], clock]), np.concatenate([[0.0], whole / weight])
     times = tau * 10 ** (decades * np.linspace(-5 / 12, 5 / 12, 6))
     fine = np.unique(np.concatenate([np.linspace(a, b, 400) for a, b in itertools.pairwise(knots)]))
     rate = np.diff(np.interp(fine, knots, values))
     middle = 0.5 * (fine[1:] + fine[:-1])
     for n in (0, 5, 20, d.size - 1):
         past = middle < clock[n]
-        kernel = 1 - g * (1 - np.mean(np.exp(-(clock[n] - middle[past][:, None]) / times), axis=1))
-        assert pushed[n] == pytest.approx(kernel @ rate[past], rel=1e-4, abs=1e-6)
-        assert f[n] == pytest.approx(max(kernel @ rate[past], 0.0), rel=1e-4, abs=1e-6)
+        gone = 1 - np.mean(np.exp(-(clock[n] - middle[past][:, None]) / times), axis=1)
+        left = whole[n] - g * weight[n] * (gone @ rate[past])
+        assert pushed[n] == pytest.approx(left, rel=1e-4, abs=1e-6)
+        assert f[n] == pytest.approx(max(left, 0.0), rel=1e-4, abs=1e-6)
 
 
 def test_a_softened_film_unloads_below_and_rejoins() -> None:

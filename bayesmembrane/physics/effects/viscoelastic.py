@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.data.motion import Motion
-from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Uniform
 from bayesmembrane.physics.effects._history import follow
 from bayesmembrane.physics.effects.base import EffectParameter, Memory
 
@@ -17,11 +17,16 @@ TERMS = 6
 
 @dataclass(frozen=True)
 class Viscoelastic(Memory):
-    """F(t) = F_e(t) - strength int (1 - sum_i exp(-(t - s) / time_i) / n) dF_e(s), n = 6.
+    """F(t) = F_e(t) - strength w(t)^m int (1 - sum_i exp(-(t - s) / time_i) / n) d(F_e w^-m)(s), n = 6.
 
     The times are evenly spread in log time within ``decades`` decades around ``time``: one relaxation time if it is
     zero, a broad spectrum if not. F_e is the instantaneous force. Without times the clock is the distance
     travelled at 1 mm/s.
+
+    w = 1 + |x| / D, with x the deflection and D the full range of the test, and m is the ``measure``: which stress
+    relaxes linearly. Theories differ in that: nominal stress is m = 0 (Fung), and with w near the stretch second
+    Piola-Kirchhoff stress is m = 1 (Simo), true stress m = -1. Acrylic tape has m = -1 to -4, and is followed twice
+    as closely by it as with m = 0.
 
     After a fast return F is negative, and counts ``withstood``: a thin film is slack then (0), one that is stiff or
     sticks to the disc withstands some of it, a block all (1).
@@ -29,7 +34,10 @@ class Viscoelastic(Memory):
 
     name: ClassVar[str] = "viscoelastic"
     title: ClassVar[str] = "viscoelastic relaxation"
-    reference: ClassVar[str] = "Y. C. Fung, Biomechanics: Mechanical Properties of Living Tissues, 2nd ed. (1993), 7.6"
+    reference: ClassVar[str] = (
+        "Y. C. Fung, Biomechanics: Mechanical Properties of Living Tissues, 2nd ed. (1993), 7.6; "
+        "J. C. Simo, Comput. Methods Appl. Mech. Eng. 60 (1987) 153, for another measure of stress"
+    )
     signature: ClassVar[str] = (
         "Unloading below loading in every cycle, with a gap that depends on time and speed and closes at rest; force "
         "falls in holds and recovers at zero."
@@ -45,6 +53,7 @@ class Viscoelastic(Memory):
         EffectParameter("time", "s", "middle relaxation time", LogNormal(30.0, 1.5), (0.05, 2e4)),
         EffectParameter("decades", "-", "width of the spectrum of times", HalfNormal(1.0), (0.0, 6.0)),
         EffectParameter("withstood", "-", "part of a push that does not make it slack", Uniform(0.0, 1.0), (0.0, 1.0)),
+        EffectParameter("measure", "-", "power of w in the stress that relaxes", Normal(0.0, 1.5), (-5.0, 5.0)),
     )
 
     @property
@@ -55,10 +64,11 @@ class Viscoelastic(Memory):
     def remember(self, p: Array, force: Array, path: Motion) -> Array:
         gap = np.diff(path.clock, prepend=0.0)
         start = np.zeros(len(p))
-        kept = np.zeros_like(force)
+        weight = (1 + np.abs(path.deflection) / path.full_range) ** p[:, 4:5]
+        driven, kept = force / weight, np.zeros_like(force)
         for place in (np.arange(TERMS) + 0.5) / TERMS - 0.5:
             time = p[:, 1:2] * 10.0 ** (place * p[:, 2:3])
-            kept += follow(force, gap / time, start) / TERMS
-        relaxed = force - p[:, :1] * (force - kept)
+            kept += follow(driven, gap / time, start) / TERMS
+        relaxed = force - p[:, :1] * (force - weight * kept)
         least = np.minimum(force, 0.0)
         return np.asarray(np.maximum(relaxed, least) + p[:, 3:4] * np.minimum(relaxed - least, 0.0))
