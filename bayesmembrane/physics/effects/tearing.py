@@ -27,6 +27,7 @@ class Tearing(Carried):
         "The whole curve is lower by the same part from one cycle to the next, also where first loading is passed; "
         "nothing comes back."
     )
+    twins_at_any_speed: ClassVar[tuple[str, ...]] = ("mullins",)  # with damage alone both are less by what was reached
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "loss", "-", "log of the part that still carries, after a first loading", HalfNormal(0.1), (0.0, 3.0), 0.0
