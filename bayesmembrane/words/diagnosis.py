@@ -175,9 +175,15 @@ def thinning_sentence(thinned: Thinned) -> str:
 
 
 def absorbed_sentences(found: Diagnosis) -> list[str]:
-    """Why no residual shows the effects that the material absorbs."""
+    """Why no residual shows the effects that the material absorbs, or that look like another energy."""
     known = components("effects")
-    return [known[name].absorbed for name in found.absorbed]
+    out = [known[name].absorbed for name in found.absorbed]
+    if found.hidden:
+        titles = listed(known[name].title for name in found.hidden)
+        out.append(
+            f"{titles} may look like another energy, for nothing comes back in this test: a return would show them"
+        )
+    return out
 
 
 def set_aside(held: HeldOut | None) -> str:
