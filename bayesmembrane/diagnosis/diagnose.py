@@ -76,7 +76,6 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
     sd = search.noise.each
     given = set(null.names)
     effects = [n for j in found.members for n in sorted(set(j.candidate.names) - given)] if known else []
-    shown = [s for s in case.signatures if s.effect not in case.hidden]
     return Diagnosis(
         verdict=found.verdict,
         effects=tuple(dict.fromkeys(effects)),
@@ -95,9 +94,8 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
         foreign=found.foreign,
         confounded=confounded(case.signatures),
         noise=search.noise,
-        power=smallest_sizes(shown, case.detection.score.critical),
+        power=smallest_sizes(case.signatures, case.detection.score.critical),
         absorbed=tuple(e.name for e in absorbed(case.measurement, null.hypothesis)),
-        hidden=tuple(sorted(case.hidden)),
         before=misfit_of(null.residual, sd, null.x.size, search.noise.white(null.residual)),
         after=misfit_of(best.residual, sd, best.x.size, search.noise.white(best.residual)),
         shape=residual_shape(case.measurement, null.residual),

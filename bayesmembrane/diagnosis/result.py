@@ -54,7 +54,6 @@ class Diagnosis(Showable):
     noise : the measurement's own
     power : by effect, the smallest |size| that this measurement would have shown, SI
     absorbed : names of the effects that the material absorbs without trace
-    hidden : names of those that another energy may take for its own in this test, for nothing returns or rests
     before, after : misfit in sample
     shape : of the residual before
     validation : misfit on points that were set aside, or None
@@ -82,7 +81,6 @@ class Diagnosis(Showable):
     noise: OwnNoise
     power: Mapping[str, float]
     absorbed: tuple[str, ...]
-    hidden: tuple[str, ...]
     before: Misfit
     after: Misfit
     shape: ResidualShape

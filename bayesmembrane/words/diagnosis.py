@@ -175,15 +175,9 @@ def thinning_sentence(thinned: Thinned) -> str:
 
 
 def absorbed_sentences(found: Diagnosis) -> list[str]:
-    """Why no residual shows the effects that the material absorbs, or that look like another energy."""
+    """Why no residual shows the effects that the material absorbs."""
     known = components("effects")
-    out = [known[name].absorbed for name in found.absorbed]
-    if found.hidden:
-        titles = listed(known[name].title for name in found.hidden)
-        out.append(
-            f"{titles} may look like another energy, for nothing comes back in this test: a return would show them"
-        )
-    return out
+    return [known[name].absorbed for name in found.absorbed]
 
 
 def set_aside(held: HeldOut | None) -> str:

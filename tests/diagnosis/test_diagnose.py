@@ -17,12 +17,10 @@ from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.ogden import Ogden
 from bayesmembrane.physics.rigs.equibiaxial import Equibiaxial
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
-from bayesmembrane.words.diagnosis import absorbed_sentences, document, sentence
+from bayesmembrane.words.diagnosis import document, sentence
 from tests.diagnosis.curves import measured
 from tests.generator.datasets import Dataset, generate
-from tests.generator.film import Film
 
-FILM = Film("neo_hookean", (8.0,), 0.010, 0.035, 0.04)
 ALL, SOME = 1, 3
 """Every reading of the 700 that the generator makes, or every third: that is enough for a clear answer, and quicker."""
 
@@ -197,21 +195,3 @@ def test_points_as_few_as_a_model_with_an_effect_has_coordinates_are_diagnosed()
     force = stress * rig.width * specimen.thickness
     curve = Measurement(rig.length * (stretch - 1), force, rig, specimen, time=28.1 * np.arange(6.0))
     assert diagnose(curve, Hypothesis(materials()["gent"], convexity="elliptic")).verdict in VERDICTS
-
-
-def test_what_a_single_loading_hides_is_told_and_no_size_of_it_would_have_shown() -> None:
-    """A sound film, loaded once and then back: there nothing is hidden."""
-    up = np.linspace(0.001, 0.030, 60)
-    noise = np.random.default_rng(71).normal(0, 0.002, 120)
-    there, back = (
-        diagnose(measured(FILM.force(path) + noise[: path.size], path), Hypothesis(materials()["neo_hookean"]))
-        for path in (up, np.concatenate([up, up[::-1]]))
-    )
-    assert there.verdict == back.verdict == "adequate"
-    assert set(there.hidden) == {"hysteresis", "mullins", "permanent_set", "viscoelastic"}
-    assert there.power
-    assert not set(there.power) & set(there.hidden)
-    assert back.hidden == ()
-    assert "mullins" in back.power
-    assert any("Mullins" in s for s in absorbed_sentences(there))
-    assert not any("Mullins" in s for s in absorbed_sentences(back))

@@ -154,9 +154,9 @@ def limits(d: Diagnosis, last: Diagnosis, names: tuple[str, str]) -> list[Block]
     out: list[Block] = []
     if d.confounded:
         out.append(confounded_table(d, names[0]))
-    if absorbed := words.absorbed_sentences(d):
-        out.append(Text("The material absorbs, so that no residual shows it:"))
-        out += points([sentence(s) for s in absorbed])
+    if d.absorbed:
+        out.append(Text("The material absorbs without trace, so that no residual shows it:"))
+        out += points([sentence(s) for s in words.absorbed_sentences(d)])
     if last.power:
         out.append(power_table(last, names[1]))
     return [Heading("What this measurement cannot tell"), *out] if out else []
