@@ -101,14 +101,15 @@ def without_effect(candidate: Candidate, name: str) -> tuple[Hypothesis, Array]:
 
 
 def available(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
-    """Effects of the library that can be at work in this test, leave a trace in it, and are not there yet."""
+    """Effects of the library that can be seen in this test, can be told from the material, and are not there yet."""
     thin = measurement.specimen.thickness
-    return [e for e in _possible(measurement, hypothesis) if not e.absorbed and not e.negligible(thin)]
+    possible = [e for e in _possible(measurement, hypothesis) if not e.absorbed and not e.negligible(thin)]
+    return [e for e in possible if _shows(e, measurement)]
 
 
-def hidden(measurement: Measurement, effects: Sequence[Effect]) -> frozenset[str]:
-    """Names of the ``effects`` that another energy may take for its own in this test, for nothing returns or rests."""
-    return frozenset(e.name for e in effects if not _shows(e, measurement))
+def hidden(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
+    """Effects that another energy takes for its own in this test, and that further tests of the material may show."""
+    return [e for e in _possible(measurement, hypothesis) if e.absorbed or not _shows(e, measurement)]
 
 
 def absorbed(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:

@@ -26,11 +26,6 @@ class Beliefs:
     `make study-reliability` (cases 560 to 779) a tenth was below 0.03 times that size, a tenth above 2.5 times, and the
     median was 0.24 times. With Cauchy's prior alone and a rule for effects without support, the log score of 132 cases
     there was -1.23 and the truth in the 95 % set of 117; with what stands here -1.06 and 126."""
-    hidden: float = 0.1
-    """Times the odds of an effect that an energy may take for its own, as nothing returns or rests in a test: no energy
-    of the library is the true one, and what it lacks on a single loading looks like relaxation or softening. With odds
-    that are whole two plain films of the third generator had no effect with 34 and 82 %; a tenth makes that 84 and 98,
-    and a relaxation that no energy follows is found still."""
     plain_gain: float = 50.0
     """ln of the Bayes factor of the best explanation over none, from which on likelihoods count much less than they
     say: real laws differ from the library's in more ways than the form error knows, which matters the more the larger

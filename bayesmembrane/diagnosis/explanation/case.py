@@ -10,14 +10,13 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import enough_points
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.diagnosis.candidates.candidate import Candidate, available, hidden
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, available
 from bayesmembrane.diagnosis.candidates.sampled import checked
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.candidates.signatures import signatures
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.detection.detect import Detection, detect
 from bayesmembrane.diagnosis.detection.scores import Signature
-from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside
 from bayesmembrane.diagnosis.explanation.limit import log_evidence_alone
 from bayesmembrane.diagnosis.explanation.twins import Pairs, twins, twins_in_time
@@ -68,7 +67,6 @@ class DiagnosisCase(ABC):
     effects : of the library, that could be at work
     signatures : of these effects beside the null model, without the invisible ones
     elsewhere : names of those that are invisible there, and leave a trace beside another energy
-    hidden : names of those that another energy may take for its own in such a test
     detection : tests of the null model
     rng : draws of the tests, and of what checks the evidence
     tell : what is being done
@@ -82,7 +80,6 @@ class DiagnosisCase(ABC):
     effects: tuple[Effect, ...]
     signatures: tuple[Signature, ...]
     elsewhere: frozenset[str]
-    hidden: frozenset[str]
     detection: Detection
     rng: np.random.Generator
     tell: Tell
@@ -95,10 +92,6 @@ class DiagnosisCase(ABC):
         """
         names = {s.effect for s in self.signatures} | self.elsewhere
         return [e for e in self.effects if e.name in names]
-
-    def odds(self, effects: Sequence[Effect]) -> list[float]:
-        """How often each is met beside the others, before the data, as far as such a test may show it."""
-        return [e.odds * (BELIEFS.hidden if e.name in self.hidden else 1.0) for e in effects]
 
     @property
     def best_plain(self) -> Candidate:
@@ -151,8 +144,7 @@ class OpenCase(DiagnosisCase):
         return renewed(search, self.smooth, best)
 
     def twins(self) -> Pairs:
-        shown = [e for e in self.effects if e.name not in self.hidden]
-        return twins(shown, self.signatures) | twins_in_time(shown, self.measurement)
+        return twins(self.effects, self.signatures) | twins_in_time(self.effects, self.measurement)
 
     def foreign(self, search: Weighing, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
         assert isinstance(search, Search)
@@ -185,21 +177,18 @@ def opened(measurement: Measurement, question: Question, seed: int, solve: Solve
     elsewhere = seen_elsewhere(search, plain, effects, {s.effect for s in found})
     seen = whitened(null.residual, null.slopes, smooth, search.noise.cautious())
     detection = detect(measurement, seen, found, rng)
-    veiled = hidden(measurement, effects)
-    return OpenCase(
-        question, search, smooth, plain, null, effects, tuple(found), elsewhere, veiled, detection, rng, tell
-    )
+    return OpenCase(question, search, smooth, plain, null, effects, tuple(found), elsewhere, detection, rng, tell)
 
 
 def seen_elsewhere(
     search: Weighing, plain: Mapping[str, Candidate], effects: Sequence[Effect], seen: Collection[str]
 ) -> frozenset[str]:
     """Names of the effects that are not ``seen``, and leave a trace beside one of the plain fits."""
-    unseen = {e.name: e for e in effects if e.name not in seen}
+    hidden = {e.name: e for e in effects if e.name not in seen}
     for c in sorted(plain.values(), key=lambda c: c.x.size):
-        for s in signatures(search, c, list(unseen.values())):
-            unseen.pop(s.effect, None)
-    return frozenset(e.name for e in effects if e.name not in seen and e.name not in unseen)
+        for s in signatures(search, c, list(hidden.values())):
+            hidden.pop(s.effect, None)
+    return frozenset(e.name for e in effects if e.name not in seen and e.name not in hidden)
 
 
 def renewed(search: Search, smooth: Array, best: Candidate) -> Search:

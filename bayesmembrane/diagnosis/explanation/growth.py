@@ -59,8 +59,8 @@ class Grown:
 
     def believed(self, candidate: Candidate, energy: str | None = None) -> float:
         """ln of the probability of a hypothesis before the data; with another ``energy`` if that is given."""
-        own = [e for e in candidate.hypothesis.effects if e.name not in self.case.null.names]
-        of_set = BELIEFS.log_set(self.case.odds(own), self.case.odds(self.case.visible))
+        own = [e.odds for e in candidate.hypothesis.effects if e.name not in self.case.null.names]
+        of_set = BELIEFS.log_set(own, [e.odds for e in self.case.visible])
         of = energy or candidate.hypothesis.material.name
         return of_set + BELIEFS.log_energy(of, self.case.question.energy, len(self.case.plain))
 

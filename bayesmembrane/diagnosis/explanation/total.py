@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -19,7 +19,6 @@ from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
 from bayesmembrane.diagnosis.explanation.unfitted import Key, unfitted
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.effects.base import Effect
 
 Named = TypeVar("Named")
 
@@ -156,24 +155,19 @@ def _untried(grown: Grown, every: Sequence[Candidate], joint: Mapping[tuple[str,
     case, given, tried = grown.case, set(grown.case.null.names), {frozenset(c.names) for c in every}
     out = defaultdict[str, float](float)
     for base in _leaders(every)[: GROWTH.untried]:
-        own, odds = set_name(base, case.null.names), case.odds(_beyond(base, given))
+        own, odds = set_name(base, case.null.names), [e.odds for e in base.hypothesis.effects if e.name not in given]
         for e in case.visible if len(odds) < BELIEFS.most else []:
             names = frozenset((*base.names, e.name))
             if e.name in base.names or names in tried:
                 continue
-            visible = case.odds(case.visible)
-            prior = BELIEFS.log_set([*odds, *case.odds([e])], visible) - BELIEFS.log_set(odds, visible)
+            visible = [v.odds for v in case.visible]
+            prior = BELIEFS.log_set([*odds, e.odds], visible) - BELIEFS.log_set(odds, visible)
             gain = min(promised(grown.search, base, e, grown.counts), BELIEFS.supported)
             q = BELIEFS.untried * joint[own, NOTHING] * float(np.exp(prior + gain))
             if q > 0:
                 name = _joined(names - given)
                 out[name] = max(out[name], q)
     return out
-
-
-def _beyond(candidate: Candidate, given: Collection[str]) -> list[Effect]:
-    """Its effects but for those given."""
-    return [e for e in candidate.hypothesis.effects if e.name not in given]
 
 
 def _leaders(every: Sequence[Candidate]) -> list[Candidate]:

@@ -117,14 +117,14 @@ def _without_effects(case: DiagnosisCase, total: Total, members: tuple[Judged, .
 def _first_order(case: DiagnosisCase, found: Sequence[Foreign]) -> Probabilities:
     """Probabilities of single effects beside every energy, from their traces alone, and of what is foreign."""
     plain, best = _with_energy(case), case.best_plain.log_evidence
-    odds = case.odds(case.visible)
+    odds = [e.odds for e in case.visible]
     none = float(np.logaddexp.reduce(list(plain.values())))
     near = [n for n, c in case.plain.items() if best - c.log_evidence < GROWTH.energy_reach]
     nothing = BELIEFS.log_set((), odds)
     sets, energies = {NOTHING: none + nothing}, {n: [w] for n, w in plain.items()}
     for e in case.visible:
         beside = {n: plain[n] + promised(case.search, case.plain[n], e) for n in near}
-        together, prior = float(np.logaddexp.reduce(list(beside.values()))), BELIEFS.log_set(case.odds([e]), odds)
+        together, prior = float(np.logaddexp.reduce(list(beside.values()))), BELIEFS.log_set((e.odds,), odds)
         for n, w in beside.items():
             energies[n].append(w + prior - nothing)
         weight = together + prior

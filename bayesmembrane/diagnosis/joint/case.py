@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, hidden
 from bayesmembrane.diagnosis.candidates.sampled import checked
 from bayesmembrane.diagnosis.candidates.signatures import signatures
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
@@ -100,7 +100,7 @@ def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Q
     search = JointSearch(parts, tuple(t / min(thickness) for t in thickness), noise)
     one_clock = len({c.measurement.time is None for c in alone}) == 1
     given = effects_in_tests([{e.name: e for e in c.question.hypothesis.effects} for c in alone], labels, one_clock)
-    shown = {e.name for c in alone for e in c.effects if e.name not in c.hidden}
+    shown = {e.name for c in alone for e in c.effects}
     effects = tuple(effects_in_tests([_possible(c, shown) for c in alone], labels, one_clock))
     smooth = np.asarray(block_diag(*(c.smooth for c in alone)))
     rng = np.random.default_rng([alone[0].search.seed, 8])
@@ -124,7 +124,6 @@ def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Q
         effects,
         tuple(found),
         elsewhere,
-        frozenset(),
         detection,
         rng,
         tell,
@@ -138,8 +137,8 @@ def _possible(case: OpenCase, shown: Collection[str]) -> dict[str, Effect]:
 
     What only its motion hides counts if another test shows it (``shown``), or if it is a constant of the material.
     """
-    own = [e for e in case.effects if e.name not in case.hidden or e.constant or e.name in shown]
-    return {e.name: e for e in (*own, *absorbed(case.measurement, case.question.hypothesis))}
+    further = hidden(case.measurement, case.question.hypothesis)
+    return {e.name: e for e in (*case.effects, *(e for e in further if e.absorbed or e.constant or e.name in shown))}
 
 
 def _energies(

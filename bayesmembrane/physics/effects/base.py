@@ -68,7 +68,7 @@ class Effect(ABC):
     coordinates : its parameters; the first one is its size, and at its null value nothing changes, whatever the others
     needs_clamp : True if it only occurs on rigs that clamp the film all round
     needs_time : True if it means nothing without times
-    needs_return : True if a test that only goes one way shows nothing of it that an energy could not: unlikely there
+    needs_return : True if a test that only goes one way shows nothing of it that an energy could not: not sought there
     shows_at_rest : True if a hold shows it as well as a return does
     absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
     exact : True if it has no law that could be off: an offset is an offset

@@ -58,16 +58,16 @@ def test_an_effect_that_leaves_no_trace_gains_and_loses_nothing(single, name) ->
     assert beside(search, plain, name).log_evidence - plain.log_evidence < 0.7
 
 
-def test_what_a_first_loading_alone_hides_shows_where_the_film_returns_or_rests(single, cyclic) -> None:
-    """There it may be another energy, and is unlikely; it is looked for none the less."""
+def test_what_a_first_loading_alone_hides_is_looked_for_where_the_film_returns_or_rests(single, cyclic) -> None:
+    """There it is another energy; further tests of the material may show it."""
     m = single[0].measurement
+    sought, there = ({e.name for e in available(x, PLAIN)} for x in (m, cyclic[0].measurement))
     kept = {"mullins", "permanent_set", "viscoelastic", "hysteresis"}
-    assert kept == hidden(m, available(m, PLAIN))
-    assert kept <= {e.name for e in available(m, PLAIN)}
-    back = cyclic[0].measurement
-    assert not hidden(back, available(back, PLAIN))
+    assert not kept & sought
+    assert kept <= there
+    assert kept <= {e.name for e in hidden(m, PLAIN)}
     held = curve(np.concatenate([m.deflection, np.full(40, m.deflection[-1])]), 3)
-    assert kept - hidden(held, available(held, PLAIN)) == {"viscoelastic"}
+    assert kept & {e.name for e in available(held, PLAIN)} == {"viscoelastic"}
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, opened
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -26,12 +25,3 @@ def test_effects_that_a_flexible_energy_would_hide_are_visible_none_the_less() -
     assert hidden, "nothing is hidden by an Ogden film here: another curve is needed"
     assert hidden <= flexible.elsewhere
     assert [e.name for e in flexible.visible] == [e.name for e in stiff.visible]
-
-
-def test_what_a_single_loading_hides_has_a_part_of_its_odds_and_no_twins() -> None:
-    """Nothing that another energy would be as well is raised to a twelfth of what the test does show."""
-    here = case("neo_hookean")
-    assert "viscoelastic" in here.hidden
-    for effect, odds in zip(here.effects, here.odds(here.effects), strict=True):
-        assert odds == effect.odds * (BELIEFS.hidden if effect.name in here.hidden else 1.0)
-    assert not any(pair & here.hidden for pair in here.twins())

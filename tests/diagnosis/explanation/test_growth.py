@@ -78,14 +78,7 @@ def test_what_decides_is_fitted_without_each_of_its_effects(monkeypatch: pytest.
     shelf = Shelf({FRICTION: -11.0, MULLINS: -90.0}, {FRICTION: -9.5})
     odds = [SimpleNamespace(odds=1.0) for _ in range(4)]
     plain = candidate(claim(), -60.0)
-    question = SimpleNamespace(energy=None)
-    case = SimpleNamespace(
-        null=plain,
-        plain={"gent": plain},
-        visible=odds,
-        question=question,
-        odds=lambda effects: [e.odds for e in effects],
-    )
+    case = SimpleNamespace(null=plain, plain={"gent": plain}, visible=odds, question=SimpleNamespace(energy=None))
     grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, shelf)))
     for c in (plain, candidate(claim("friction", "mullins"), -10.0), candidate(claim("friction", "tearing"), -80.0)):
         grown.add(c)

@@ -69,7 +69,6 @@ def effects(
         visible=[*untried, *TRIED, *TRIED][:4],
         question=SimpleNamespace(energy=None),
         twins=lambda: frozenset(),
-        odds=lambda effects: [e.odds for e in effects],
         foreign=lambda *_: [],
         tell=lambda _: None,
     )
@@ -122,7 +121,6 @@ def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monke
         visible=[*TRIED, *TRIED],
         question=SimpleNamespace(energy=None),
         twins=lambda: frozenset(),
-        odds=lambda effects: [e.odds for e in effects],
         foreign=lambda *_: [],
         tell=lambda _: None,
     )

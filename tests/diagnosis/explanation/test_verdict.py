@@ -108,7 +108,6 @@ def test_an_effect_beside_one_energy_is_a_rival_of_another_energy_without_it(mon
         best_plain=plain["ogden"],
         plain=plain,
         visible=[drift],
-        odds=lambda effects: [e.odds for e in effects],
         search=search,
         question=SimpleNamespace(energy=None),
         tell=lambda _: None,
