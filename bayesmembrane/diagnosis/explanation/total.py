@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -127,6 +127,7 @@ def summed(grown: Grown) -> Total:
     told = [f for f in found if f.counted(counts) > BELIEFS.supported]
     terms += [(f.base, f.kind, own(f.base) + f.counted(counts) + BELIEFS.log_foreign(kinds)) for f in told]
     guessed = [(key, w + raised[key[1]] + nothing) for key, w in others.items()]
+    guessed += [(key, own(f.base) + w + BELIEFS.log_foreign(kinds)) for f, key, w in _sudden(told, grown)]
     p = _normalised(np.array([*(w for _, _, w in terms), *(w for _, w in guessed)]))
     judged = [
         _judged(grown, c, float(q), grown.believed(c))
@@ -145,6 +146,19 @@ def summed(grown: Grown) -> Total:
     both = _falling({key: q / whole for key, q in joint.items()})
     marginal = Probabilities(_summed_out(both, 0), _falling(energies), _summed_out(both, 1))
     return Total(tuple(judged), marginal, both, tuple(found))
+
+
+def _sudden(told: Sequence[Foreign], grown: Grown) -> Iterator[tuple[Foreign, Key, float]]:
+    """(what is foreign, the set of an effect that may come as it does, ln of the Bayes factor): twins of each other.
+
+    A tear may come in a hold or in a later cycle, where no law has a moment for it.
+    """
+    for f in told:
+        for e in grown.case.visible if f.falls else []:
+            names = frozenset((*f.base.names, e.name))
+            if e.sudden and len(names - set(grown.case.null.names)) <= BELIEFS.most:
+                gain = f.counted(grown.counts) - float(np.log(BELIEFS.apart))
+                yield f, (f.base.hypothesis.material.name, names), gain
 
 
 def _untried(grown: Grown, every: Sequence[Candidate], joint: Mapping[tuple[str, str], float]) -> dict[str, float]:

@@ -29,6 +29,7 @@ class ClampSlip(Slack):
         "The curve starts later and later from cycle to cycle: a toe that grows with the largest deflection, unloading "
         "below loading, reloading on the unloading curve, and no return to the first curve."
     )
+    twins_at_any_speed: ClassVar[tuple[str, ...]] = ("permanent_set",)  # both are a film that has become longer
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "slip", "-", "length slid out on a first loading, over the free length", HalfNormal(0.02), (0.0, 0.5), 0.0

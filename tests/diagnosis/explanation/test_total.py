@@ -1,6 +1,6 @@
 """The sum over hypotheses: what a further effect that could not be seen is worth, and one that nobody fitted."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -13,14 +13,16 @@ from bayesmembrane.diagnosis.explanation import total
 from bayesmembrane.diagnosis.explanation import visible as visible_module
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase
+from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, Foreign
 from bayesmembrane.diagnosis.explanation.growth import Grown
+from bayesmembrane.diagnosis.explanation.total import NOTHING
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.hypothesis import hypothesis
 
 LEFT = 100.0
 FOUR = (1.0,) * 4  # odds of all effects
-TRIED = [SimpleNamespace(odds=1.0, name=n) for n in ("friction", "mullins")]
+TRIED = [SimpleNamespace(odds=1.0, name=n, sudden=False) for n in ("friction", "mullins")]
 
 
 def candidate(*effects: str, log_evidence: float, energy: str = "gent") -> Candidate:
@@ -29,13 +31,24 @@ def candidate(*effects: str, log_evidence: float, energy: str = "gent") -> Candi
     return Candidate(claim, x, nothing, nothing[:, None], log_evidence, (), nothing[None], np.zeros(2), nothing)
 
 
-def effects(
-    monkeypatch: pytest.MonkeyPatch, seen: float, gain: float, untried: Sequence[Any] = (), promised: float = -np.inf
-) -> dict[str, float]:
-    """Probabilities where friction explains the curve, and Mullins beside it has a ``gain`` in ln Z.
+def effects(monkeypatch: pytest.MonkeyPatch, **said: Any) -> dict[str, float]:
+    """Probabilities of the sets of `summed_up`."""
+    return dict(summed_up(monkeypatch, **said).probabilities.effects)
+
+
+def summed_up(
+    monkeypatch: pytest.MonkeyPatch,
+    seen: float,
+    gain: float,
+    untried: Sequence[Any] = (),
+    promised: float = -np.inf,
+    step: Mapping[str, Any] | None = None,
+) -> total.Total:
+    """The sum where friction explains the curve, and Mullins beside it has a ``gain`` in ln Z.
 
     That changes by ``seen`` where what could not be seen counts as absent. Of four effects that can be seen some may be
-    ``untried``, where traces of those that were not fitted have a ``promised`` ln of the Bayes factor.
+    ``untried``, where traces of those that were not fitted have a ``promised`` ln of the Bayes factor. Beside the first
+    set there is a ``step``, if there is one.
     """
     takes = {
         frozenset({"friction"}): {"friction": LEFT - 20.0},
@@ -69,7 +82,7 @@ def effects(
         visible=[*untried, *TRIED, *TRIED][:4],
         question=SimpleNamespace(energy=None),
         twins=lambda: frozenset(),
-        foreign=lambda *_: [],
+        foreign=lambda _, bases, __: [] if step is None else [Foreign(SUDDEN, bases[0], 30.0, **step)],
         tell=lambda _: None,
     )
     grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
@@ -79,13 +92,13 @@ def effects(
         candidate("friction", "mullins", log_evidence=-10.0 + gain),
     ):
         grown.add(c)
-    return dict(total.summed(grown).probabilities.effects)
+    return total.summed(grown)
 
 
 @pytest.mark.parametrize("seen", [1.5, 0.0, -25.0])
 def test_a_set_counts_as_far_as_its_effects_can_be_seen(monkeypatch: pytest.MonkeyPatch, seen: float) -> None:
     """Whole: it is the prior of its sizes that changes, while only a part of ln Z counts."""
-    p = effects(monkeypatch, seen, gain=2.0)
+    p = effects(monkeypatch, seen=seen, gain=2.0)
     counted = BELIEFS.counts(52.0) * 2.0 + seen
     odds = np.exp(counted + BELIEFS.log_set((1.0,) * 2, FOUR) - BELIEFS.log_set((1.0,), FOUR))
     assert p["friction+mullins"] == pytest.approx(odds / (1 + odds), rel=1e-6)
@@ -107,6 +120,30 @@ def test_a_further_effect_that_nobody_fitted_is_not_excluded(monkeypatch: pytest
         assert p["friction+tearing"] / p["friction"] == pytest.approx(kept)
         assert p["friction+mullins"] / p["friction"] == pytest.approx(nothing["friction+mullins"] / nothing["friction"])
     assert [sum(p.values()) for p in found.values()] == pytest.approx([1.0, 1.0])
+
+
+@pytest.mark.parametrize("name", ["tearing", "friction"])
+def test_a_fall_that_stays_is_shared_with_an_effect_that_may_come_so(
+    monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """A tear in a hold is at most twelve times less probable than what is foreign, beside the same set."""
+    tear = [SimpleNamespace(odds=1.0, name=name, sudden=True)]
+    own = "friction" if name == "friction" else "friction+tearing"
+    found = summed_up(monkeypatch, seen=0.0, gain=-1.0, untried=tear, step={"relative": True, "size": -0.1})
+    beside = found.joint["friction", SUDDEN]
+    assert beside > 0.9
+    plain = summed_up(monkeypatch, seen=0.0, gain=-1.0, untried=tear).joint
+    odds = BELIEFS.log_foreign(1) + BELIEFS.counts(50.0) * 30.0 - BELIEFS.log_foreign(0)
+    expected = beside / BELIEFS.apart + plain.get((own, NOTHING), 0.0) * beside / np.exp(odds)
+    assert found.joint[own, NOTHING] == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("step", [{"relative": True, "size": 0.1}, {"relative": False, "size": -0.1}])
+def test_a_rise_and_a_fall_by_a_constant_are_no_tear(monkeypatch: pytest.MonkeyPatch, step: dict[str, Any]) -> None:
+    tear = [SimpleNamespace(odds=1.0, name="tearing", sudden=True)]
+    assert ("friction+tearing", NOTHING) not in summed_up(
+        monkeypatch, seen=0.0, gain=-1.0, untried=tear, step=step
+    ).joint
 
 
 def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -52,11 +52,11 @@ def test_levels_are_those_of_a_first_look_whoever_is_raised() -> None:
     assert weights[frozenset(["c"])] + raised[frozenset(["c"])] == pytest.approx(-60.0 - np.log(BELIEFS.apart))
 
 
-def test_loops_and_losses_of_whatever_law_are_twins_whatever_the_motion() -> None:
+def test_loops_losses_and_longer_films_of_whatever_law_are_twins_whatever_the_motion() -> None:
     every = [cls() for cls in components("effects").values()]
-    loops, less = frozenset(("friction", "hysteresis")), frozenset(("mullins", "tearing"))
-    assert set(twins(every, ())) == {loops, less}
-    assert not twins([e for e in every if e.name not in ("friction", "mullins")], ())
+    alike = (("friction", "hysteresis"), ("mullins", "tearing"), ("clamp_slip", "permanent_set"))
+    assert set(twins(every, ())) == {frozenset(pair) for pair in alike}
+    assert not twins([e for e in every if e.name not in ("friction", "mullins", "clamp_slip")], ())
 
 
 def test_sets_differ_by_one_twin() -> None:
