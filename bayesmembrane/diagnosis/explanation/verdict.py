@@ -66,13 +66,19 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     if not members or (len(members) > VERDICT.most_members and not p.likely()):
         return unknown
     first = members[0]
-    if strange is not None and p.anything_foreign > 0.5 and strange.share * first.unexplained > VERDICT.foreign_carries:
+    if strange is not None and p.anything_foreign > 0.5 and _carries(strange, first, given):
         return unknown
     if [set_name(m.candidate, given) for m in members] == [NOTHING]:
         return unknown if p.anything_foreign > 1 - VERDICT.sure else _without_effects(case, total, members)
     if _carried(first.candidate):
         return unknown
     return Verdict("named" if len(members) == 1 else "ambiguous", members, total.ranking, p, strange)
+
+
+def _carries(strange: Foreign, first: Judged, given: Sequence[str]) -> bool:
+    """True if it is what is foreign that explains the curve, not the most probable set beside it."""
+    alone = set_name(first.candidate, given) == NOTHING
+    return alone or strange.share * first.unexplained > VERDICT.foreign_carries
 
 
 def _strange(total: Total, given: Sequence[str]) -> Foreign | None:

@@ -83,6 +83,7 @@ def test_what_is_foreign_and_large_forbids_a_name() -> None:
 def test_what_is_foreign_without_any_effect_is_no_name() -> None:
     assert verdict({NOTHING: 0.99, "friction": 0.01}, strange=0.99) == ("unknown", [], True)
     assert verdict({NOTHING: 0.7, "friction": 0.3}, strange=0.99) == ("unknown", [], True)
+    assert verdict({NOTHING: 0.92, "friction": 0.08}, strange=0.92, takes=0.1) == ("unknown", [], True)
 
 
 @pytest.mark.parametrize(("null", "answer"), [("gent", "adequate"), ("yeoh", "material")])
