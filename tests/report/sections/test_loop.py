@@ -20,7 +20,7 @@ from bayesmembrane.report.runs import Shown
 from bayesmembrane.report.sections.diagnosis import place_of
 from bayesmembrane.report.sections.diagnosis.figures import Place, Residual, discrepancy_picture, residual_picture
 from bayesmembrane.report.sections.diagnosis.tables import confounded_table, power_table, ranking_table
-from bayesmembrane.report.sections.loop import LoopSection, residual_rows
+from bayesmembrane.report.sections.loop import LoopSection, loops_of, residual_rows
 from bayesmembrane.report.sections.loop.others import others
 from bayesmembrane.report.sections.loop.tables import errors_table, moved_table, scores_table
 from bayesmembrane.report.sections.loop.way import waypoints
@@ -228,6 +228,16 @@ def test_two_loops_keep_apart(named: Loop, unknown: Loop) -> None:
     assert len(set(names)) == len(names)
     starts = [s.partition(" up to")[0] for s in LoopSection().answer([named, unknown])]
     assert starts == ["synthetic <film>, neo-Hookean, 120 readings"] * 2
+
+
+def test_loops_on_synthetic_curves_come_last(named: Loop) -> None:
+    first = named.rounds[0]
+    curve = first.diagnosis.measurement
+    made = replace(curve, provenance=replace(curve.provenance, origin="SYNTHETIC: made for a test"))
+    shown = replace(first, diagnosis=replace(first.diagnosis, measurement=made))
+    synthetic = replace(named, rounds=(shown, *named.rounds[1:]))
+    for given in ([synthetic, named], [named, synthetic]):
+        assert loops_of(given) == [named, synthetic]
 
 
 @pytest.mark.usefixtures("blank_pictures")

@@ -51,33 +51,38 @@ class LoopSection(Section):
         return [b for p in self.parts(results) for b in (Heading(p.title), *p.blocks)]
 
     def parts(self, results: Sequence[Any]) -> Sequence[Part]:
-        loops = of_kind(results, Loop)
+        loops = loops_of(results)
         return [_part(found, number if len(loops) > 1 else 0) for number, found in enumerate(loops, 1)]
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
         """A paragraph for each round and one for the modulus; one for each loop where there are several, whose first
         screens tell the sizes.
         """
-        loops = of_kind(results, Loop)
+        loops = loops_of(results)
         if len(loops) == 1:
             return [*answer(loops[0]), *moved(loops[0])[:1]]
         return [f"{subject(found)}: {' '.join(of_loop(found, sized=False).lines[1:])}" for found in loops]
 
     def lead(self, results: Sequence[Any]) -> Lead | None:
-        loops = of_kind(results, Loop)
+        loops = loops_of(results)
         return lead_of(loops[0]) if len(loops) == 1 else None
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
-        return [Glance("loop", subject(found), finding(deciding(found))) for found in of_kind(results, Loop)]
+        return [Glance("loop", subject(found), finding(deciding(found))) for found in loops_of(results)]
 
     def subject(self, results: Sequence[Any]) -> Subject | None:
-        loops = of_kind(results, Loop)
+        loops = loops_of(results)
         if not loops or of_kind(results, Shown):
             return None  # the calibrations tell more
         films = dict.fromkeys(found.rounds[0].before.run.measurement.specimen.name for found in loops)
         curves = list(dict.fromkeys(seen(found.rounds[0].diagnosis.measurement).curve for found in loops))
         curve = curves[0] if len(curves) == 1 else "force curve"
         return Subject(tuple(films), f"What was missing: {'; '.join(map(subject, loops))}.", curve)
+
+
+def loops_of(results: Sequence[Any]) -> list[Loop]:
+    """Those of ``results``; of synthetic curves last."""
+    return sorted(of_kind(results, Loop), key=lambda f: seen(f.rounds[0].diagnosis.measurement).origin == "synthetic")
 
 
 def lead_of(found: Loop) -> Lead:
