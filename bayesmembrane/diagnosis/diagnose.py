@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.thinning import thinned
-from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed, unsought
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
 from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, Tell, opened
@@ -101,6 +101,7 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
         shape=residual_shape(case.measurement, null.residual),
         validation=validation,
         experiments=_experiments(search, found, null),
+        unsought=tuple(e.name for e in unsought(case.measurement, null.hypothesis)),
     )
 
 

@@ -60,6 +60,7 @@ class Diagnosis(Showable):
     experiments : what to measure next where rivals are left
     thinned : what was diagnosed of a measurement with too many readings, and what all of the above is about; else None
     set_aside : single readings that were left out as outliers, of those; else None
+    unsought : names of the effects that were not looked for, since a test that only goes one way hides them
     """
 
     verdict: str
@@ -88,6 +89,7 @@ class Diagnosis(Showable):
     experiments: tuple[Experiment, ...]
     thinned: Thinned | None = None
     set_aside: SetAside | None = None
+    unsought: tuple[str, ...] = ()
 
     @property
     def hypothesis(self) -> Hypothesis:

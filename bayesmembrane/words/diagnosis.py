@@ -82,6 +82,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "noise": {"sd_N": noise.sd, "rho": noise.rho, "stated": noise.stated, "times_stated": noise.excess},
         "smallest_visible": dict(found.power),
         "absorbed": absorbed_sentences(found),
+        "unsought": list(found.unsought),
         "next_measurements": [
             {
                 "what": spoken_test(e.test, found.rig),
@@ -178,6 +179,15 @@ def absorbed_sentences(found: Diagnosis) -> list[str]:
     """Why no residual shows the effects that the material absorbs."""
     known = components("effects")
     return [known[name].absorbed for name in found.absorbed]
+
+
+def unsought_sentence(found: Diagnosis) -> str:
+    """Which effects were not looked for, and what would show them; "" if there are none."""
+    known = components("effects")
+    named = listed(known[name].title for name in found.unsought)
+    return (
+        f"Not looked for, since a test that only goes one way hides them: {named}; unload to see them." if named else ""
+    )
 
 
 def set_aside(held: HeldOut | None) -> str:

@@ -117,6 +117,11 @@ def absorbed(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
     return [e for e in _possible(measurement, hypothesis) if e.absorbed]
 
 
+def unsought(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
+    """Effects that the test shows, if at all, as another energy would, since it only goes one way."""
+    return [e for e in hidden(measurement, hypothesis) if not e.absorbed]
+
+
 def _shows(effect: Effect, m: Measurement) -> bool:
     """True if the motion is such that it is no matter of the energy alone."""
     returns, rests = bool(np.any(m.leg < 0)), bool(m.time is not None and m.holds)

@@ -8,7 +8,7 @@ from scipy.special import logsumexp
 from scipy.stats import cauchy, multivariate_t, norm
 
 from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.diagnosis.candidates.candidate import Candidate, available, hidden, with_effects
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, available, hidden, unsought, with_effects
 from bayesmembrane.diagnosis.candidates.evidence import log_inside
 from bayesmembrane.diagnosis.candidates.sampled import sampled
 from bayesmembrane.diagnosis.candidates.search import Search
@@ -66,6 +66,8 @@ def test_what_a_first_loading_alone_hides_is_looked_for_where_the_film_returns_o
     assert not kept & sought
     assert kept <= there
     assert kept <= {e.name for e in hidden(m, PLAIN)}
+    assert kept == {e.name for e in unsought(m, PLAIN)}
+    assert not unsought(cyclic[0].measurement, PLAIN)
     held = curve(np.concatenate([m.deflection, np.full(40, m.deflection[-1])]), 3)
     assert kept & {e.name for e in available(held, PLAIN)} == {"viscoelastic"}
 

@@ -14,10 +14,10 @@ from bayesmembrane.diagnosis.other_tests import predicted
 from bayesmembrane.ground.stored import store
 from bayesmembrane.next_test.further import FurtherTest, Kind
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.report.blocks import Figure, Points, Table
+from bayesmembrane.report.blocks import Figure, Points, Table, Text
 from bayesmembrane.report.page import PAGE, TWIN, write_report
 from bayesmembrane.report.runs import Shown
-from bayesmembrane.report.sections.diagnosis import place_of
+from bayesmembrane.report.sections.diagnosis import limits, place_of
 from bayesmembrane.report.sections.diagnosis.figures import Place, Residual, discrepancy_picture, residual_picture
 from bayesmembrane.report.sections.diagnosis.tables import confounded_table, power_table, ranking_table
 from bayesmembrane.report.sections.loop import LoopSection, loops_of, residual_rows
@@ -28,7 +28,7 @@ from bayesmembrane.words import diagnosis as diagnosis_words
 from bayesmembrane.words import loop as loop_words
 from bayesmembrane.words.brief import of_diagnosis, of_loop
 from bayesmembrane.words.candidates import candidate_title
-from bayesmembrane.words.diagnosis import set_aside
+from bayesmembrane.words.diagnosis import document, set_aside
 from bayesmembrane.words.moved import Change, changes, modulus_fitted, modulus_sentence
 from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.rounds import answer, bound_sentences, moved, rival_sentences, validation_sentences
@@ -126,6 +126,15 @@ def test_sizes_that_show_are_listed_the_easiest_first(named: Loop) -> None:
 def test_confounded_effects_carry_their_angle(named: Loop) -> None:
     d = replace(only(named, "named"), confounded=(("clamp_slip", "permanent_set", 12.34),))
     assert confounded_table(d, "c").cells() == [["slip in the clamp", "permanent set", "12.3"]]
+
+
+def test_what_was_not_looked_for_is_told(named: Loop) -> None:
+    d = only(named, "named")
+    some = replace(d, unsought=("mullins", "hysteresis"))
+    texts = [[b.text for b in limits(x, x, ("c", "p")) if isinstance(b, Text)] for x in (d, some)]
+    told = "Mullins softening and hysteresis of the material; unload to see them."
+    assert [any(told in t for t in each) for each in texts] == [False, True]
+    assert document(some)["unsought"] == ["mullins", "hysteresis"]
 
 
 def test_moved_parameters_are_in_the_posteriors(named: Loop) -> None:

@@ -157,6 +157,8 @@ def limits(d: Diagnosis, last: Diagnosis, names: tuple[str, str]) -> list[Block]
     if d.absorbed:
         out.append(Text("The material absorbs without trace, so that no residual shows it:"))
         out += points([sentence(s) for s in words.absorbed_sentences(d)])
+    if d.unsought:
+        out.append(Text(words.unsought_sentence(d)))
     if last.power:
         out.append(power_table(last, names[1]))
     return [Heading("What this measurement cannot tell"), *out] if out else []
