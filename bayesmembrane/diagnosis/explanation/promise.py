@@ -45,7 +45,7 @@ def promised(search: Weighing, base: Candidate, effect: Effect, counts: float = 
             along, square, length = float(f.along[i]), float(f.product[i, i]), float(lengths[i])
             toward = along * slopes.sides[i] if slopes.sides[i] else abs(along)
             ratio = Ratio(toward / square * length, length / sqrt(square), length, effect.size.one_sided)
-            best = max(best, counts * (0.5 * along**2 / square - f.cost) + ratio.log_part(counts))
+            best = max(best, counts * (0.5 * along**2 / square - f.cost) + ratio.resolved.log_part(counts))
     return best
 
 

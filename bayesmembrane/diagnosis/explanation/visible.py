@@ -23,6 +23,8 @@ SCALES = np.geomspace(1e-2, 1e2, 81)
 """At which a prior is, in parts of what is expected."""
 SHARPEST = 1e-9
 """Standard deviation of a ratio, and what is expected of it, at least."""
+LOOSE = 1e-4
+"""Part of what is known of a size that the data say, at least: all else is the prior."""
 LEAST = 1e-11
 """Part of its weight that a set keeps whatever the likelihood of a ratio says: a normal one has no tails."""
 
@@ -47,20 +49,38 @@ class Ratio:
         sd = min(self.sd * times, max(self.sd, 1.0))
         return Ratio(self.mean * times, sd, self.expected * times, self.one_sided)
 
+    @property
+    def resolved(self) -> Ratio:
+        """The same in units of its standard deviation, where that is less than one.
+
+        What is left of a trace by all that others could absorb is less than what shows, where the priors of the others
+        keep them from absorbing it.
+        """
+        times = 1 / min(max(self.sd, SHARPEST), 1.0)
+        return Ratio(self.mean * times, self.sd * times, self.expected * times, self.one_sided)
+
+    @property
+    def without_prior(self) -> Ratio:
+        """1 / s0^2 = 1 / s^2 - 1 / R^2 and m0 = m s0^2 / s^2: the likelihood of a posterior with s < 1."""
+        if self.sd >= 1:
+            return self
+        certain = max(1 - (self.sd / max(self.expected, SHARPEST)) ** 2, LOOSE)
+        return Ratio(self.mean / certain, self.sd / sqrt(certain), self.expected, self.one_sided)
+
     def log_part(self, counts: float) -> float:
         """ln int q(r) L(r)^c dr, its part in a weight to which its likelihood L contributes a part c = ``counts``.
 
         L(r) = exp(-(r - m)^2 / (2 s^2)) of the ratio r. What could not be seen, below r0 = `Beliefs.visible`, counts as
         absent, and what could is as probable on every scale up to the expected R, with the tail of Cauchy's law beyond:
-        q(r) = min(1 / r, R / r^2) / (1 + ln(R / r0)) from r0 on, half of that for either sign. An R below r0 is taken
-        to be r0.
+        q(r) = min(1 / r, R / r^2) / (1 + ln(R / r0)) from r0 on, half of that for either sign. Where R is below r0, it is
+        R / r^2: a part R / r0 of such effects is large enough to be there at all.
         """
         faintest, usual = BELIEFS.visible, max(self.expected, BELIEFS.visible)
 
         def log_q(r: Array) -> Array:
             there = np.maximum(r, faintest)
             own = np.log(np.minimum(1 / there, usual / there**2) / (1 + log(usual / faintest)))
-            return np.where(r >= faintest, own, -np.inf)
+            return np.where(r >= faintest, own + log(max(self.expected, SHARPEST) / usual), -np.inf)
 
         places = np.concatenate([[faintest * (1 - 1e-9), faintest], usual * SCALES])
         return self._log_integral(log_q, places, self.sd / sqrt(counts))
@@ -171,7 +191,7 @@ def own_ratio(own: Array, sizes: Array, covariance: Array, expected: Array, one_
     turn = own.T @ along / max(length, TINY)
     sd = sqrt(max(float(turn @ covariance @ turn), 0.0))
     mean = 0.0 if not np.any(sizes) else -length if one_sided and along @ usual < 0 else length
-    return Ratio(mean, sd, float(np.linalg.norm(usual)), one_sided)
+    return Ratio(mean, sd, float(np.linalg.norm(usual)), one_sided).without_prior.resolved
 
 
 def own_traces(white: Array, others: Array) -> Array:
