@@ -72,8 +72,8 @@ class Ratio:
 
         L(r) = exp(-(r - m)^2 / (2 s^2)) of the ratio r. What could not be seen, below r0 = `Beliefs.visible`, counts as
         absent, and what could is as probable on every scale up to the expected R, with the tail of Cauchy's law beyond:
-        q(r) = min(1 / r, R / r^2) / (1 + ln(R / r0)) from r0 on, half of that for either sign. Where R is below r0, it is
-        R / r^2: a part R / r0 of such effects is large enough to be there at all.
+        q(r) = min(1 / r, R / r^2) / (1 + ln(R / r0)) from r0 on, half of that for either sign. Where R is below r0,
+        it is R / r^2: a part R / r0 of such effects is large enough to be there at all.
         """
         faintest, usual = BELIEFS.visible, max(self.expected, BELIEFS.visible)
 
