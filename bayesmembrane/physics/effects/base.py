@@ -41,6 +41,16 @@ class EffectParameter(Parameter):
         return self.null is not None and self.null in self.bounds
 
     @property
+    def sense(self) -> tuple[float, float]:
+        """Between which values it means anything: of a size with a unit, the null value that is a bound, for how large
+        it may be depends on the rig; else the bounds.
+        """
+        if self.null is None or self.unit == "-":
+            return self.bounds
+        low, high = self.bounds
+        return (low if low == self.null else -math.inf), (high if high == self.null else math.inf)
+
+    @property
     def scale(self) -> float:
         """Size that is expected before the data: the prior's root mean square distance from null, or its sd."""
         return _scale(self.prior, self.null)
@@ -146,8 +156,8 @@ class Effect(ABC):
         return ""
 
     def within_bounds(self, p: Array) -> Array:
-        """Parameters (B, k), moved to the nearest bound where they lie outside."""
-        low, high = np.array([c.bounds for c in self.coordinates]).T
+        """Parameters (B, k), moved to the nearest bound of what means anything where they lie outside."""
+        low, high = np.array([c.sense for c in self.coordinates]).T
         return np.clip(p, low, high)
 
 

@@ -164,8 +164,20 @@ def test_it_says_where_it_cannot_occur(effect: Effect) -> None:
 
 @every
 def test_what_lies_outside_its_bounds_counts_as_the_bound(effect: Effect) -> None:
-    low, high = np.array([p.bounds for p in effect.coordinates]).T
-    assert np.array_equal(effect.within_bounds(np.array([low - 1.0, high + 1.0])), [low, high])
+    low, high = np.array([p.sense for p in effect.coordinates]).T
+    far = np.array([(p.bounds[0] - 1.0, p.bounds[1] + 1.0) for p in effect.coordinates])
+    assert np.array_equal(effect.within_bounds(far.T), np.clip(far.T, low, high))
+
+
+@every
+def test_how_large_a_size_with_a_unit_may_be_is_a_matter_of_the_rig(effect: Effect) -> None:
+    """A soft film on a small disc sees 20 mm/N as a stiff one sees 0.2: no size in SI is too large for all rigs."""
+    size, x = effect.size, effect.typical[None, :].copy()
+    x[0, 0] = 100 * max(map(abs, size.bounds))
+    kept = effect.within_bounds(x)[0, 0]
+    assert kept == (size.bounds[1] if size.unit == "-" else x[0, 0])
+    if size.one_sided and size.null == size.bounds[0]:
+        assert effect.within_bounds(-x)[0, 0] == size.null
 
 
 def test_steps_of_differences_stay_small() -> None:
