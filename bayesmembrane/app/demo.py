@@ -32,7 +32,6 @@ from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.ground.stored import answer, answer_folders, store
 from bayesmembrane.physics.hypothesis import hypothesis
-from bayesmembrane.report.page import write_report
 
 TITLE = "What the reconstructed force curve of a 50 um silicone film says about five materials"
 RANGES = ("OP1", "OP2")
@@ -100,6 +99,8 @@ def demo(page_folder: Path, work: Work) -> dict[str, Any]:
         others += begin(valleys)
         compare(work, submit)
         _wait(first + others)
+    from bayesmembrane.report.page import write_report  # on demand: what draws takes 30 MB, and workers draw nothing
+
     page = write_report([folder], page_folder, TITLE, note)
     return {
         "report": str(page),

@@ -21,7 +21,6 @@ from bayesmembrane.diagnosis.explanation.case import Question
 from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.jobs import Tell
 from bayesmembrane.physics.hypothesis import Hypothesis, from_settings
-from bayesmembrane.report.page import write_report
 
 PAGES = "pages"
 
@@ -41,6 +40,8 @@ def perform(task: Task, campaign: Path, tell: Tell) -> Found:
     interrupted = bool(getattr(answer.result, "interrupted", False))
     page = None
     if options.get("page") and not interrupted and answer.folder is not None:
+        from bayesmembrane.report.page import write_report  # on demand: what draws takes 30 MB
+
         tell("page", "writing its page")
         page = write_report([answer.folder], campaign / PAGES / task.key, tell=lambda sentence: tell("page", sentence))
     return Found(values, answer.folder, page, interrupted)
