@@ -179,7 +179,7 @@ class Posterior:
         ok = prediction.ok
         log_likelihood, every = np.full(len(x), -np.inf), None
         if np.any(ok):
-            force = prediction.force[ok]
+            force = prediction.force if np.all(ok) else prediction.force[ok]
             shown = self._traces(x[ok], force)
             with np.errstate(over="ignore", invalid="ignore"):
                 value = self._likelihood(force, shown, x[ok])

@@ -80,7 +80,10 @@ class WhiteLikelihood(NoiseLikelihood):
     def log_likelihood(self, residual: Array, x: Array) -> Array:
         r = residual if self.axes is None else residual @ self.axes
         variance = self._total(x)
-        return np.asarray(-0.5 * np.sum(r * r / variance + np.log(2 * np.pi * variance), axis=1))
+        terms = r * r
+        terms /= variance  # in place: of many draws of a long curve these are the largest arrays there are
+        terms += np.log(2 * np.pi * variance)
+        return np.asarray(-0.5 * np.sum(terms, axis=1))
 
     def covariance(self, x: Array) -> Array:
         variance = np.broadcast_to(self._total(x[None, :])[0], self.size)
