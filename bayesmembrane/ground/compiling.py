@@ -3,12 +3,20 @@
 numba notes a function in its index before the code itself is there. A full disk, or a process killed between the two,
 leaves an index that points to code of another version, which the next process runs; and what cannot be written or read
 ends in a traceback. Here the code comes first, under a name that nothing has, and what fails costs time only.
+
+A compiler never gives back what it took, 0.2 GB for the first material: it works in a copy of this process that ends
+with it, and this one reads what that left on the disk.
 """
 
 from __future__ import annotations
 
 import hashlib
+import os
+import signal
+import sys
+import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -18,6 +26,9 @@ import numba
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+PATIENCE = 300
+"""Seconds after which a copy that compiles is given up, and this process does it."""
+
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """A decorator as `numba.njit` with ``options``, whose code is kept on the disk where that is possible."""
@@ -26,7 +37,7 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         made = numba.njit(function, **options)
         # Where nothing can be written numba finds no place: then each process compiles for itself.
         with suppress(RuntimeError, OSError):
-            made._cache = _Cache(made.py_func)
+            made._cache = _Cache(made)
         return made
 
     return wrap
@@ -78,13 +89,72 @@ class _File(IndexDataCacheFile):  # type: ignore[misc]
 class _Cache(FunctionCache):  # type: ignore[misc]
     """Code that is kept; what cannot be kept is compiled again by the next process."""
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)
+    def __init__(self, dispatcher: Any) -> None:
+        super().__init__(dispatcher.py_func)
+        self._dispatcher = dispatcher
         stamp = self._impl.locator.get_source_stamp()
         self._cache_file = _File(self._cache_path, self._impl.filename_base, stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        found = super().load_overload(sig, target_context)
+        if found is None and _Copies.serve():
+            _in_a_copy(lambda: self._dispatcher.compile(sig))
+            found = super().load_overload(sig, target_context)
+            _Copies.failed = found is None
+        return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
         try:
             super().save_overload(sig, data)
         except OSError:
             self.disable()
+
+
+class _Copies:
+    """Whether copies of this process compile: not once that failed, nor where a system or threads make it unsafe.
+
+    inside : this is such a copy
+    """
+
+    failed, inside = False, False
+
+    @classmethod
+    def serve(cls) -> bool:
+        can = sys.platform == "linux" and threading.current_thread() is threading.main_thread()
+        return can and not cls.failed and not cls.inside
+
+
+def _in_a_copy(work: Callable[[], Any]) -> None:
+    """Do ``work`` in a copy of this process, of which nothing stays but what it wrote."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of threads, none of which compiles
+        process = os.fork()
+    if process:
+        _wait(process)
+        return
+    try:
+        _alone()
+        work()
+    finally:
+        os._exit(0)
+
+
+def _wait(process: int) -> None:
+    try:
+        os.waitpid(process, 0)
+    except BaseException:  # an interrupt: whoever comes next compiles it
+        os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)
+        raise
+
+
+def _alone() -> None:
+    """Let go of what this copy has of the process it was made of: signals, locks, pipes, and whom that tells."""
+    _Copies.inside = True
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
+        signal.signal(number, signal.SIG_DFL)
+    signal.alarm(PATIENCE)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for place in range(3):
+        os.dup2(nowhere, place)
+    os.closerange(3, os.sysconf("SC_OPEN_MAX"))
