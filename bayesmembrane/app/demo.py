@@ -99,9 +99,9 @@ def demo(page_folder: Path, work: Work) -> dict[str, Any]:
         others += begin(valleys)
         compare(work, submit)
         _wait(first + others)
-    from bayesmembrane.report.page import write_report  # on demand: what draws takes 30 MB, and workers draw nothing
+        from bayesmembrane.report.page import write_report  # on demand: what draws takes 30 MB, and work needs none
 
-    page = write_report([folder], page_folder, TITLE, note)
+        page = write_report([folder], page_folder, TITLE, note, submit)
     return {
         "report": str(page),
         "verdicts": [_verdict(found) for found in _answers(folder, "loop")],

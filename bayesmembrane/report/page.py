@@ -14,6 +14,7 @@ from typing import Any
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.ground.errors import BayesmembraneError, SettingsError, StorageError
 from bayesmembrane.ground.files import write_text
+from bayesmembrane.ground.jobs import Submit, Tell
 from bayesmembrane.ground.plain import json_text
 from bayesmembrane.ground.registry import components
 from bayesmembrane.report.blocks import Block, Column, Lead, Part, Table, Text
@@ -33,7 +34,11 @@ def warned(sentence: str) -> None:
 
 
 def write_report(
-    found: Sequence[Any], out: Path, title: str | None = None, tell: Callable[[str], None] = warned
+    found: Sequence[Any],
+    out: Path,
+    title: str | None = None,
+    tell: Callable[[str], None] = warned,
+    submit: Submit | None = None,
 ) -> Path:
     """Write ``out/index.html`` and ``out/report.json`` about all that was ``found``, and return the page's path.
 
@@ -44,6 +49,7 @@ def write_report(
     out : folder; made if it is missing
     title : of the page; made of the specimens' names unless given
     tell : is told in a sentence of each stored answer that cannot be read; the page says so, too, and shows the others
+    submit : has other processes draw what can be drawn side by side
 
     A report of an earlier time is replaced, any other file is not: `StorageError`. The same error names a folder that
     holds nothing to show, and says why if nothing of what is stored can be read; `SettingsError` says that there is
@@ -54,7 +60,7 @@ def write_report(
     gathering = gathered(found)
     for sentence in gathering.left_out:
         tell(sentence)
-    content = compose(gathering.results, title)
+    content = compose(gathering.results, title, submit)
     twin = {
         "generator": GENERATOR,
         "title": content.title,
@@ -91,7 +97,7 @@ def sections() -> list[Section]:
     return sorted((kind() for kind in components("sections").values()), key=lambda s: (s.order, s.name))
 
 
-def compose(results: Sequence[Any], title: str | None = None) -> Content:
+def compose(results: Sequence[Any], title: str | None = None, submit: Submit | None = None) -> Content:
     """What the sections make of ``results``, which are no folders."""
     every = sections()
     leading = next(((section, lead) for section in every if (lead := section.lead(results)) is not None), None)
@@ -99,7 +105,7 @@ def compose(results: Sequence[Any], title: str | None = None) -> Content:
     subject = _subject([s for s in (section.subject(results) for section in every) if s is not None])
     verb = "say" if subject.curve.endswith("curves") else "says"
     about = f"What the {subject.curve}{' of ' if subject.films else ''}{listed(subject.films)} {verb}"
-    parts = [part for section in every for part in section.parts(results)]
+    parts = _parts(every, results, submit)
     plain = Content(
         title=title or about,
         subtitle=subject.sentence,
@@ -114,6 +120,19 @@ def compose(results: Sequence[Any], title: str | None = None) -> Content:
     # A page that begins with a first screen: what the other sections answer comes after it.
     parts = _named_once([*_general_table(every, results), *others, *parts])
     return replace(plain, subtitle="", answer=lead.lines, parts=parts, lead=lead)
+
+
+def _parts(every: Sequence[Section], results: Sequence[Any], submit: Submit | None) -> list[Part]:
+    """Those of all sections in their order; what others can draw is drawn by others meanwhile."""
+    if submit is None:
+        return [part for section in every for part in section.parts(results)]
+    begun = [[submit(_drawn, piece) for piece in section.pieces(results)] for section in every]
+    here = [[] if jobs else section.parts(results) for section, jobs in zip(every, begun, strict=True)]
+    return [p for jobs, own in zip(begun, here, strict=True) for p in (*(job.result() for job in jobs), *own)]
+
+
+def _drawn(piece: Callable[[], Part], tell: Tell) -> Part:
+    return piece()
 
 
 def _told_below(told: Sequence[str]) -> list[Part]:

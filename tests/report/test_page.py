@@ -1,8 +1,11 @@
 """The page stands alone, shows names as they are, and says at the top what must not be overlooked."""
 
 import json
+import pickle
 import re
 import shutil
+from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -16,6 +19,7 @@ from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.calibration.prediction_store import FILE
 from bayesmembrane.calibration.run import Run, predictions_of
 from bayesmembrane.ground.errors import SettingsError, StorageError
+from bayesmembrane.ground.jobs import silent
 from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.cache import Tally
 from bayesmembrane.reconstruction.result import Influence, LossCheck, RangeResult, Reconstruction
@@ -166,6 +170,24 @@ def test_a_run_without_prior_draws_or_states_is_still_shown(tmp_path: Path, yeoh
     text = Page(write_report([bare], tmp_path).read_text(encoding="utf-8")).text
     assert "nothing can be said by Yeoh (locked for 100 % of the draws)" in text
     assert "nan" not in text.lower().replace("nano", "")
+
+
+def test_what_others_draw_is_what_is_drawn_here(tmp_path: Path, yeoh: Shown, neo_hookean: Shown) -> None:
+    sent = []
+
+    def submit(work: Callable[..., Any], *given: Any) -> Future[Any]:
+        sent.append(pickle.dumps((work, given)))
+        work, given = pickle.loads(sent[-1])
+        done: Future[Any] = Future()
+        done.set_result(pickle.loads(pickle.dumps(work(*given, silent))))
+        return done
+
+    results = [yeoh, neo_hookean, reconstruction()]
+    by_others = write_report(results, tmp_path / "by others", submit=submit)
+    assert len(sent) == 2
+    here = write_report(results, tmp_path / "here")
+    for name in (here.name, TWIN):
+        assert (by_others.parent / name).read_bytes() == (here.parent / name).read_bytes()
 
 
 def test_the_twin_holds_the_tables_as_numbers(whole: Path) -> None:

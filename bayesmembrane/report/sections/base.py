@@ -7,7 +7,7 @@ One file, or one folder, is one section; the registry finds it, and another pack
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
@@ -66,6 +66,10 @@ class Section(ABC):
         """The section with its title; several where each result has a heading of its own."""
         made = tuple(self.blocks(results))
         return (Part(self.name, self.title, made),) if made else ()
+
+    def pieces(self, results: Sequence[Any]) -> Sequence[Callable[[], Part]]:
+        """`parts` one by one, as calls that other processes can make; nothing where they are made together."""
+        return ()
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
         """Sentences for the top of the page: what to read if one reads nothing else."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -52,12 +53,12 @@ class RunSection(Section):
         return [b for p in parts for b in (Heading(p.title), *p.blocks)]
 
     def parts(self, results: Sequence[Any]) -> Sequence[Part]:
+        return [made() for made in self.pieces(results)]
+
+    def pieces(self, results: Sequence[Any]) -> Sequence[Callable[[], Part]]:
         shown = [*of_kind(results, Shown), *map(read, of_kind(results, Run))]
         compared = of_kind(results, Compared)
-        return [
-            Part(s.key, f"{s.name}, fitted up to {reach(s, shown)}", tuple(_blocks(s, _beside(s, compared))))
-            for s in in_order(shown)
-        ]
+        return [partial(_part, s, reach(s, shown), _beside(s, compared)) for s in in_order(shown)]
 
     def warnings(self, results: Sequence[Any]) -> Sequence[str]:
         return warnings([s.case for s in in_order(of_kind(results, Shown))])
@@ -91,6 +92,10 @@ def _beside(s: Shown, compared: Sequence[Compared]) -> Compared | None:
     """The optima that belong to a run without effects."""
     fits = (c for c in compared if c.material == s.material and abs(c.end - s.digest.end) <= 1e-6 * s.digest.end)
     return None if s.hypothesis.effects else next(fits, None)
+
+
+def _part(s: Shown, end: str, compared: Compared | None) -> Part:
+    return Part(s.key, f"{s.name}, fitted up to {end}", tuple(_blocks(s, compared)))
 
 
 def _blocks(s: Shown, compared: Compared | None) -> list[Block]:
