@@ -116,6 +116,25 @@ def weighed(posterior: Evaluates, x: Array) -> Densities:
     )
 
 
+def solved_in_parts(posterior: Evaluates, x: Array) -> tuple[Array, Array]:
+    """(log posterior (B,), curves (B, M)) of draws x (B, k), all else for a part of them at a time."""
+    rows = max(1, AT_ONCE // posterior.readings)
+    density, parts = [], []
+    for i in range(0, max(len(x), 1), rows):
+        found = posterior.evaluate(x[i : i + rows])
+        density.append(found.log_posterior)
+        parts.append(found.curves)
+    if len(parts) == 1:
+        return density[0], parts[0]
+    # A part without any curve has no traces, either.
+    curves = np.empty((len(x), max(part.shape[1] for part in parts)))
+    for i in range(0, len(x), rows):
+        part = parts.pop(0)
+        curves[i : i + rows, : part.shape[1]] = part
+        curves[i : i + rows, part.shape[1] :] = np.nan
+    return np.concatenate(density), curves
+
+
 @dataclass(frozen=True, eq=False)
 class Posterior:
     """p(x | y) ~ p0(x) 1[convex] N(y - F(x); 0, Sigma(x)).
@@ -179,7 +198,7 @@ class Posterior:
         ok = prediction.ok
         log_likelihood, every = np.full(len(x), -np.inf), None
         if np.any(ok):
-            force = prediction.force if np.all(ok) else prediction.force[ok]
+            force = prediction.force[ok]
             shown = self._traces(x[ok], force)
             with np.errstate(over="ignore", invalid="ignore"):
                 value = self._likelihood(force, shown, x[ok])

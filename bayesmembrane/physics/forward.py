@@ -32,6 +32,8 @@ LONG = 100
 """Curves of more points than this are interpolated, to 1e-6."""
 AT_ONCE = 500_000
 """Readings that are computed in one batch."""
+COMPOSED = 200_000
+"""The same of a batch with effects: they hold a dozen arrays of its size."""
 IN_CACHE = 100_000
 """The same of closed forms: nothing but arithmetic, which waits for memory where its arrays are larger."""
 
@@ -192,7 +194,7 @@ class Forward:
     def _composed(self, x: Array, sensitivities: bool, reached: bool, spare: Spared) -> Prediction:
         """As `__call__`, in batches that fit into memory."""
         count = self.hypothesis.curve_size + 1 if sensitivities else 1
-        most = IN_CACHE if self.rig.closed_form else AT_ONCE
+        most = IN_CACHE if self.rig.closed_form else COMPOSED
         rows = max(1, most // (count * self.path.deflection.size))
         parts = [self._batch(x[i : i + rows], sensitivities, reached, spare) for i in range(0, len(x), rows)]
         if len(parts) == 1:

@@ -88,3 +88,6 @@ def test_many_draws_are_weighed_in_parts(film, monkeypatch) -> None:  # type: ig
     for name in ("log_prior", "log_likelihood", "outcome"):
         np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), rtol=1e-9, err_msg=name)
     assert type(parts) is not type(whole)  # no curves are kept
+    density, curves = posterior.solved_in_parts(p, x)
+    np.testing.assert_allclose(density, whole.log_posterior, rtol=1e-9)
+    np.testing.assert_allclose(curves, whole.curves, rtol=1e-9)

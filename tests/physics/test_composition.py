@@ -259,7 +259,7 @@ def test_many_draws_are_worked_off_in_batches(monkeypatch: pytest.MonkeyPatch) -
     x[:, 0] += np.linspace(0, 1, 7)
     f = Forward(h, m, m.deflection)
     whole = f(x, sensitivities=True)
-    monkeypatch.setattr("bayesmembrane.physics.forward.AT_ONCE", 20 * len(m))
+    monkeypatch.setattr("bayesmembrane.physics.forward.COMPOSED", 20 * len(m))
     parts = f(x, sensitivities=True)
     assert parts.force == pytest.approx(whole.force, rel=1e-12)
     assert parts.sensitivity == pytest.approx(whole.sensitivity, rel=1e-9, abs=1e-12)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from bayesmembrane.calibration.posterior import Evaluates, Posterior
+from bayesmembrane.calibration.posterior import Evaluates, Posterior, solved_in_parts
 from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array
 
@@ -157,8 +157,7 @@ def emulate(
     some = rng.permutation(len(x))[: min(LEARN_FROM, max(LEARN_FORCES // posterior.readings, 4 * LEAST_DRAWS))]
     x = x[some]
     if solved is None:
-        found = posterior.evaluate(x)
-        curves, truth = found.curves, found.log_posterior
+        truth, curves = solved_in_parts(posterior, x)
     else:
         curves, truth = solved.curves[first[some]], solved.log_posterior[first[some]]
     ok = np.isfinite(truth) & np.all(np.isfinite(curves), axis=1)
