@@ -30,7 +30,7 @@ from bayesmembrane.comparison.prior_widths import prior_widths
 from bayesmembrane.comparison.result import ByWeights, Row
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import DataError, SettingsError
-from bayesmembrane.ground.jobs import Tell
+from bayesmembrane.ground.jobs import Tell, give_back
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.hypothesis import Hypothesis
 
@@ -110,6 +110,7 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
 
     def part(name: str, doing: str, make: Callable[[], Part], more: str = "") -> Part:
         tell(job.label, doing)
+        give_back()
         return kept(run.path, name, f"{key} {more}", make)
 
     def step(text: str) -> None:

@@ -25,6 +25,7 @@ from bayesmembrane.diagnosis.other_tests import OtherTest, check, predicted
 from bayesmembrane.diagnosis.reference.outliers import without_outliers
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned, thinning
 from bayesmembrane.diagnosis.thresholds import LOOP, TINY
+from bayesmembrane.ground.jobs import give_back
 from bayesmembrane.ground.pieces import piece
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.forward import Solve
@@ -175,6 +176,7 @@ class _Closing:
     def sampled(self, claim: Hypothesis) -> Stage:
         """The posterior of ``claim``; raises `KeyboardInterrupt` if it was stopped from outside."""
         self.tell(f"sampling {claim.label()}")
+        give_back()
         progress = self.watch(claim.label()) if self.watch is not None else None
         s = self.settings
         walk = Settings(ess=s.ess, most_steps=LOOP.most_steps)
