@@ -23,7 +23,7 @@ SCALES = np.geomspace(1e-2, 1e2, 81)
 """At which a prior is, in parts of what is expected."""
 SHARPEST = 1e-9
 """Standard deviation of a ratio, and what is expected of it, at least."""
-LOOSE = 1e-4
+LOOSE = 0.1
 """Part of what is known of a size that the data say, at least: all else is the prior."""
 LEAST = 1e-11
 """Part of its weight that a set keeps whatever the likelihood of a ratio says: a normal one has no tails."""
@@ -59,12 +59,15 @@ class Ratio:
         times = 1 / min(max(self.sd, SHARPEST), 1.0)
         return Ratio(self.mean * times, self.sd * times, self.expected * times, self.one_sided)
 
-    @property
-    def without_prior(self) -> Ratio:
-        """1 / s0^2 = 1 / s^2 - 1 / R^2 and m0 = m s0^2 / s^2: the likelihood of a posterior with s < 1."""
+    def without_prior(self, usual: float) -> Ratio:
+        """1 / s0^2 = 1 / s^2 - 1 / R^2 and m0 = m s0^2 / s^2: the likelihood of a posterior with s < 1.
+
+        R = ``usual`` is the standard deviation of the prior about where the ratio is: with Cauchy's tails it is wider
+        there than about nothing.
+        """
         if self.sd >= 1:
             return self
-        certain = max(1 - (self.sd / max(self.expected, SHARPEST)) ** 2, LOOSE)
+        certain = max(1 - (self.sd / max(usual, SHARPEST)) ** 2, LOOSE)
         return Ratio(self.mean / certain, self.sd / sqrt(certain), self.expected, self.one_sided)
 
     def log_part(self, counts: float) -> float:
@@ -151,7 +154,7 @@ def log_seen(
     if not set(candidate.names) - set(given):
         return 0.0
     covariance, white = search.covariance(candidate), search.noise.white(candidate.slopes)
-    unbound = _unbound(search, candidate)
+    unbound, steep = _unbound(search, candidate), search.steepness(candidate)
     whole, position = 0.0, candidate.hypothesis.material_size
     for effect in candidate.hypothesis.effects:
         if effect.name not in given:
@@ -167,6 +170,7 @@ def log_seen(
                 covariance[np.ix_(own, own)],
                 search.expected_sizes(effect),
                 one_sided,
+                steep[own],
             )
             whole += ratio.log_seen(counts, takes.get(effect.name, 0.0))
         position += len(effect.coordinates)
@@ -179,11 +183,12 @@ def _unbound(search: Weighing, candidate: Candidate) -> Array:
     return candidate.x + (mean - search.coefficients_at(candidate)) * search.steepness(candidate)
 
 
-def own_ratio(own: Array, sizes: Array, covariance: Array, expected: Array, one_sided: bool) -> Ratio:
+def own_ratio(own: Array, sizes: Array, covariance: Array, expected: Array, one_sided: bool, local: Array) -> Ratio:
     """Of the whole trace of an effect with traces ``own`` (N, m) of its ``sizes`` (m,), one in each of several tests.
 
-    covariance : (m, m) of the sizes; expected : (m,) before the data. The priors of m sizes are in ln Z, and that of
-    the whole trace is exchanged for another one: the others count as ln Z does.
+    covariance : (m, m) of the sizes; expected : (m,) before the data; local : (m,) standard deviations of their priors
+    about where they are. The priors of m sizes are in ln Z, and that of the whole trace is exchanged for another one:
+    the others count as ln Z does.
     """
     usual = own @ (expected if one_sided else np.copysign(expected, sizes))
     along = own @ sizes if np.any(sizes) else usual
@@ -191,7 +196,8 @@ def own_ratio(own: Array, sizes: Array, covariance: Array, expected: Array, one_
     turn = own.T @ along / max(length, TINY)
     sd = sqrt(max(float(turn @ covariance @ turn), 0.0))
     mean = 0.0 if not np.any(sizes) else -length if one_sided and along @ usual < 0 else length
-    return Ratio(mean, sd, float(np.linalg.norm(usual)), one_sided).without_prior.resolved
+    found = Ratio(mean, sd, float(np.linalg.norm(usual)), one_sided)
+    return found.without_prior(float(np.linalg.norm(turn * local))).resolved
 
 
 def own_traces(white: Array, others: Array) -> Array:

@@ -139,7 +139,8 @@ def test_the_square_of_a_ratio_is_what_chi_square_loses_without_the_effect(film:
 
     size, sd = abs(found.x[-1]), np.sqrt(search.covariance(found)[-1, -1])
     usual = float(search.expected_sizes(OFFSET)[0])
-    expected = Ratio(ratio(size), ratio(sd), ratio(usual), False).without_prior.resolved
+    local = ratio(float(search.steepness(found)[-1]))
+    expected = Ratio(ratio(size), ratio(sd), ratio(usual), False).without_prior(local).resolved
     assert log_seen(search, found, (), {}, 0.5) == pytest.approx(expected.log_seen(0.5), rel=1e-6)
     assert log_seen(search, found, ("force_offset",), {}, 0.5) == 0.0
 
@@ -153,7 +154,7 @@ def test_a_bent_trace_is_as_large_as_what_a_fit_without_it_leaves(film: tuple[Se
     seen = [log_seen(search, faint, (), {"force_offset": r**2}, 1.0) for r in (1.0, 2.0, 4.0)]
     assert absorbed < np.log(0.1)
     assert np.all(np.diff([absorbed, *seen]) >= 0)
-    assert absorbed < seen[1] < seen[2]
+    assert absorbed <= seen[1] < seen[2]
     assert log_seen(search, found, (), {"force_offset": 1e6}, 1.0) == log_seen(search, found, (), {}, 1.0)
 
 
@@ -170,16 +171,18 @@ def test_one_size_in_each_of_several_tests_has_the_ratio_of_the_whole_trace() ->
     traces[:10, 0], traces[10:, 1] = 3.0, 2.0
     sizes, usual, covariance = np.array([0.2, 0.5]), np.array([1.0, 2.0]), np.diag([0.01, 0.04])
     lengths = np.linalg.norm(traces, axis=0)
-    found = own_ratio(traces, sizes, covariance, usual, one_sided=True)
+    found = own_ratio(traces, sizes, covariance, usual, local=usual, one_sided=True)
     each = sizes * lengths
     assert found.mean == pytest.approx(np.linalg.norm(each))
     assert found.expected == pytest.approx(np.linalg.norm(lengths * usual))
     part = each / np.linalg.norm(each)
     assert found.sd == pytest.approx(np.sqrt(np.sum((part * lengths) ** 2 * np.diag(covariance))))
-    assert own_ratio(traces, -sizes, covariance, usual, one_sided=True).mean == pytest.approx(-found.mean)
-    assert own_ratio(traces, -sizes, covariance, usual, one_sided=False).mean == pytest.approx(found.mean)
-    assert own_ratio(traces, np.array([0.0, 0.5]), covariance, usual, one_sided=True).mean == pytest.approx(each[1])
-    assert own_ratio(traces, np.zeros(2), covariance, usual, one_sided=True).mean == 0.0
+    assert own_ratio(traces, -sizes, covariance, usual, local=usual, one_sided=True).mean == pytest.approx(-found.mean)
+    assert own_ratio(traces, -sizes, covariance, usual, local=usual, one_sided=False).mean == pytest.approx(found.mean)
+    assert own_ratio(
+        traces, np.array([0.0, 0.5]), covariance, usual, local=usual, one_sided=True
+    ).mean == pytest.approx(each[1])
+    assert own_ratio(traces, np.zeros(2), covariance, usual, local=usual, one_sided=True).mean == 0.0
 
 
 def test_a_size_that_is_stopped_at_nothing_is_judged_by_what_the_data_ask_for() -> None:
@@ -220,5 +223,14 @@ def test_a_posterior_without_its_prior_is_the_likelihood(sd: float) -> None:
     """N(m0, s0^2) times N(0, R^2) and divided by it again."""
     expected, mean = 0.9, 0.8
     certain = 1 / (1 / sd**2 + 1 / expected**2)
-    found = Ratio(mean * certain / sd**2, np.sqrt(certain), expected, False).without_prior
+    found = Ratio(mean * certain / sd**2, np.sqrt(certain), expected, False).without_prior(expected)
     assert (found.mean, found.sd) == pytest.approx((mean, sd))
+
+
+def test_far_out_a_size_is_told_by_the_data_alone() -> None:
+    """Cauchy's prior is flat where a size is eight times the expected one, and says nothing of it there."""
+    own, size, usual = np.array([[1.0]]), np.array([0.6]), np.array([0.07])
+    far = usual * np.sqrt(0.5 * (1 + (size / usual) ** 2))
+    found = own_ratio(own, size, np.array([[0.11**2]]), usual, local=far, one_sided=True)
+    assert found.mean == pytest.approx(size[0] / 0.11, rel=0.05)
+    assert found.sd == pytest.approx(1.0)
