@@ -142,10 +142,19 @@ def summed(grown: Grown) -> Total:
         energies[energy] += q
     for name, q in _untried(grown, every, joint).items():
         joint[name, NOTHING] += q
-    whole = sum(joint.values())
-    both = _falling({key: q / whole for key, q in joint.items()})
-    marginal = Probabilities(_summed_out(both, 0), _falling(energies), _summed_out(both, 1))
+    both = _flattened(joint)
+    marginal = Probabilities(_summed_out(both, 0), _falling(BELIEFS.flattened(energies)), _summed_out(both, 1))
     return Total(tuple(judged), marginal, both, tuple(found))
+
+
+def _flattened(joint: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], float]:
+    """`Beliefs.flattened` over the sets beside each kind of what is foreign; together one, and falling."""
+    kinds = defaultdict[str, dict[str, float]](dict)
+    for (name, kind), q in joint.items():
+        kinds[kind][name] = q
+    whole = sum(joint.values())
+    flat = {kind: BELIEFS.flattened(sets) for kind, sets in kinds.items()}
+    return _falling({(name, kind): q / whole for kind, sets in flat.items() for name, q in sets.items()})
 
 
 def _sudden(told: Sequence[Foreign], grown: Grown) -> Iterator[tuple[Foreign, Key, float]]:

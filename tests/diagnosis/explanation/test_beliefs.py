@@ -37,3 +37,26 @@ def test_factors_count_whole_where_little_is_gained_and_less_the_more_there_is()
     # What is gained still counts for more, the more it is.
     assert np.all(np.diff(counts[1:] * gains[1:]) > 0)
     assert BELIEFS.counts(1e5) == BELIEFS.least_counts < counts[-1]
+
+
+@pytest.mark.parametrize("first", [0.96, 0.99])
+def test_what_stands_out_is_left_as_it_is(first: float) -> None:
+    said = {"a": first, "b": 0.7 - 0.7 * first, "c": 0.3 - 0.3 * first}
+    assert BELIEFS.flattened(said) == pytest.approx(said)
+
+
+def test_where_nothing_stands_out_odds_are_raised_to_a_power() -> None:
+    flat = BELIEFS.flattened({"a": 0.3, "b": 0.15, "c": 0.05})  # as part of a sum
+    assert sum(flat.values()) == pytest.approx(0.5)
+    assert list(flat) == ["a", "b", "c"]
+    assert flat["a"] / flat["b"] == pytest.approx(2**BELIEFS.flatter)
+    assert flat["b"] / flat["c"] == pytest.approx(3**BELIEFS.flatter)
+    assert BELIEFS.flattened({}) == {}
+
+
+@pytest.mark.parametrize("rivals", [1, 3, 30])
+def test_the_larger_a_probability_the_larger_it_is_flattened(rivals: int) -> None:
+    firsts = np.linspace(0.5, 1.0, 101)
+    flat = [BELIEFS.flattened({"a": p, **{f"b{i}": (1 - p) / rivals for i in range(rivals)}})["a"] for p in firsts]
+    assert np.all(np.diff(flat) > 0)
+    assert np.all(np.array(flat) <= firsts + 1e-12)

@@ -1,6 +1,7 @@
 """The sum over hypotheses: what a further effect that could not be seen is worth, and one that nobody fitted."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -43,13 +44,15 @@ def summed_up(
     untried: Sequence[Any] = (),
     promised: float = -np.inf,
     step: Mapping[str, Any] | None = None,
+    flatter: float = 1.0,
 ) -> total.Total:
     """The sum where friction explains the curve, and Mullins beside it has a ``gain`` in ln Z.
 
     That changes by ``seen`` where what could not be seen counts as absent. Of four effects that can be seen some may be
     ``untried``, where traces of those that were not fitted have a ``promised`` ln of the Bayes factor. Beside the first
-    set there is a ``step``, if there is one.
+    set there is a ``step``, if there is one. ``flatter`` : the power of `Beliefs.flattened`.
     """
+    monkeypatch.setattr(total, "BELIEFS", replace(BELIEFS, flatter=flatter))
     takes = {
         frozenset({"friction"}): {"friction": LEFT - 20.0},
         frozenset({"friction", "mullins"}): {"mullins": 3.0},
@@ -102,6 +105,16 @@ def test_a_set_counts_as_far_as_its_effects_can_be_seen(monkeypatch: pytest.Monk
     counted = BELIEFS.counts(52.0) * 2.0 + seen
     odds = np.exp(counted + BELIEFS.log_set((1.0,) * 2, FOUR) - BELIEFS.log_set((1.0,), FOUR))
     assert p["friction+mullins"] == pytest.approx(odds / (1 + odds), rel=1e-6)
+
+
+def test_sets_and_energies_are_told_flattened_and_what_is_foreign_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    step = {"share": 0.1}
+    said, flat = (summed_up(monkeypatch, seen=0.5, gain=2.0, step=step, flatter=f) for f in (1.0, BELIEFS.flatter))
+    assert flat.probabilities.foreign == pytest.approx(said.probabilities.foreign)
+    beside = {k: p for k, p in said.joint.items() if k[1] == NOTHING}
+    assert {k: flat.joint[k] for k in beside} == pytest.approx(BELIEFS.flattened(beside))
+    assert sum(flat.probabilities.effects.values()) == pytest.approx(1.0)
+    assert flat.probabilities.energies == pytest.approx(BELIEFS.flattened(said.probabilities.energies))
 
 
 def test_probabilities_add_up_to_one(monkeypatch: pytest.MonkeyPatch) -> None:
