@@ -121,6 +121,9 @@ Effects act in this order, in whatever order they are named, and each is one fil
   is the part that grows on when it is repeated, s says how far growth has saturated (slip and set only).
   A clamp also slips, and a film tears, at once: `jump` is the part of it that comes at `place`.
 - One-sided effects have their null value as a bound.
+- Lengths, forces and their rates are parts of what a test reaches: priors and bounds stand here as on OP1 of the source
+  (91.5 mm of full range, 2.25 N, 35 s), and grow with the full range D, the largest force and the duration. Where
+  forces are stresses they are parts of the largest stress.
 - Not here: the weight of a disc that hangs on the load cell is a constant, `force_offset`. Wrinkling: of 2000 films
   drawn from the priors, clamped with stretch 1 and 1.03, none with a convex energy had a state with P1 > 0 > P2 up to
   91.5 mm (Mooney-Rivlin films that are not convex had); a film that was clamped loose wrinkles until it is taut, which

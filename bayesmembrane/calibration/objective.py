@@ -43,6 +43,7 @@ class Objective:
                 'the loss "weighted" needs the noise of the measurement, and it states none',
                 remedy='give force_sd_N in the specimen file, or use "euclidean"',
             )
+        hypothesis = hypothesis.on(measurement)
         self.hypothesis, self.measurement, self.loss = hypothesis, measurement, loss
         weighted, covariance = loss == "weighted", measurement.covariance
         self.root = np.linalg.cholesky(covariance) if weighted and covariance is not None else None

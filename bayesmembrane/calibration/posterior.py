@@ -149,6 +149,7 @@ class Posterior:
 
     def __post_init__(self) -> None:
         enough_points(self.hypothesis, self.measurement)
+        object.__setattr__(self, "hypothesis", self.hypothesis.on(self.measurement))
         self.noise  # noqa: B018 - what it cannot do is said at once
 
     @cached_property

@@ -85,7 +85,7 @@ class Run(Showable):
     @cached_property
     def hypothesis(self) -> Hypothesis:
         """What was sampled."""
-        return from_settings(self.settings["hypothesis"])
+        return from_settings(self.settings["hypothesis"]).on(self.measurement)
 
     @cached_property
     def measurement(self) -> Measurement:

@@ -143,10 +143,9 @@ class SearchThresholds:
 class Sizes:
     """What effects are expected to be, in parts of what the test reached."""
 
-    travel: float = 0.01
-    """Of the largest deflection: lengths, as slack, a set, the frame's yielding at the largest force."""
-    force: float = 0.01
-    """Of the largest force: forces, as friction, an offset, a drift until the end."""
+    part: float = 0.01
+    """Of the largest deflection: lengths, as slack, a set, the frame's yielding at the largest force. Of the largest
+    force: forces, as friction, an offset, a drift until the end."""
     largest: float = 20.0
     """Times the expected size: nothing larger is looked for."""
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,6 +46,10 @@ class Prior(ABC):
     @abstractmethod
     def mean_sd(self) -> tuple[float, float]:
         """Mean and standard deviation."""
+
+    @abstractmethod
+    def times(self, factor: float) -> Self:
+        """That of ``factor`` X, with ``factor`` > 0."""
 
     @property
     def support(self) -> tuple[float, float]:
@@ -88,6 +92,9 @@ class Normal(Prior):
     def mean_sd(self) -> tuple[float, float]:
         return self.mean, self.sd
 
+    def times(self, factor: float) -> Self:
+        return replace(self, mean=factor * self.mean, sd=factor * self.sd)
+
     def __str__(self) -> str:
         return f"normal, mean {self.mean:g}, sd {self.sd:g}"
 
@@ -116,6 +123,9 @@ class Uniform(Prior):
     @property
     def mean_sd(self) -> tuple[float, float]:
         return (self.low + self.high) / 2, (self.high - self.low) / math.sqrt(12)
+
+    def times(self, factor: float) -> Self:
+        return replace(self, low=factor * self.low, high=factor * self.high)
 
     def __str__(self) -> str:
         return f"uniform on [{self.low:g}, {self.high:g}]"
@@ -147,6 +157,9 @@ class HalfNormal(Prior):
     @property
     def mean_sd(self) -> tuple[float, float]:
         return self.origin + self.scale * math.sqrt(2 / math.pi), self.scale * math.sqrt(1 - 2 / math.pi)
+
+    def times(self, factor: float) -> Self:
+        return replace(self, scale=factor * self.scale, origin=factor * self.origin)
 
     def __str__(self) -> str:
         start = f", from {self.origin:g} on" if self.origin else ""
@@ -181,6 +194,9 @@ class Lomax(Prior):
     @property
     def mean_sd(self) -> tuple[float, float]:
         return self.scale / 2, self.scale * math.sqrt(3) / 2
+
+    def times(self, factor: float) -> Self:
+        return replace(self, scale=factor * self.scale)
 
     def __str__(self) -> str:
         return f"Lomax of index 3, scale {self.scale:g}"
@@ -217,6 +233,9 @@ class LogNormal(Prior):
     def mean_sd(self) -> tuple[float, float]:
         mean = self.median * math.exp(self.spread**2 / 2)
         return mean, mean * math.sqrt(math.expm1(self.spread**2))
+
+    def times(self, factor: float) -> Self:
+        return replace(self, median=factor * self.median)
 
     def __str__(self) -> str:
         return f"log-normal, median {self.median:g}, within a factor {np.exp(self.spread):.3g}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,7 @@ from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.noise.base import Noise, force_scale
 from bayesmembrane.physics.noise.white import White
+from bayesmembrane.physics.reach import reach_of
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,13 @@ class Hypothesis:
         blocks += [(e.name, e.coordinates) for e in self.effects]
         blocks += [("noise", self.noise.coordinates)]
         return tuple(replace(p, name=f"{block}.{p.name}") for block, ps in blocks for p in ps)
+
+    def on(self, measurement: Measurement) -> Self:
+        """The same with the priors of its effects in parts of what the measurement reached."""
+        if not self.effects:
+            return self
+        reach = reach_of(measurement)
+        return replace(self, effects=tuple(e.on(reach) for e in self.effects))
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -140,9 +140,9 @@ class Surface:
     def __init__(
         self, hypothesis: Hypothesis, measurement: Measurement, solve: Solve = unaided, loss: str = "euclidean"
     ) -> None:
-        self.hypothesis, self.measurement = hypothesis, measurement
-        self.chart = Chart(hypothesis)
         self.objective = Objective(hypothesis, measurement, loss, solve)
+        self.hypothesis, self.measurement = self.objective.hypothesis, measurement
+        self.chart = Chart(self.hypothesis)
 
     def batch(self, z: Array) -> tuple[Array, Array]:
         """r (B, N) and dr/dz (B, N, k) of z (B, k); nan where there is no film, or no coordinates."""

@@ -37,3 +37,12 @@ def test_what_is_written_out_equals_scipy(prior: Prior) -> None:
     assert prior.support == d.support()
     mine, others = prior.draw(np.random.default_rng(4), (3, 2)), d.rvs((3, 2), random_state=np.random.default_rng(4))
     assert mine == pytest.approx(others, rel=1e-15)
+
+
+@pytest.mark.parametrize("prior", PRIORS, ids=str)
+def test_a_multiple_has_the_multiple_of_every_quantile(prior: Prior) -> None:
+    u = np.linspace(0.02, 0.98, 9)
+    assert prior.times(30.0).quantile(u) == pytest.approx(30.0 * prior.quantile(u), rel=1e-12)
+    x = prior.quantile(u)
+    assert prior.times(30.0).log_density(30.0 * x) == pytest.approx(prior.log_density(x) - np.log(30.0), rel=1e-9)
+    assert prior.times(1.0) == prior

@@ -46,6 +46,7 @@ class JointTest:
                 f'a test cannot be called "{self.label}"',
                 remedy=f"use letters, digits, - and _, as in strip-1, and not {WALK}",
             )
+        object.__setattr__(self, "hypothesis", self.hypothesis.on(self.measurement))
 
 
 @dataclass(frozen=True, eq=False)

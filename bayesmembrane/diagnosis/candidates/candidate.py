@@ -13,6 +13,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.reach import reach_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +131,8 @@ def _shows(effect: Effect, m: Measurement) -> bool:
 
 def _possible(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
     """Effects of the library that can occur in this test and are not in the hypothesis."""
-    found: list[Effect] = [cls() for cls in components("effects").values()]
+    reach = reach_of(measurement)
+    found: list[Effect] = [cls(reach) for cls in components("effects").values()]
     have = {e.name for e in hypothesis.effects}
     rig, path = measurement.rig, measurement.path
     return [e for e in found if e.name not in have and not e.unavailable(rig, path)]

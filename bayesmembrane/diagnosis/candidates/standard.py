@@ -13,6 +13,7 @@ from bayesmembrane.diagnosis.thresholds import SIZES
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Parameter, Prior, Uniform
 from bayesmembrane.physics.effects.base import Effect, EffectParameter
 from bayesmembrane.physics.hypothesis import Hypothesis
+from bayesmembrane.physics.reach import reach_of
 
 FAR = 1e4
 """Times the expected size: what a Cauchy prior has beyond is nothing."""
@@ -211,16 +212,7 @@ def expected_size(effect: Effect, measurement: Measurement) -> float:
 
 def size_scales(measurement: Measurement) -> dict[str, float]:
     """{SI unit: size that is expected before the data} of effects whose size is no pure number."""
-    travel = measurement.full_range
-    force = float(np.max(np.abs(measurement.force)))
-    duration = max(float(np.ptp(measurement.path.clock)), 1e-12)
-    return {
-        "m": SIZES.travel * travel,
-        "N": SIZES.force * force,
-        "N/s": SIZES.force * force / duration,
-        "N/m": SIZES.force * force / travel,
-        "m/N": SIZES.travel * travel / force,
-    }
+    return {unit: SIZES.part * size for unit, size in reach_of(measurement).by_unit.items()}
 
 
 def _axis(p: Parameter, scales: dict[str, float]) -> Size | Shape:

@@ -160,6 +160,7 @@ def opened(measurement: Measurement, question: Question, seed: int, solve: Solve
 
     Raises `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
     """
+    question = replace(question, hypothesis=question.hypothesis.on(measurement))
     hypothesis = question.hypothesis
     _check_size(measurement, hypothesis)
     smooth = smooth_reference(measurement)

@@ -77,7 +77,7 @@ def in_tests(name: str, parts: Sequence[tuple[int, Effect]], one_clock: bool = T
             "constant": constant,
         },
     )
-    made: EffectInTests = kind(tuple(parts))
+    made: EffectInTests = kind(parts=tuple(parts))
     return made
 
 

@@ -15,25 +15,33 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, Parameter, Prior
+from bayesmembrane.physics.reach import Reach
 
 
 @dataclass(frozen=True)
 class EffectParameter(Parameter):
-    """A parameter of an effect, in SI.
+    """A parameter of an effect, in SI; priors and bounds of lengths, forces and their rates are those of `SOURCE`.
 
     null : the value at which the effect vanishes, exactly; None for a shape, which means nothing once it has vanished
     """
 
     null: float | None = None
+
+    def on(self, reach: Reach) -> Self:
+        """The same where a test goes so far: what is a part of that grows with it."""
+        factor = reach.times(self.unit)
+        low, high = self.bounds
+        null = None if self.null is None else factor * self.null
+        return replace(self, prior=self.prior.times(factor), bounds=(factor * low, factor * high), null=null)
 
     @property
     def one_sided(self) -> bool:
@@ -90,7 +98,11 @@ class Effect(ABC):
     sudden : True if it may come at any moment, as a fall of the force by a factor that stays
     odds : how often it is met beside the others, before anything is measured
     rank : orders effects within a stage; equal ranks go by name
+
+    reach : of the test that it is at work in; None: that for which priors and bounds are declared
     """
+
+    reach: Reach | None = None
 
     name: ClassVar[str]
     title: ClassVar[str]
@@ -112,6 +124,15 @@ class Effect(ABC):
     odds: ClassVar[float] = 1.0
     rank: ClassVar[int] = 0
     stage: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        if self.reach is not None:
+            declared, reach = type(self).coordinates, self.reach
+            object.__setattr__(self, "coordinates", tuple(p.on(reach) for p in declared))
+
+    def on(self, reach: Reach) -> Self:
+        """The same in a test that goes so far."""
+        return replace(self, reach=reach)
 
     @property
     def null(self) -> Array:
