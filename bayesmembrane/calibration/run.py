@@ -53,6 +53,7 @@ from bayesmembrane.calibration.store import (
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.interrupts import Stop, never
+from bayesmembrane.ground.jobs import give_back
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.cache import CachedSolver, Tally
@@ -241,6 +242,7 @@ class _Work:
         """The run, with what was walked already in ``segments``, and stored there (None: nowhere)."""
         counted = _tally(self.posterior.solve)
         sampled = self._walked(segments)
+        give_back()
         data, status = outcome(self.posterior, sampled, self.how.sampling.ess, self.how.seed)
         status["checks"]["ruled_out"] = ruled_out_gain(self.posterior, *sampled.draws(MOST_DRAWS), self.how.seed)
         if counted is not None and (now := _tally(self.posterior.solve)) is not None:

@@ -115,6 +115,7 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
 
     def step(text: str) -> None:
         tell(job.label, text)
+        give_back()
 
     def climb(name: str, doing: str, seed: int) -> EvidenceEstimate:
         def keep(piece: str, make: Callable[[], ARun]) -> ARun:

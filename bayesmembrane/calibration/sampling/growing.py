@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bayesmembrane.ground.parameters import Array
 
-HELD = 2**26  # bytes that stay in memory
+HELD = 2**24  # bytes that stay in memory
 STRETCH = 2**24  # bytes that are gone through at once
 
 

@@ -16,6 +16,7 @@ SPREAD, HEAVY = 1.3, 5.0  # how much wider than the draws a density is, and its 
 ENOUGH, FOLLOWED = 100.0, 10  # effective draws of the other points' posterior, and densities made to find them
 EACH, PER_DIMENSION = 400, 300  # draws of such a density
 UNSEEN = 10.0  # over the effective draws is the least error
+TOGETHER = 4096  # draws that are weighed at once
 HALVINGS = 30  # of the interval of powers
 LED_BY = 10  # effective draws for each dimension that such a density is fitted to
 ABSURD = 300.0
@@ -98,7 +99,8 @@ class Pool:
 
     def _weigh(self) -> None:
         share = np.log(np.array(self.counts) / len(self.x))
-        log_g = logsumexp(share[1:, None] + self.log_others, axis=0)
+        parts = [slice(i, i + TOGETHER) for i in range(0, len(self.x), TOGETHER)]
+        log_g = np.concatenate([logsumexp(share[1:, None] + self.log_others[:, part], axis=0) for part in parts])
         for _ in range(BRIDGED):
             # Meng & Wong's iteration: the mean of p / q is the normalisation of p.
             self.log_q = np.logaddexp(share[0] + self.log_p - self.log_z, log_g)

@@ -16,7 +16,8 @@ from bayesmembrane.physics.mechanics import fallback
 from bayesmembrane.physics.mechanics.profile import profile
 from bayesmembrane.physics.mechanics.request import Request, Spared, request
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
-from bayesmembrane.physics.mechanics.solution import Curves, Status
+from bayesmembrane.physics.mechanics.ritz.simd import LANES
+from bayesmembrane.physics.mechanics.solution import Curves, Status, joined
 
 Solve = Callable[[Request], Curves]
 """`solve`, or something in front of it."""
@@ -24,6 +25,8 @@ Solve = Callable[[Request], Curves]
 SOLVERS: MappingProxyType[str, Solve] = MappingProxyType(
     {"ritz": fallback.solve, "ritz_alone": ritz.solve, "shooting": fallback.shoot}
 )
+TOGETHER = 2**14
+"""Forces that are solved for at once: what a solver needs beside them is many times as large as they are."""
 __all__ = ["SOLVERS", "Request", "Solve", "Spared", "force_curve", "profile", "request", "ritz", "solve", "unaided"]
 
 
@@ -34,7 +37,11 @@ def solve(request: Request) -> Curves:
     """
     if request.solver not in SOLVERS:
         raise unknown_name("solver", request.solver, SOLVERS)
-    return SOLVERS[request.solver](request)
+    films, deflections = request.deflection.shape
+    some = LANES * max(1, TOGETHER // deflections // LANES)
+    parts = [slice(i, i + some) for i in range(0, films, some)]
+    solver = SOLVERS[request.solver]
+    return solver(request) if len(parts) == 1 else joined([solver(request.of(part)) for part in parts])
 
 
 def unaided(asked: Request, solve: Solve = solve) -> Curves:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum, IntFlag
 
 import numpy as np
@@ -102,6 +103,12 @@ class Curves:
         """How many forces carry each status, by label; statuses that do not occur are left out."""
         codes, counts = np.unique(self.status, return_counts=True)
         return {Status(int(c)).label: int(k) for c, k in zip(codes, counts, strict=True)}
+
+
+def joined(parts: Sequence[Curves]) -> Curves:
+    """The films of all parts, in order; those of each at as many deflections."""
+    every = {f.name: [getattr(part, f.name) for part in parts] for f in fields(Curves)}
+    return replace(parts[0], **{name: np.concatenate(v) for name, v in every.items() if v[0] is not None})
 
 
 @dataclass(frozen=True)
