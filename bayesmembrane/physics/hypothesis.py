@@ -60,6 +60,8 @@ class Hypothesis:
         if not self.effects:
             return self
         reach = reach_of(measurement)
+        if all(e.reach == reach for e in self.effects):
+            return self
         return replace(self, effects=tuple(e.on(reach) for e in self.effects))
 
     @property

@@ -57,7 +57,9 @@ def test_a_zero_of_stresses_is_expected_in_parts_of_the_stress() -> None:
 @pytest.mark.parametrize("make", [Posterior, lambda h, m: Objective(h, m, "euclidean", api.solve)])
 def test_whoever_holds_a_measurement_has_its_priors(make) -> None:  # type: ignore[no-untyped-def]
     m, h = strip(), hypothesis("gent", ["machine_compliance", "force_drift"])
-    assert make(h, m).hypothesis == make(h.on(m), m).hypothesis == h.on(m) != h
+    assert make(h, m).hypothesis == h.on(m) != h
+    there = h.on(m)
+    assert make(there, m).hypothesis is there  # whoever keeps something by its identity finds it again
 
 
 def test_a_longer_and_stronger_test_reaches_more() -> None:

@@ -43,7 +43,9 @@ class Search(Weighing):
     seed: int = 0
     solve: Solve = api.solve
     known_factors: FormFactors | None = None
-    _made: Lately[int, RememberingObjective] = field(default_factory=lambda: Lately(MADE), init=False, repr=False)
+    _made: Lately[int, tuple[Hypothesis, RememberingObjective]] = field(
+        default_factory=lambda: Lately(MADE), init=False, repr=False
+    )
 
     @property
     def force(self) -> Array:
@@ -109,8 +111,11 @@ class Search(Weighing):
 
     def _remembering(self, hypothesis: Hypothesis) -> RememberingObjective:
         """Of one of the hypotheses that were asked for last: a search asks for one many times."""
-        # By identity, for that costs nothing; what is made holds the hypothesis, so that no other one gets its number.
+        # By identity, for that costs nothing; the hypothesis is held beside, so that no other one gets its number.
         return self._made.of(
             id(hypothesis),
-            lambda: RememberingObjective(Objective(hypothesis, self.measurement, "euclidean", self.quick)),
-        )
+            lambda: (
+                hypothesis,
+                RememberingObjective(Objective(hypothesis, self.measurement, "euclidean", self.quick)),
+            ),
+        )[1]
