@@ -375,6 +375,9 @@ class VerdictThresholds:
     """Of no effect, and of nothing foreign, to first order: where one is less probable, all are weighed although no
     test sees a misfit. Of 104 plain films (`make study-loop`, seeds 300000 to 300159) 2 have less, and 12 less than
     0.95; of five films with effects of ratios 3 to 8 that no test saw, on both generators, three."""
+    alike: float = 3.0
+    """Times by which an energy is more probable than another one with the same effects, up to which the one with fewer
+    parameters stands for the set: what is sampled, and told. Probabilities are those of all."""
     most_members: int = 6
     """Of an ambiguous answer; if more are needed and no effect is more probable than not, nothing can be told. Only so
     many are held against each other when further tests are looked for."""

@@ -21,7 +21,7 @@ class Verdict:
     """What the probabilities come to.
 
     verdict : "adequate", "named", "ambiguous", "material" or "unknown"
-    members : the hypotheses that it rests on, each with the most probable energy of its set of effects
+    members : the hypotheses that it rests on, each with one energy of its set of effects (`_first_of_each_set`)
     ranking : every hypothesis that was fitted, the most probable first
     probabilities : summed
     foreign : what is foreign, where it is not sure that there is nothing
@@ -58,9 +58,7 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     """
     p, given = total.probabilities, case.null.names
     strange = _strange(total, given)
-    best: dict[str, Judged] = {}
-    for j in total.ranking:
-        best.setdefault(set_name(j.candidate, given), j)
+    best = _first_of_each_set(total.ranking, given)
     members = tuple(best[name] for name in _smallest(p.effects) if name in best)
     unknown = Verdict("unknown", (), total.ranking, p, strange)
     if not members or (len(members) > VERDICT.most_members and not p.likely()):
@@ -73,6 +71,22 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     if _carried(first.candidate):
         return unknown
     return Verdict("named" if len(members) == 1 else "ambiguous", members, total.ranking, p, strange)
+
+
+def _first_of_each_set(ranking: Sequence[Judged], given: Sequence[str]) -> dict[str, Judged]:
+    """By set of effects its most probable energy; beside effects that with the fewest parameters of those as good.
+
+    Which of two energies is a little more probable than the other hangs on the noise, and on round-off.
+    """
+    sets: dict[str, list[Judged]] = {}
+    for j in ranking:
+        sets.setdefault(set_name(j.candidate, given), []).append(j)
+    for name, same in sets.items():
+        near = [j for j in same if j.probability * VERDICT.alike >= same[0].probability]
+        good = [j for j in near if not _carried(j.candidate)]
+        if name != NOTHING and good:
+            sets[name] = [min(good, key=lambda j: j.candidate.x.size)]
+    return {name: same[0] for name, same in sets.items()}
 
 
 def _carries(strange: Foreign, first: Judged, given: Sequence[str]) -> bool:

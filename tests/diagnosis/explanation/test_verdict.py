@@ -97,6 +97,19 @@ def test_an_energy_that_is_far_off_is_not_known() -> None:
     assert verdict({"friction": 1.0}, best=candidate("friction", energy_error=0.2))[0] == "unknown"
 
 
+@pytest.mark.parametrize(("yeoh", "error", "chosen"), [(0.4, 1e-3, "yeoh"), (0.1, 1e-3, "ogden"), (0.4, 0.2, "ogden")])
+def test_of_energies_as_good_the_one_with_fewest_parameters_stands_for_a_set(
+    yeoh: float, error: float, chosen: str
+) -> None:
+    """It need not be the first, but its form may not be what explains the curve."""
+    both = ("ogden", 0.96 - yeoh, 1e-3), ("yeoh", yeoh, error)
+    ranking = tuple(Judged(candidate("friction", e, m), p, 0.0, 0.01, 1.0) for m, p, e in both)
+    case = SimpleNamespace(null=candidate(NOTHING))
+    found = decided(cast(OpenCase, case), replace(total({"friction": 0.96, "mullins": 0.04}), ranking=ranking))
+    assert [m.candidate.hypothesis.material.name for m in found.members] == [chosen]
+    assert found.ranking == ranking
+
+
 def test_an_effect_beside_one_energy_is_a_rival_of_another_energy_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """An energy with many parameters may follow an effect wholly; a simpler one with the effect is as good."""
     plain = {n: replace(candidate(NOTHING, material=n), log_evidence=z) for n, z in (("ogden", 0.0), ("yeoh", -15.0))}
