@@ -18,9 +18,8 @@ from bayesmembrane.diagnosis.left.shape import ResidualShape, residual_shape
 from bayesmembrane.diagnosis.loop import Loop, Stage
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
-from bayesmembrane.ground.registry import components
 from bayesmembrane.words import language
-from bayesmembrane.words.diagnosis import laws_off, percent, set_title, too_far, why_not
+from bayesmembrane.words.diagnosis import laws_off, percent, set_title, smallest_sizes, too_far, why_not
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.moved import MATTERS, modulus_of, settled
@@ -406,15 +405,11 @@ def _held(d: Diagnosis) -> str:
 
 
 def _use_as_it_is(d: Diagnosis) -> str:
-    known, m = components("effects"), d.measurement
-    shown = m.rig.shown(m.specimen.thickness)
-    finite = sorted((v / known[n]().size.scale, n, v) for n, v in d.power.items() if np.isfinite(v))
     start = f"Use {spoken(d.null.hypothesis)} over this range"
-    if not d.detection.adequate or not finite:
+    sizes = smallest_sizes(d)[:2]
+    if not d.detection.adequate or not sizes:
         return f"{start}."
-    seen_from = listed(
-        f"{effect_title(n)} of {size_in_words(v, known[n]().size.unit, shown)}" for _, n, v in finite[:2]
-    )
+    seen_from = listed(f"{title} of {size}" for title, size in sizes)
     return f"{start}: {seen_from} would have shown."
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, UNNAMED, WAVE, Foreign
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, set_name
 from bayesmembrane.diagnosis.left.heldout import HeldOut
@@ -447,11 +448,16 @@ def _bounds(candidate: Candidate) -> str:
 
 def _power(found: Diagnosis) -> str:
     """The smallest sizes that would have shown, for the effects that are easiest to see relative to what is usual."""
-    known, units = components("effects"), _units(found)
-    relative = sorted((size / known[n]().size.scale, n, size) for n, size in found.power.items() if np.isfinite(size))
-    sizes = [(known[n], size) for _, n, size in relative[: WORDS.visible_effects]]
-    words = [f"{e.title} of {size_in_words(size, e().size.unit, units)}" for e, size in sizes]
+    words = [f"{title} of {size}" for title, size in smallest_sizes(found)[: WORDS.visible_effects]]
     return f"It would have shown {', '.join(words)} or more." if words else ""
+
+
+def smallest_sizes(found: Diagnosis) -> list[tuple[str, str]]:
+    """(title of an effect, the smallest size that would have shown), the easiest to see beside what is usual first."""
+    known, units = components("effects"), _units(found)
+    effects = {n: known[n]() for n, size in found.power.items() if np.isfinite(size)}
+    order = sorted(effects, key=lambda n: (found.power[n] / expected_size(effects[n], found.measurement), n))
+    return [(known[n].title, size_in_words(found.power[n], effects[n].size.unit, units)) for n in order]
 
 
 def _noise(found: Diagnosis) -> str:
