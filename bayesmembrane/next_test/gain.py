@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 
@@ -34,18 +34,14 @@ def confused(foretold: Sequence[tuple[Array, Array]]) -> Array:
     0: they say the same. A. Bhattacharyya, Bull. Calcutta Math. Soc. 35 (1943) 99. By the products of all columns, so
     that a pair costs what its columns do, however many readings there are.
     """
-    every = np.column_stack([np.column_stack([m - foretold[0][0], g]) for m, g in foretold])
-    products = every.T @ every
-    ends = np.cumsum([0, *(g.shape[1] + 1 for _, g in foretold)])
-    means, columns = ends[:-1], [np.arange(a + 1, b) for a, b in pairwise(ends)]
-    single = [_log_det(products[np.ix_(c, c)]) for c in columns]
-    out = []
+    own = [g.T @ g for _, g in foretold]
+    single, out = [_log_det(gram) for gram in own], []
     for a, b in combinations(range(len(foretold)), 2):
-        both = np.concatenate([columns[a], columns[b]])
-        gram = 0.5 * products[np.ix_(both, both)]
-        along = (products[both, means[a]] - products[both, means[b]]) / np.sqrt(2)
-        whole = products[means[a], means[a]] + products[means[b], means[b]] - 2 * products[means[a], means[b]]
-        square = whole - along @ np.linalg.solve(np.eye(both.size) + gram, along)
+        (mean_a, columns_a), (mean_b, columns_b) = foretold[a], foretold[b]
+        cross, apart = columns_a.T @ columns_b, mean_a - mean_b
+        gram = 0.5 * np.block([[own[a], cross], [cross.T, own[b]]])
+        along = np.concatenate([columns_a.T @ apart, columns_b.T @ apart]) / np.sqrt(2)
+        square = apart @ apart - along @ np.linalg.solve(np.eye(along.size) + gram, along)
         out.append(-max(float(square), 0.0) / 8 + (single[a] + single[b]) / 4 - _log_det(gram) / 2)
     return np.minimum(out, 0.0)
 
