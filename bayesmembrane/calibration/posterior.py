@@ -193,13 +193,11 @@ class Posterior:
     def evaluate(self, x: ArrayLike) -> Evaluation:
         """Prior, likelihood, force and outcome of x (B, k), from one batched solution."""
         x = np.atleast_2d(np.asarray(x, dtype=float))
-        mode = self.hypothesis.convexity
-        prediction = (self.nodes or self.forward)(x, reached=mode.looks_beyond, spare=mode.spare)
-        inside = self.prior.inside(prediction)
-        ok = prediction.ok
+        every_force, status, inside = self._solved(x)
+        ok = np.all(status == Status.OK, axis=1)
         log_likelihood, every = np.full(len(x), -np.inf), None
         if np.any(ok):
-            force = prediction.force[ok]
+            force = every_force[ok]
             shown = self._traces(x[ok], force)
             with np.errstate(over="ignore", invalid="ignore"):
                 value = self._likelihood(force, shown, x[ok])
@@ -208,11 +206,31 @@ class Posterior:
                 every = np.full((len(x), *shown.shape[1:]), np.nan)
                 every[ok] = shown
         log_prior = np.where(inside, self.prior.log_density(x), -np.inf)
-        return Evaluation(log_prior, log_likelihood, outcome_of(prediction.status, inside), prediction.force, every)
+        return Evaluation(log_prior, log_likelihood, outcome_of(status, inside), every_force, every)
+
+    def _solved(self, x: Array) -> tuple[Array, NDArray[np.int8], NDArray[np.bool_]]:
+        """Forces (B, N) N and their status, and (B,) True where the convexity prior holds.
+
+        Nobody has to look beyond the readings for a film that is convex whatever becomes of it.
+        """
+        n, sure = self.readings, self.prior.surely_inside(x)
+        force, status, inside = np.empty((len(x), n)), np.empty((len(x), n), dtype=np.int8), sure.copy()
+        mode = self.hypothesis.convexity
+        for some, beyond in ((sure, False), (~sure, mode.looks_beyond)):
+            if np.any(some):
+                found = (self.nodes or self.forward)(x[some], reached=beyond, spare=mode.spare)
+                force[some], status[some] = found.force, found.status
+                if some is not sure:
+                    inside[some] = self.prior.inside(found)
+        return force, status, inside
 
     def log_prior(self, x: ArrayLike) -> Array:
-        """ln p0(x) where the convexity prior holds, -inf elsewhere; (B,)."""
-        return self.evaluate(x).log_prior
+        """ln p0(x) where the convexity prior holds, -inf elsewhere; (B,). Only what may miss it is solved."""
+        x = np.atleast_2d(np.asarray(x, dtype=float))
+        out, rest = self.prior.log_density(x), ~self.prior.surely_inside(x)
+        if np.any(rest):
+            out[rest] = self.evaluate(x[rest]).log_prior
+        return out
 
     def log_likelihood(self, x: ArrayLike) -> Array:
         """ln p(y | x), (B,); -inf where the film has no curve, or is not followed since the prior rules it out."""

@@ -16,7 +16,7 @@ from bayesmembrane.data.thinning import MOST
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.ground.sobol import scrambled_sobol
 from bayesmembrane.physics.convexity import MODES, ConvexityMode, States
-from bayesmembrane.physics.forward import AT_ONCE, Forward, Solve
+from bayesmembrane.physics.forward import AT_ONCE, Forward, Margins, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 
@@ -83,6 +83,13 @@ class JointPrior:
         mode = mode or self.hypothesis.convexity
         return mode.holds(mode.margin(states, self.hypothesis.material))
 
+    def surely_inside(self, x: Array) -> NDArray[np.bool_]:
+        """(B,) True where x (B, k) are convex in whatever state, and the prior asks for nothing else."""
+        h = self.hypothesis
+        if not h.convexity.looks_beyond:
+            return np.zeros(len(x), dtype=bool)
+        return np.asarray(h.material.convex_everywhere(h.films(x).T), dtype=bool)
+
     def scrambled(self, seed: int) -> list[Scrambled]:
         """`SCRAMBLES` independent sequences of points that fill p0 evenly; others for another hypothesis."""
         h = self.hypothesis
@@ -118,12 +125,27 @@ class JointPrior:
         rows = max(1, AT_ONCE // min(len(measurement), MOST))
         inside = {n: np.empty(len(x), bool) for n in MODES}
         for part in [slice(i, i + rows) for i in range(0, len(x), rows)]:
-            states = forward.margins(x[part])  # of some curves at every reading: not for all films at once
-            for n, mode in MODES.items():
-                inside[n][part] = self.inside(states, mode)
+            found = self._inside_each(forward, x[part])  # of some curves at every reading: not for all films at once
+            for n in MODES:
+                inside[n][part] = found[n]
         masses = {n: _mass(np.sum(i.reshape(SCRAMBLES, each), axis=1), each) for n, i in inside.items()}
         order = np.random.default_rng([seed, 2]).permutation(len(x))
         return masses, x[order][inside[self.hypothesis.convexity.name][order]]
+
+    def _inside_each(self, forward: Forward, x: Array) -> dict[str, NDArray[np.bool_]]:
+        """{mode: (B,) whether it holds} of x (B, k); only films that may miss one are followed."""
+        films = self.hypothesis.films(x)
+        sure = np.asarray(self.hypothesis.material.convex_everywhere(films.T), dtype=bool)
+        unknown = np.full(len(x), np.nan)
+        found = {
+            n: self.inside(Margins(films, unknown, unknown, unknown[:, None], unknown[:, None]), mode)
+            for n, mode in MODES.items()
+        }
+        if not np.all(sure):
+            states = forward.margins(x[~sure])
+            for n, mode in MODES.items():
+                found[n][~sure] = self.inside(states, mode)
+        return found
 
     def masses(
         self, measurement: Measurement, seed: int = 0, draws: int = DRAWS, solve: Solve = api.solve

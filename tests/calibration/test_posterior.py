@@ -91,3 +91,24 @@ def test_many_draws_are_weighed_in_parts(film, monkeypatch) -> None:  # type: ig
     density, curves = posterior.solved_in_parts(p, x)
     np.testing.assert_allclose(density, whole.log_posterior, rtol=1e-9)
     np.testing.assert_allclose(curves, whole.curves, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["yeoh", "gent", "mooney_rivlin"])
+@pytest.mark.parametrize("mode", ["reached", "elliptic"])
+def test_films_that_are_convex_everywhere_are_those_that_the_solver_finds_so(  # type: ignore[no-untyped-def]
+    film, monkeypatch: pytest.MonkeyPatch, name: str, mode: str
+) -> None:
+    """Nothing of the posterior changes where nobody looks beyond the readings of such a film."""
+    curve = film("neo_hookean", (7.5,), points=12).up_to(0.04)
+    p = Posterior(hypothesis(name, convexity=mode), curve)
+    x = p.prior.draw(np.random.default_rng(8), 300)
+    sure = p.prior.surely_inside(x)
+    assert np.any(sure) == (name != "mooney_rivlin")
+    found, log_prior, masses = p.evaluate(x), p.log_prior(x), p.prior.masses(curve, draws=256)
+    monkeypatch.setattr(material(name), "convex_everywhere", lambda p: np.zeros(np.shape(p[0]), dtype=bool))
+    followed = p.evaluate(x)
+    assert np.array_equal(found.log_prior, followed.log_prior)
+    assert np.array_equal(log_prior, followed.log_prior)
+    np.testing.assert_allclose(found.log_likelihood, followed.log_likelihood, rtol=1e-6)
+    assert np.array_equal(found.outcome, followed.outcome)
+    assert masses == p.prior.masses(curve, draws=256)

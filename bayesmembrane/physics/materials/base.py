@@ -90,6 +90,13 @@ class Material(ABC):
         return None
 
     @staticmethod
+    def convex_everywhere(p: Any) -> Any:
+        """True where W is known to be strictly convex in every state that exists, from the parameters alone; False
+        where only the states themselves can tell.
+        """
+        return np.zeros(np.shape(p[0]), dtype=bool)
+
+    @staticmethod
     def extensibility(p: Any) -> Any:
         """The bound on I1 - 3 that no state can pass; infinity unless the chains lock."""
         return np.full(np.shape(p[0]), np.inf)

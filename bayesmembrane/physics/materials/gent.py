@@ -49,6 +49,11 @@ class Gent(Material):
         return of_first(i, 0.0 * ln - p[0] * p[1] * ln, d, d * r / p[1])
 
     @staticmethod
+    def convex_everywhere(p: Any) -> Any:
+        """W rises with K ever faster, and K is convex in the stretches."""
+        return (p[0] > 0) & (p[1] > 0)
+
+    @staticmethod
     def sensitivities(p: Any, l1: Any, l2: Any) -> tuple[tuple[Any, Any, Any], ...]:
         i = first_invariant(l1, l2)
         u = i[0] / p[1]

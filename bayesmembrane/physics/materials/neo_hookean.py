@@ -34,6 +34,11 @@ class NeoHookean(Material):
         return p[0] * i[0], p[0] * i[1], p[0] * i[2], p[0] * i[3], p[0] * i[4], p[0] * i[5]
 
     @staticmethod
+    def convex_everywhere(p: Any) -> Any:
+        """K is convex in the stretches."""
+        return p[0] > 0
+
+    @staticmethod
     def sensitivities(p: Any, l1: Any, l2: Any) -> tuple[tuple[Any, Any, Any], ...]:
         i = first_invariant(l1, l2)
         return (rate_of_first(i, i[0], 1.0),)

@@ -12,6 +12,9 @@ from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.physics.materials.base import LN_GD, Derivatives, Material
 from bayesmembrane.physics.materials.invariants import first_invariant, of_first, rate_of_first
 
+CURVED = 3.1
+"""Bounds g.H^-1 g / K of the gradient g and the Hessian H of K, whose largest value is 3.074 at l1 = l2 = 1.556."""
+
 
 @dataclass(frozen=True)
 class Yeoh(Material):
@@ -44,6 +47,16 @@ class Yeoh(Material):
         k = i[0]
         psi = k * (p[0] + k * (p[1] + k * p[2]))
         return of_first(i, psi, p[0] + k * (2.0 * p[1] + 3.0 * k * p[2]), 2.0 * p[1] + 6.0 * k * p[2])
+
+    @staticmethod
+    def convex_everywhere(p: Any) -> Any:
+        """c1 + (2 + 2 q) c2 K + (3 + 6 q) c3 K^2 > 0 for all K > 0, with q = `CURVED`.
+
+        The Hessian of W is W' H + W'' g g^T with that H of K and its gradient g, and positive where W' + W'' g.H^-1 g
+        is. Where W'' is negative, g.H^-1 g < q K bounds that from below.
+        """
+        linear, square = (2.0 + 2.0 * CURVED) * p[1], (3.0 + 6.0 * CURVED) * p[2]
+        return (p[0] > 0) & (square >= 0) & ((linear >= 0) | (linear * linear < 4.0 * p[0] * square))
 
     @staticmethod
     def sensitivities(p: Any, l1: Any, l2: Any) -> tuple[tuple[Any, Any, Any], ...]:

@@ -167,3 +167,18 @@ def test_the_neo_hookean_film_inside_is_one(material):
     film, plain = material.from_vector(material.from_coordinates(x)), materials()["neo_hookean"](7.5)
     l1, l2 = np.meshgrid(np.linspace(1.0, 4.0, 9), np.linspace(1.0, 4.0, 9))
     np.testing.assert_allclose(film.tension(l1, l2), plain.tension(l1, l2), rtol=1e-5, atol=1e-9)
+
+
+def test_what_is_convex_everywhere_is_so_in_every_state(material):
+    """Also where the film is pressed, and close to the most curved state of K, l1 = l2 = 1.556."""
+    rng = np.random.default_rng(21)
+    x = np.stack([c.prior.draw(rng, 400) for c in material.coordinates])
+    p = material.from_coordinates(x)
+    sure = np.asarray(material.convex_everywhere(p))
+    assert sure.shape == (400,)
+    l1, l2 = np.exp(rng.normal(0.5, 0.7, (2, 500)))
+    l1[:100], l2[:100] = rng.normal(1.556, 0.05, (2, 100))
+    with np.errstate(all="ignore"):
+        _, _, _, w11, w12, w22 = material.derivatives(p[:, sure][:, :, None], l1, l2)
+        convex = (w11 > 0) & (w11 * w22 - w12**2 > 0)
+    assert np.all(convex | np.isnan(w11))
