@@ -129,11 +129,6 @@ def summed(grown: Grown) -> Total:
     guessed = [(key, w + raised[key[1]] + nothing) for key, w in others.items()]
     guessed += [(key, own(f.base) + w + BELIEFS.log_foreign(kinds)) for f, key, w in _sudden(told, grown)]
     p = _normalised(np.array([*(w for _, _, w in terms), *(w for _, w in guessed)]))
-    judged = [
-        _judged(grown, c, float(q), grown.believed(c))
-        for (c, kind, _), q in zip(terms, p[: len(terms)], strict=True)
-        if kind == NOTHING
-    ]
     parts = [(c.hypothesis.material.name, set_name(c, given), kind) for c, kind, _ in terms]
     parts += [(energy, _joined(names - set(given)), NOTHING) for (energy, names), _ in guessed]
     joint, energies = defaultdict[tuple[str, str], float](float), defaultdict[str, float](float)
@@ -143,6 +138,13 @@ def summed(grown: Grown) -> Total:
     for name, q in _untried(grown, every, joint).items():
         joint[name, NOTHING] += q
     both = _flattened(joint)
+    judged = []
+    for (c, kind, _), q in zip(terms, p[: len(terms)].tolist(), strict=True):
+        if kind == NOTHING:
+            key = set_name(c, given), NOTHING
+            of_set = q / joint[key] if q > 0 else 0.0
+            judged.append(_judged(grown, c, of_set * both[key], grown.believed(c)))
+    judged.sort(key=lambda j: -j.probability)
     marginal = Probabilities(_summed_out(both, 0), _falling(BELIEFS.flattened(energies)), _summed_out(both, 1))
     return Total(tuple(judged), marginal, both, tuple(found))
 

@@ -114,6 +114,9 @@ def test_sets_and_energies_are_told_flattened_and_what_is_foreign_is_not(monkeyp
     beside = {k: p for k, p in said.joint.items() if k[1] == NOTHING}
     assert {k: flat.joint[k] for k in beside} == pytest.approx(BELIEFS.flattened(beside))
     assert sum(flat.probabilities.effects.values()) == pytest.approx(1.0)
+    for j in flat.ranking:  # one energy each: what a hypothesis has is what its set has
+        assert j.probability == pytest.approx(flat.joint["+".join(sorted(j.candidate.names)) or NOTHING, NOTHING])
+    assert [j.probability for j in flat.ranking] == sorted((j.probability for j in flat.ranking), reverse=True)
     assert flat.probabilities.energies == pytest.approx(BELIEFS.flattened(said.probabilities.energies))
 
 
