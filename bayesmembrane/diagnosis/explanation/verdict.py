@@ -61,7 +61,7 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     best = _first_of_each_set(total.ranking, given)
     members = tuple(best[name] for name in _smallest(p.effects) if name in best)
     unknown = Verdict("unknown", (), total.ranking, p, strange)
-    if not members or (len(members) > VERDICT.most_members and not p.likely()):
+    if not members or (len(members) > VERDICT.most_members and not p.likely(VERDICT.leads)):
         return unknown
     first = members[0]
     if strange is not None and p.anything_foreign > 0.5 and _carries(strange, first, given):

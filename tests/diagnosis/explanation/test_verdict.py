@@ -70,6 +70,10 @@ def test_an_ambiguous_answer_holds_the_fewest_sets_that_are_enough() -> None:
 def test_too_many_sets_are_no_answer() -> None:
     names = ["friction", "mullins", "tearing", "clamp_slip", "viscoelastic", "hysteresis", "force_drift"]
     assert verdict(dict.fromkeys(names, 1 / 7))[0] == "unknown"
+    assert verdict({"friction": 0.3, **dict.fromkeys(names[1:], 0.7 / 6)})[0] == "unknown"
+    found = verdict({"friction": 0.36, **dict.fromkeys(names[1:], 0.64 / 6)})
+    assert found[0] == "ambiguous"  # a test that decides on friction is worth making
+    assert found[1][0] == "friction"
 
 
 def test_what_is_foreign_and_small_is_told_beside_a_name() -> None:
