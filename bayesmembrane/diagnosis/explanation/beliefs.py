@@ -56,7 +56,8 @@ class Beliefs:
     so (mean 0.68); on seed 35, before, 15 of 35."""
     stands_out: tuple[float, float] = (0.90, 0.95)
     """From the first of these on what is most probable begins to be left as it is, and from the second on it is: on
-    those fresh seeds 45 of 50 were so (mean 0.98). To flatten these, too, takes two names of three, and one wrong one of two."""
+    those fresh seeds 45 of 50 were so (mean 0.98). To flatten these, too, takes two names of three, and one wrong one
+    of two."""
     declared: float = 1 / 3
     """Of the energy that was declared; the others share the rest. Without one, all are equally probable. Twice the odds
     of each of five others: what somebody typed is a hint, and no other question."""
