@@ -30,6 +30,9 @@ FIRST = "yeoh"
 EXPLAINED = 0.2
 """Of the squares beyond noise that the plain model leaves: what an explanation leaves at most."""
 
+SHOWN = 3
+"""Of the members of an ambiguous answer, the most probable ones."""
+
 
 @dataclass(frozen=True, eq=False)
 class Tried:
@@ -77,8 +80,8 @@ class Trial:
 
     @property
     def members(self) -> tuple[Tried, ...]:
-        """The models that the verdict rests on; none of an `adequate` or `unknown` one."""
-        return tuple(t for t in self.tried if t.member)
+        """The models that the verdict rests on, the first `SHOWN`; none of an `adequate` or `unknown` one."""
+        return tuple(t for t in self.tried if t.member)[:SHOWN]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from bayesmembrane.ground.registry import components, material
-from tests.studies.vhb import FIRST, Quick, Trial, Tried
+from tests.studies.vhb import FIRST, SHOWN, Quick, Trial, Tried
 from tests.studies.vhb_data import Cycle, difference, even, scatter
 
 CALCULATED = 1e-6
@@ -45,8 +45,8 @@ def _head(found: Sequence[Cycle], seed: int) -> list[str]:
         f"Made by `python -m tests.studies.vhb --seed {seed}` from measurements that are not part of the project "
         "(uniaxial strips of the acrylic tape VHB 4910, loaded and unloaded once at 0.01, 0.03 and 0.05 1/s to a "
         "stretch of 1.5, 2.0 and 2.5; github.com/Chongran-Zhao/Viscoelastic-fitting, MIT).",
-        "An energy is calibrated on one cycle and diagnosed; what the diagnosis names is added, or every member of the "
-        "set where it is ambiguous. Both models then predict the cycles to the same peak at the other two rates, with "
+        "An energy is calibrated on one cycle and diagnosed; what the diagnosis names is added, or each of the first "
+        f"{SHOWN} members where it is ambiguous. Both models then predict the cycles to the same peak at the other two rates, with "
         "nothing refitted. All errors are root mean squares of the nominal stress over a whole cycle, in kPa. Priors "
         "of effects that are lengths or forces take the strip as 50 mm long, 10 mm wide and 1 mm thick.",
         _times(found),
