@@ -46,9 +46,9 @@ def _head(found: Sequence[Cycle], seed: int) -> list[str]:
         "(uniaxial strips of the acrylic tape VHB 4910, loaded and unloaded once at 0.01, 0.03 and 0.05 1/s to a "
         "stretch of 1.5, 2.0 and 2.5; github.com/Chongran-Zhao/Viscoelastic-fitting, MIT).",
         "An energy is calibrated on one cycle and diagnosed; what the diagnosis names is added, or each of the first "
-        f"{SHOWN} members where it is ambiguous. Both models then predict the cycles to the same peak at the other two rates, with "
-        "nothing refitted. All errors are root mean squares of the nominal stress over a whole cycle, in kPa. Priors "
-        "of effects that are lengths or forces take the strip as 50 mm long, 10 mm wide and 1 mm thick.",
+        f"{SHOWN} members where it is ambiguous. Both models then predict the cycles to the same peak at the other two "
+        "rates, with nothing refitted. All errors are root mean squares of the nominal stress over a whole cycle, in "
+        "kPa. Sizes of effects that are lengths or forces take the strip as 50 mm long, 10 mm wide and 1 mm thick.",
         _times(found),
     ]
 
