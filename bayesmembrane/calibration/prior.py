@@ -85,10 +85,13 @@ class JointPrior:
 
     def surely_inside(self, x: Array) -> NDArray[np.bool_]:
         """(B,) True where x (B, k) are convex in whatever state, and the prior asks for nothing else."""
-        h = self.hypothesis
-        if not h.convexity.looks_beyond:
+        if not self.hypothesis.convexity.looks_beyond:
             return np.zeros(len(x), dtype=bool)
-        return np.asarray(h.material.convex_everywhere(h.films(x).T), dtype=bool)
+        return self._convex_everywhere(self.hypothesis.films(x))
+
+    def _convex_everywhere(self, films: Array) -> NDArray[np.bool_]:
+        """(B,) True where ``films`` (B, n) are known to be convex in every state."""
+        return np.asarray(self.hypothesis.material.convex_everywhere(films.T), dtype=bool)
 
     def scrambled(self, seed: int) -> list[Scrambled]:
         """`SCRAMBLES` independent sequences of points that fill p0 evenly; others for another hypothesis."""
@@ -135,8 +138,7 @@ class JointPrior:
     def _inside_each(self, forward: Forward, x: Array) -> dict[str, NDArray[np.bool_]]:
         """{mode: (B,) whether it holds} of x (B, k); only films that may miss one are followed."""
         films = self.hypothesis.films(x)
-        sure = np.asarray(self.hypothesis.material.convex_everywhere(films.T), dtype=bool)
-        unknown = np.full(len(x), np.nan)
+        sure, unknown = self._convex_everywhere(films), np.full(len(x), np.nan)
         found = {
             n: self.inside(Margins(films, unknown, unknown, unknown[:, None], unknown[:, None]), mode)
             for n, mode in MODES.items()

@@ -477,7 +477,7 @@ class LoopThresholds:
     most_steps: int = 1600
     """Of each ensemble of walkers: where a curve leaves shapes of a law open, they would walk for a quarter of an hour
     (Ogden with Mullins on the synthetic film). The run says that it ended there, and its effective sample size: Yeoh
-    with Mullins there is worth 1100 to 1200 draws by then. A mixture that proposes all of it is no way out: with 150 to
+    with Mullins there is worth 1460 draws by then. A mixture that proposes all of it is no way out: with 150 to
     350 components its weights have tails (k-hat 0.3 to 0.8), and single states hold a chain for hundreds of steps."""
     most_rounds: int = 3
     """Two added effects are as many as a curve can carry; the third round says that nothing more is missing."""

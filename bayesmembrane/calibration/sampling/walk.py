@@ -25,7 +25,6 @@ from bayesmembrane.calibration.sampling.weights import Worth
 from bayesmembrane.calibration.starts import Tried, try_points
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.interrupts import Stop, StopAsked, deferred, never
-from bayesmembrane.ground.jobs import give_back
 from bayesmembrane.ground.parameters import Array
 
 SAVE_AFTER = 10.0  # s: what a run that is killed loses at most, beside the step that it was at
@@ -308,7 +307,6 @@ class _Walk:
         self.saved = time.perf_counter()
         self.standing = (self.chains.steps, self.chains)
         self.ahead, self.unsaved = _Pile(self.chains.steps), _Pile(self.chains.steps)
-        give_back()
         self.known = learn(self.posterior, self.chains)
 
     def learn(self) -> None:
@@ -318,7 +316,6 @@ class _Walk:
             self.chains = replace(self.chains, mixture=None, offered=None, leapt=self.chains.steps)
         self.chains = replace(self.chains, lessons=(*self.chains.lessons, self.chains.steps))
         self.standing = (self.chains.steps, self.chains)
-        give_back()
         self.known = learn(self.posterior, self.chains)
 
     def on_to(self, look: int, asked: StopAsked) -> bool:

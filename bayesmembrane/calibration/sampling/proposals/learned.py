@@ -17,6 +17,7 @@ from bayesmembrane.calibration.sampling.proposals.ensemble import ensemble_moves
 from bayesmembrane.calibration.sampling.proposals.jumping import jumping
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture
 from bayesmembrane.calibration.sampling.proposals.walking import walking
+from bayesmembrane.ground.jobs import give_back
 
 FIRST_LESSON, NEXT_LESSON = 100, 4
 """The proposal is learned from the chains after so many steps, and anew whenever there are so many times as many,
@@ -56,6 +57,7 @@ def learn(posterior: Posterior, chains: Chains) -> Learned:
     """
     if not chains.lessons:
         return Learned()
+    give_back()  # what a walk holds is no use to an emulator
     end = chains.lessons[-1]
     every = -(-(end - end // 4) * chains.log_posterior[:, 0].size // SEEN)
     some, rng = picked(chains.x, np.arange(end // 4, end, every)), np.random.default_rng(end)
