@@ -307,6 +307,8 @@ class ForeignThresholds:
     """Of the readings at either end where no step is looked for: a start or an end is none."""
     widths: tuple[float, ...] = (1e-6, 0.006, 0.018)
     """Of the whole test: how long a step takes, from at once to a few seconds."""
+    rests: tuple[float, ...] = (0.01, 0.03, 0.1)
+    """Of the whole test: in which what has begun comes to rest, as a temperature does."""
     waves: int = 800
     """Waves that are tried over time, and as many over deflection, at most."""
     wave_step: float = 0.35

@@ -37,6 +37,11 @@ class Reach:
         """How many times as large a size of this unit is here as in `SOURCE`; 1 of what is no part of anything."""
         return self.by_unit.get(unit, 1.0) / SOURCE.by_unit.get(unit, 1.0)
 
+    @property
+    def lasts(self) -> float:
+        """How many times as long as `SOURCE`."""
+        return self.duration / SOURCE.duration
+
 
 SOURCE = Reach(0.0915, 2.25, 35.0)
 """That of the operating point OP1 of the source, for which effects declare the priors of their sizes."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -127,7 +127,6 @@ def summed(grown: Grown) -> Total:
     told = [f for f in found if f.counted(counts) > BELIEFS.supported]
     terms += [(f.base, f.kind, own(f.base) + f.counted(counts) + BELIEFS.log_foreign(kinds)) for f in told]
     guessed = [(key, w + raised[key[1]] + nothing) for key, w in others.items()]
-    guessed += [(key, own(f.base) + w + BELIEFS.log_foreign(kinds)) for f, key, w in _sudden(told, grown)]
     p = _normalised(np.array([*(w for _, _, w in terms), *(w for _, w in guessed)]))
     parts = [(c.hypothesis.material.name, set_name(c, given), kind) for c, kind, _ in terms]
     parts += [(energy, _joined(names - set(given)), NOTHING) for (energy, names), _ in guessed]
@@ -157,19 +156,6 @@ def _flattened(joint: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], 
     whole = sum(joint.values())
     flat = {kind: BELIEFS.flattened(sets) for kind, sets in kinds.items()}
     return _falling({(name, kind): q / whole for kind, sets in flat.items() for name, q in sets.items()})
-
-
-def _sudden(told: Sequence[Foreign], grown: Grown) -> Iterator[tuple[Foreign, Key, float]]:
-    """(what is foreign, the set of an effect that may come as it does, ln of the Bayes factor): twins of each other.
-
-    A tear may come in a hold or in a later cycle, where no law has a moment for it.
-    """
-    for f in told:
-        for e in grown.case.visible if f.falls else []:
-            names = frozenset((*f.base.names, e.name))
-            if e.sudden and len(names - set(grown.case.null.names)) <= BELIEFS.most:
-                gain = f.counted(grown.counts) - float(np.log(BELIEFS.apart))
-                yield f, (f.base.hypothesis.material.name, names), gain
 
 
 def _untried(grown: Grown, every: Sequence[Candidate], joint: Mapping[tuple[str, str], float]) -> dict[str, float]:

@@ -32,13 +32,15 @@ class EffectParameter(Parameter):
     """A parameter of an effect, in SI; priors and bounds of lengths, forces and their rates are those of `SOURCE`.
 
     null : the value at which the effect vanishes, exactly; None for a shape, which means nothing once it has vanished
+    of_the_test : True of a time that is a part of the test's duration, and no time of the film or the rig
     """
 
     null: float | None = None
+    of_the_test: bool = False
 
     def on(self, reach: Reach) -> Self:
         """The same where a test goes so far: what is a part of that grows with it."""
-        factor = reach.times(self.unit)
+        factor = reach.lasts if self.of_the_test else reach.times(self.unit)
         low, high = self.bounds
         null = None if self.null is None else factor * self.null
         return replace(self, prior=self.prior.times(factor), bounds=(factor * low, factor * high), null=null)
@@ -95,7 +97,6 @@ class Effect(ABC):
     constant : True if its parameters are then the same in all of them; those of others belong to what a test reached
     twins_at_one_speed : names of effects that only another speed, or a hold, tells from this one
     twins_at_any_speed : names of effects that only the shape of its law tells from this one, whatever the motion
-    sudden : True if it may come at any moment, as a fall of the force by a factor that stays
     odds : how often it is met beside the others, before anything is measured
     rank : orders effects within a stage; equal ranks go by name
 
@@ -120,7 +121,6 @@ class Effect(ABC):
     constant: ClassVar[bool] = False
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ()
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ()
-    sudden: ClassVar[bool] = False
     odds: ClassVar[float] = 1.0
     rank: ClassVar[int] = 0
     stage: ClassVar[str]

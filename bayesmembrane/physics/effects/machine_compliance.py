@@ -34,7 +34,7 @@ class MachineCompliance(Compliance):
     remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("compliance", "m/N", "travel lost by the first newton", Lomax(5e-4), (0.0, 1e-2), 0.0),
-        EffectParameter("exponent", "-", "of the force that the travel lost grows with", Normal(0.9, 0.15), (0.4, 1.4)),
+        EffectParameter("exponent", "-", "of the force that the travel lost grows with", Normal(0.8, 0.16), (0.3, 1.4)),
     )
 
     def yielding(self, p: Array, force: Array) -> tuple[Array, Array]:

@@ -7,17 +7,22 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.ground.parameters import Array, HalfNormal
-from bayesmembrane.physics.effects._history import EXPONENT, JUMP, JUMPS, PLACE, REPEATED, growth, jumped
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
+from bayesmembrane.physics.effects._history import EXPONENT, JUMP, REPEATED, SATURATION, growth
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
+from bayesmembrane.physics.reach import SOURCE
+
+PLACES = (0.15, 0.27, 0.39, 0.51, 0.63, 0.75, 0.87)
+"""Of the duration: moments to begin a search with, for one is found from nearby only."""
 
 
 @dataclass(frozen=True)
 class Tearing(Carried):
-    """F = F0 exp(-loss [(1 - jump) G + jump / (1 + exp((place - m / D) / w))]), w = 0.015.
+    """F = F0 exp(-loss [(1 - jump) G + jump (1 - exp(-(t - moment) / takes))]), the second part from the moment on.
 
-    G is the growth law of the test (1 after a first loading to its full range D), m the largest deflection so far: a
-    film tears little by little, and by a jump.
+    G is the growth law of the test (1 after a first loading to its full range), t the time since its start: a film tears
+    little by little as it is stretched, and runs at some moment, be it in a hold, until the tear comes to rest. Without
+    times the clock is the distance travelled at 1 mm/s.
     """
 
     name: ClassVar[str] = "tearing"
@@ -28,21 +33,39 @@ class Tearing(Carried):
         "nothing comes back."
     )
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("mullins",)  # with damage alone both are less by what was reached
-    sudden: ClassVar[bool] = True  # in a hold or a later cycle too, where its law knows no moment
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "loss", "-", "log of the part that still carries, after a first loading", HalfNormal(0.1), (0.0, 3.0), 0.0
         ),
         EXPONENT,
         REPEATED,
+        SATURATION,
         JUMP,
-        PLACE,
+        EffectParameter(
+            "moment",
+            "s",
+            "when a tear runs",
+            Uniform(0.0, SOURCE.duration),
+            (0.0, SOURCE.duration),
+            of_the_test=True,
+        ),
+        EffectParameter(
+            "takes",
+            "s",
+            "time after which it has nearly come to rest",
+            LogNormal(0.02 * SOURCE.duration, 0.95),
+            (0.001 * SOURCE.duration, 0.5 * SOURCE.duration),
+            of_the_test=True,
+        ),
     )
 
     @property
     def starts(self) -> list[dict[str, float]]:
-        return [*JUMPS]
+        whole = self.coordinates[5].bounds[1]
+        return [{"jump": 0.05}, *({"jump": 0.6, "moment": part * whole, "takes": 0.03 * whole} for part in PLACES)]
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
-        slow = growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path)
-        return np.asarray(force * np.exp(-p[:, :1] * jumped(p[:, 3:4], p[:, 4:5], slow, state.reached, state.path)))
+        slow = growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path, p[:, 3:4])
+        since = np.maximum(state.path.clock - p[:, 5:6], 0.0)
+        ran = -np.expm1(-since / p[:, 6:7])
+        return np.asarray(force * np.exp(-p[:, :1] * ((1 - p[:, 4:5]) * slow + p[:, 4:5] * ran)))

@@ -23,7 +23,7 @@ from bayesmembrane.physics.hypothesis import hypothesis
 
 LEFT = 100.0
 FOUR = (1.0,) * 4  # odds of all effects
-TRIED = [SimpleNamespace(odds=1.0, name=n, sudden=False) for n in ("friction", "mullins")]
+TRIED = [SimpleNamespace(odds=1.0, name=n) for n in ("friction", "mullins")]
 
 
 def candidate(*effects: str, log_evidence: float, energy: str = "gent") -> Candidate:
@@ -136,30 +136,6 @@ def test_a_further_effect_that_nobody_fitted_is_not_excluded(monkeypatch: pytest
         assert p["friction+tearing"] / p["friction"] == pytest.approx(kept)
         assert p["friction+mullins"] / p["friction"] == pytest.approx(nothing["friction+mullins"] / nothing["friction"])
     assert [sum(p.values()) for p in found.values()] == pytest.approx([1.0, 1.0])
-
-
-@pytest.mark.parametrize("name", ["tearing", "friction"])
-def test_a_fall_that_stays_is_shared_with_an_effect_that_may_come_so(
-    monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    """A tear in a hold is at most twelve times less probable than what is foreign, beside the same set."""
-    tear = [SimpleNamespace(odds=1.0, name=name, sudden=True)]
-    own = "friction" if name == "friction" else "friction+tearing"
-    found = summed_up(monkeypatch, seen=0.0, gain=-1.0, untried=tear, step={"relative": True, "size": -0.1})
-    beside = found.joint["friction", SUDDEN]
-    assert beside > 0.9
-    plain = summed_up(monkeypatch, seen=0.0, gain=-1.0, untried=tear).joint
-    odds = BELIEFS.log_foreign(1) + BELIEFS.counts(50.0) * 30.0 - BELIEFS.log_foreign(0)
-    expected = beside / BELIEFS.apart + plain.get((own, NOTHING), 0.0) * beside / np.exp(odds)
-    assert found.joint[own, NOTHING] == pytest.approx(expected, rel=1e-3)
-
-
-@pytest.mark.parametrize("step", [{"relative": True, "size": 0.1}, {"relative": False, "size": -0.1}])
-def test_a_rise_and_a_fall_by_a_constant_are_no_tear(monkeypatch: pytest.MonkeyPatch, step: dict[str, Any]) -> None:
-    tear = [SimpleNamespace(odds=1.0, name="tearing", sudden=True)]
-    assert ("friction+tearing", NOTHING) not in summed_up(
-        monkeypatch, seen=0.0, gain=-1.0, untried=tear, step=step
-    ).joint
 
 
 def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monkeypatch: pytest.MonkeyPatch) -> None:
