@@ -26,6 +26,8 @@ CONTRADICTED = 0.1
 """Of all readings: where legs turn, as many may be counted to the other one."""
 NOMINAL_SPEED = 1e-3
 """m/s: without times the disc counts as moved at this speed, so that a second is a millimetre of travel."""
+OVER = 0.98
+"""Of the largest deflection of a first leg: a loading is all but over there, and what follows may be a hold."""
 SLOWEST = 1e-3
 """Of the largest speed of a path: below it the disc counts as moving this fast."""
 
@@ -89,6 +91,15 @@ class Motion:
         if self.time.size > 1 and self.steps[1] > 0:
             start = self.steps[0] * (self.time[1] - self.time[0]) / self.steps[1]
         return np.asarray(self.time - self.time[0] + min(start, float(self.time[-1] - self.time[0])))
+
+    @cached_property
+    def pace(self) -> float:
+        """m/s: mean speed of the first loading, until it is all but over; `NOMINAL_SPEED` without times."""
+        turns = np.flatnonzero(np.diff(self.leg))
+        first = self.deflection[: int(turns[0]) + 1 if turns.size else None]
+        there = int(np.argmax(first >= OVER * np.max(first)))
+        took, went = float(self.clock[there]), float(first[there])
+        return went / took if self.time is not None and took > 0 and went > 0 else NOMINAL_SPEED
 
     @cached_property
     def speed(self) -> Array:

@@ -6,12 +6,17 @@ import numpy as np
 import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import materials
+from bayesmembrane.physics.effects._history import growth
+from bayesmembrane.physics.effects.base import FilmState
 from bayesmembrane.physics.effects.machine_compliance import MachineCompliance
+from bayesmembrane.physics.effects.tearing import Tearing
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import Status, request, solve
+from bayesmembrane.physics.reach import Reach
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.physics.effects.protocols import FILMS, RIG, force, measured, path, staircase, timeless, two_speeds, vector
 
@@ -139,19 +144,45 @@ def test_what_grows_never_shrinks(name: str) -> None:
     assert loading[-1] < 0.99 * loading[0]
 
 
-@pytest.mark.parametrize(
-    ("name", "x"), [("clamp_slip", [0.03, 2.0, 0.0, 0.0, 1.0, 0.5]), ("tearing", [0.1, 2.0, 0.0, 1.0, 0.5])]
-)
-def test_what_comes_at_once_comes_at_its_place_and_stays(name: str, x: list[float]) -> None:
-    """As a clamp that sticks until it slips: nothing before that deflection is reached for the first time."""
+def test_a_clamp_that_slips_at_once_does_so_at_its_place_and_stays() -> None:
+    """As one that sticks until then: nothing before that deflection is reached for the first time."""
     m = measured(staircase((0.02, 0.06, 0.02), 400))
-    f, plain = force(m, name, x=np.array(x)), force(m)
+    f, plain = force(m, "clamp_slip", x=np.array([0.03, 2.0, 0.0, 0.0, 1.0, 0.5, 0.5])), force(m)
     first, last = m.cycle == 1, m.cycle == 3
     over = (m.cycle == 2) & (m.leg > 0) & (m.deflection > 0.034)
     assert f[first] == pytest.approx(plain[first], rel=1e-2)
     assert np.all(f[over] < 0.98 * plain[over])
     well = last & (m.deflection > 0.012)
     assert np.all(f[well] < 0.98 * plain[well])
+
+
+def test_a_tear_runs_at_its_moment_in_a_hold_too_and_comes_to_rest() -> None:
+    """Half a minute up, a minute of hold, half a minute down; from 50 s on a tenth is lost, within some seconds."""
+    time = np.arange(1.0, 121.0)
+    d = np.interp(time, [0, 30, 90, 120], [0, 0.06, 0.06, 0])
+    m = measured(d, time)
+    whole, plain = float(m.path.clock[-1]), force(m)
+    torn = Tearing().on(Reach(0.06, 1.0, whole))
+    clock = m.path.clock
+    p = np.array([[0.1, 2.0, 0.0, 0.0, 1.0, 50.0, 3.0, 0.5]])
+    f = torn.carried(p, plain[None], FilmState(m.path, d[None], plain[None], plain[None]))[0]
+    assert f[clock <= 50] == pytest.approx(plain[clock <= 50])
+    assert f[clock > 50] == pytest.approx(plain[clock > 50] * np.exp(-0.1 * -np.expm1(-(clock[clock > 50] - 50) / 3)))
+    moment = next(c for c in torn.coordinates if c.name == "moment")
+    assert moment.bounds == (0.0, pytest.approx(whole))
+
+
+def test_what_creeps_grows_in_a_hold_and_on_a_first_loading_like_what_does_not() -> None:
+    a, c = np.array([[0.5], [2.0], [4.0]]), np.array([[0.4], [1.0], [1.0]])
+    time = np.concatenate([np.linspace(1, 40, 40), np.linspace(41, 100, 60)])
+    d = np.interp(time, [0, 40], [0, 0.06])
+    held = Motion(d, time, 0.06)
+    crept, not_crept = (growth(a, c, np.tile(d, (3, 1)), held, 0.0, np.full((3, 1), q)) for q in (1.0, 0.0))
+    assert held.pace == pytest.approx(0.06 / 40)
+    assert crept[:, :40] == pytest.approx(not_crept[:, :40], rel=1e-6)
+    # In the hold (x / D)^a is one: it goes on by (a + 1) c v t / D.
+    assert crept[:, -1] - 1.0 == pytest.approx(((a + 1) * c)[:, 0] * 60 / 40, rel=1e-6)
+    assert not_crept[:, -1] == pytest.approx(1.0)
 
 
 def test_slip_of_a_longer_film_is_a_film_of_that_length() -> None:
@@ -297,8 +328,6 @@ def test_an_effect_of_another_rig_is_refused() -> None:
 
 
 def test_growth_is_the_same_function_of_path_for_any_sampling() -> None:
-    from bayesmembrane.physics.effects._history import growth
-
     coarse, fine = staircase((0.03, 0.03, 0.06), 11), staircase((0.03, 0.03, 0.06), 201)
     a, c = np.array([[0.5], [2.0], [4.0]]), np.array([[0.0], [0.3], [1.0]])
     ends = [growth(a, c, np.tile(d, (3, 1)), path(d))[:, -1] for d in (coarse, fine)]

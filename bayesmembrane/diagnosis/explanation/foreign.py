@@ -80,7 +80,10 @@ def beside(search: Search, bases: Sequence[Candidate], others: Sequence[Candidat
     if len(search.measurement) >= FOREIGN.least_points:
         smooth = smooth_reference(search.measurement)
         for base in others:
-            both: tuple[Finder, ...] = (partial(_of_family, base, _steps(search.measurement, base)), partial(_clipped, base))
+            both: tuple[Finder, ...] = (
+                partial(_of_family, base, _steps(search.measurement, base)),
+                partial(_clipped, base),
+            )
             found += [f for f in (_with_its_own_noise(search, smooth, find) for find in both) if f is not None]
     return sorted(found, key=lambda f: -(f.gain + f.base.log_evidence))
 

@@ -23,30 +23,49 @@ REPEATED = EffectParameter(
     Uniform(0.0, 1.0),
     (0.0, 1.0),
 )
+CREEPS = EffectParameter(
+    "creeps", "-", "part of that which grows with time under load, in holds too", Uniform(0.0, 1.0), (0.0, 1.0)
+)
 JUMP = EffectParameter("jump", "-", "part of it that comes at once", Uniform(0.0, 1.0), (0.0, 1.0))
 PLACE = EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1))
 WIDTH = 0.015
 """Of the full range, in which a jump comes."""
+STILL = 1e-7
+"""Of the full range: a smaller step is none, and the mean of a power over it the power itself."""
 JUMPS = tuple({"jump": 0.6, "place": place} for place in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9))
 """Shapes to begin a search with: a jump is found from nearby only."""
 
 
-def growth(exponent: Array, repeated: Array, deflection: Array, path: Motion, saturation: Array | float = 0.0) -> Array:
-    """G (B, N) = (1 - c) H + c (a + 1) sum over loading steps of (x / D)^a dx / D, never falling; with
-    H = (1 + s) (m / D)^a / (1 + s (m / D)^a).
+def growth(
+    exponent: Array,
+    repeated: Array,
+    deflection: Array,
+    path: Motion,
+    saturation: Array | float = 0.0,
+    creeps: Array | float = 0.0,
+) -> Array:
+    """G (B, N) = (1 - c) H + c (a + 1) [(1 - q) sum over loading steps of (x / D)^a dx / D + q int (x / D)^a v dt / D],
+    never falling; with H = (1 + s) (m / D)^a / (1 + s (m / D)^a).
 
-    m is the largest deflection so far, D the full range of the test, a ``exponent``, c ``repeated`` and s
-    ``saturation``, each (B, 1): a power if s = 0, a threshold or a quick rise that comes to its end if not. A first
-    loading up to D ends at G = 1 for any of them; the second part goes on growing when it is repeated.
+    m is the largest deflection so far, D the full range of the test, v the `pace` of its first loading, a ``exponent``,
+    c ``repeated``, s ``saturation`` and q ``creeps``, each (B, 1): a power if s = 0, a threshold or a quick rise that
+    comes to its end if not. A first loading up to D at one speed ends at G = 1 for any of them; the second part goes on
+    growing when it is repeated, and the last one while the film is stretched, be it held.
     """
     x = np.maximum(deflection, 0.0) / path.full_range
     power = running_max(x) ** exponent
     first = (1 + saturation) * power / (1 + saturation * power)
     if not np.any(repeated > 0):
         return first
-    power = np.maximum(x, 0.0) ** (exponent + 1)
-    step = np.maximum(np.diff(power, axis=-1, prepend=0.0), 0.0)
-    return np.asarray((1 - repeated) * first + repeated * np.cumsum(step, axis=-1))
+    step = np.diff(x ** (exponent + 1), axis=-1, prepend=0.0)
+    again = np.maximum(step, 0.0)
+    if np.any(np.asarray(creeps) > 0):
+        moved = np.diff(x, axis=-1, prepend=0.0)
+        still = np.abs(moved) < STILL
+        load = np.where(still, (exponent + 1) * x**exponent, step / np.where(still, 1.0, moved))
+        held = load * np.diff(path.clock, prepend=0.0) * (path.pace / path.full_range)
+        again = (1 - creeps) * again + creeps * held
+    return np.asarray((1 - repeated) * first + repeated * np.cumsum(again, axis=-1))
 
 
 def jumped(jump: Array, place: Array, slow: Array, reached: Array, path: Motion) -> Array:

@@ -7,7 +7,17 @@ from typing import ClassVar
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal
-from bayesmembrane.physics.effects._history import EXPONENT, JUMP, JUMPS, PLACE, REPEATED, SATURATION, growth, jumped
+from bayesmembrane.physics.effects._history import (
+    CREEPS,
+    EXPONENT,
+    JUMP,
+    JUMPS,
+    PLACE,
+    REPEATED,
+    SATURATION,
+    growth,
+    jumped,
+)
 from bayesmembrane.physics.effects.base import EffectParameter, Slack, running_max
 
 
@@ -39,6 +49,7 @@ class ClampSlip(Slack):
         SATURATION,
         JUMP,
         PLACE,
+        CREEPS,
     )
 
     @property
@@ -46,6 +57,6 @@ class ClampSlip(Slack):
         return [{"jump": 0.05, "place": 0.5}, *JUMPS]
 
     def excess(self, p: Array, deflection: Array, path: Motion) -> Array:
-        slow = growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4])
+        slow = growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4], p[:, 6:7])
         reached = running_max(deflection)
         return p[:, :1] * jumped(p[:, 4:5], p[:, 5:6], slow, reached, path)

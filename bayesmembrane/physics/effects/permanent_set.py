@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, Uniform
-from bayesmembrane.physics.effects._history import EXPONENT, REPEATED, SATURATION, growth
+from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, REPEATED, SATURATION, growth
 from bayesmembrane.physics.effects.base import Deflection, EffectParameter, running_max
 
 
@@ -45,11 +45,12 @@ class PermanentSet(Deflection):
         ),
         REPEATED,
         SATURATION,
+        CREEPS,
     )
 
     def deflect(self, p: Array, deflection: Array, path: Motion) -> Array:
         largest = running_max(deflection)
-        lasting = p[:, :1] * growth(p[:, 1:2], p[:, 3:4], deflection, path, p[:, 4:5])
+        lasting = p[:, :1] * growth(p[:, 1:2], p[:, 3:4], deflection, path, p[:, 4:5], p[:, 5:6])
         with np.errstate(all="ignore"):
             part = np.where(largest > 0, np.maximum(deflection, 0.0) / largest, 0.0)
         return np.asarray(deflection - lasting * (1 - p[:, 2:3] * part))

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
-from bayesmembrane.physics.effects._history import EXPONENT, JUMP, REPEATED, SATURATION, growth
+from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, growth
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 from bayesmembrane.physics.reach import SOURCE
 
@@ -20,9 +20,9 @@ PLACES = (0.15, 0.27, 0.39, 0.51, 0.63, 0.75, 0.87)
 class Tearing(Carried):
     """F = F0 exp(-loss [(1 - jump) G + jump (1 - exp(-(t - moment) / takes))]), the second part from the moment on.
 
-    G is the growth law of the test (1 after a first loading to its full range), t the time since its start: a film tears
-    little by little as it is stretched, and runs at some moment, be it in a hold, until the tear comes to rest. Without
-    times the clock is the distance travelled at 1 mm/s.
+    G is the growth law of the test (1 after a first loading to its full range), t the time since its start: a film
+    tears little by little as it is stretched, and a tear runs at some moment, be it in a hold, and comes to rest.
+    Without times the clock is the distance travelled at 1 mm/s.
     """
 
     name: ClassVar[str] = "tearing"
@@ -57,6 +57,7 @@ class Tearing(Carried):
             (0.001 * SOURCE.duration, 0.5 * SOURCE.duration),
             of_the_test=True,
         ),
+        CREEPS,
     )
 
     @property
@@ -65,7 +66,7 @@ class Tearing(Carried):
         return [{"jump": 0.05}, *({"jump": 0.6, "moment": part * whole, "takes": 0.03 * whole} for part in PLACES)]
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
-        slow = growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path, p[:, 3:4])
+        slow = growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path, p[:, 3:4], p[:, 7:8])
         since = np.maximum(state.path.clock - p[:, 5:6], 0.0)
         ran = -np.expm1(-since / p[:, 6:7])
         return np.asarray(force * np.exp(-p[:, :1] * ((1 - p[:, 4:5]) * slow + p[:, 4:5] * ran)))
