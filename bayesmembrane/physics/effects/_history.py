@@ -53,17 +53,18 @@ def growth(
     growing when it is repeated, and the last one while the film is stretched, be it held.
     """
     x = np.maximum(deflection, 0.0) / path.full_range
-    power = running_max(x) ** exponent
+    load = x**exponent
+    power = running_max(load)
     first = (1 + saturation) * power / (1 + saturation * power)
     if not np.any(repeated > 0):
         return first
-    step = np.diff(x ** (exponent + 1), axis=-1, prepend=0.0)
+    step = np.diff(x * load, axis=-1, prepend=0.0)
     again = np.maximum(step, 0.0)
     if np.any(np.asarray(creeps) > 0):
         moved = np.diff(x, axis=-1, prepend=0.0)
         still = np.abs(moved) < STILL
-        load = np.where(still, (exponent + 1) * x**exponent, step / np.where(still, 1.0, moved))
-        held = load * np.diff(path.clock, prepend=0.0) * (path.pace / path.full_range)
+        mean = np.where(still, (exponent + 1) * load, step / np.where(still, 1.0, moved))
+        held = mean * np.diff(path.clock, prepend=0.0) * (path.pace / path.full_range)
         again = (1 - creeps) * again + creeps * held
     return np.asarray((1 - repeated) * first + repeated * np.cumsum(again, axis=-1))
 
@@ -102,3 +103,35 @@ def _follow(values, gap, start, out):  # type: ignore[no-untyped-def]
             h = e * h + s * (values[b, n] - before)
             before = values[b, n]
             out[b, n] = h
+
+
+def relaxing(values: Array, gap: Array, times: Array) -> Array:
+    """(B, N) mean over T ``times`` (B, T) of h, which relaxes to where ``values`` (B, N) moves it:
+    h_n = e_n h_(n-1) + s_n (v_n - v_(n-1)), from zero.
+
+    Exact for values that move evenly over each ``gap`` (N,) of time, with g the gap in relaxation times: e = exp(-g)
+    and s = (1 - e) / g. The values come from zero to the first one over its own gap.
+    """
+    out = np.zeros_like(values)
+    _relax(values, np.ascontiguousarray(gap, dtype=float), np.ascontiguousarray(times, dtype=float), out)
+    return out / times.shape[1]
+
+
+@compiled(error_model="numpy")
+def _relax(values, gap, times, out):  # type: ignore[no-untyped-def]
+    for b in range(values.shape[0]):
+        for t in range(times.shape[1]):
+            h, before, length, e, s = 0.0, 0.0, -1.0, 1.0, 1.0
+            for n in range(values.shape[1]):
+                if gap[n] != length:  # of an even clock one exponential is enough
+                    length = gap[n]
+                    g = length / times[b, t]
+                    if g > 1e-6:
+                        e = np.exp(-g)
+                        s = (1.0 - e) / g
+                    else:
+                        e = 1.0 - g
+                        s = 1.0 - 0.5 * g
+                h = e * h + s * (values[b, n] - before)
+                before = values[b, n]
+                out[b, n] += h

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Uniform
-from bayesmembrane.physics.effects._history import follow
+from bayesmembrane.physics.effects._history import relaxing
 from bayesmembrane.physics.effects.base import EffectParameter, Memory
 
 TERMS = 6
@@ -66,12 +66,9 @@ class Viscoelastic(Memory):
 
     def remember(self, p: Array, force: Array, path: Motion) -> Array:
         gap = np.diff(path.clock, prepend=0.0)
-        start = np.zeros(len(p))
         weight = (1 + np.abs(path.deflection) / path.full_range) ** p[:, 4:5]
-        driven, kept = force / weight, np.zeros_like(force)
-        for place in (np.arange(TERMS) + 0.5) / TERMS - 0.5:
-            time = p[:, 1:2] * 10.0 ** (place * p[:, 2:3])
-            kept += follow(driven, gap / time, start) / TERMS
-        relaxed = force - p[:, :1] * (force - weight * kept)
+        places = (np.arange(TERMS) + 0.5) / TERMS - 0.5
+        kept = weight * relaxing(force / weight, gap, p[:, 1:2] * 10.0 ** (places * p[:, 2:3]))
+        relaxed = force - p[:, :1] * (force - kept)
         least = np.minimum(force, 0.0)
         return np.asarray(np.maximum(relaxed, least) + p[:, 3:4] * np.minimum(relaxed - least, 0.0))
