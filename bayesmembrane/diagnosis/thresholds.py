@@ -281,7 +281,7 @@ class TwinsThresholds:
     alike: float = 0.05
     """Of the misfit beyond noise: a set that leaves more than this beyond its twin does not fit as it does. It is the
     square of a law that is 22 % off."""
-    behind: float = 8.0
+    behind: float = 12.0
     """ln of the Bayes factor: a set that is further behind its twin is told apart all the same, whatever it leaves, for
     laws of the deflection alone are nearly exact. On the calibration half of `make study-reliability` (cases 60 to 123)
     sets that were levelled at a gap of 10 to 60 were the wrong ones, each of three times."""

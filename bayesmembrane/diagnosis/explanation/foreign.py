@@ -64,6 +64,11 @@ class Foreign:
     soft: float = 0.0
     limit: Limit | None = None
 
+    @property
+    def falls(self) -> bool:
+        """True if the force falls at some moment, and stays lower."""
+        return self.kind == SUDDEN and self.size < 0
+
     def counted(self, counts: float) -> float:
         """ln of the Bayes factor of which a part ``counts``: laws may be off, yet not where a thing could have been."""
         return counts * (self.gain - self.chance) + self.chance

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -125,7 +125,8 @@ def summed(grown: Grown) -> Total:
     terms = [(c, NOTHING, weight(c) + nothing) for c in every]
     # What the data do not speak for is neither seen nor excluded.
     told = [f for f in found if f.counted(counts) > BELIEFS.supported]
-    terms += [(f.base, f.kind, own(f.base) + f.counted(counts) + BELIEFS.log_foreign(kinds)) for f in told]
+    strange = [own(f.base) + f.counted(counts) + BELIEFS.log_foreign(kinds) for f in told]
+    terms += [(f.base, f.kind, max(w, _like_a_tear(f, every, weight))) for f, w in zip(told, strange, strict=True)]
     guessed = [(key, w + raised[key[1]] + nothing) for key, w in others.items()]
     p = _normalised(np.array([*(w for _, _, w in terms), *(w for _, w in guessed)]))
     parts = [(c.hypothesis.material.name, set_name(c, given), kind) for c, kind, _ in terms]
@@ -156,6 +157,25 @@ def _flattened(joint: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], 
     whole = sum(joint.values())
     flat = {kind: BELIEFS.flattened(sets) for kind, sets in kinds.items()}
     return _falling({(name, kind): q / whole for kind, sets in flat.items() for name, q in sets.items()})
+
+
+def _like_a_tear(f: Foreign, every: Sequence[Candidate], weight: Callable[[Candidate], float]) -> float:
+    """ln of the least weight of a force that falls at some moment: a part of that of an effect which comes so.
+
+    Where it stands nearly as well as the same energy with a tear beside the same set, neither is told to be more than
+    `BELIEFS.apart` times as probable: what warms up, or a cell whose zero moves, leaves the same trace.
+    """
+    stands, energy = f.base.log_evidence + f.gain - f.chance, f.base.hypothesis.material
+    tears = [
+        weight(c)
+        for c in every
+        if f.falls
+        and c.hypothesis.material is energy
+        and c.log_evidence - stands < TWINS.behind
+        and len(c.names) == len(f.base.names) + 1
+        and all(e.sudden or e.name in f.base.names for e in c.hypothesis.effects)
+    ]
+    return max(tears, default=-np.inf) - float(np.log(BELIEFS.apart))
 
 
 def _untried(grown: Grown, every: Sequence[Candidate], joint: Mapping[tuple[str, str], float]) -> dict[str, float]:
