@@ -116,10 +116,11 @@ Effects act in this order, in whatever order they are named, and each is one fil
 - The frame yields to the force of the film after everything that it remembers, by a fixed point at every point of the
   curve; what the load cell adds comes after.
 - `clamp_slip`, `permanent_set` and `tearing` keep their mechanism, but grow by a law with a free power, since a machine
-  does not follow the power of a textbook: G = (1 - c) H + c (a + 1) int (x / D)^a dx / D over all loading, with
-  H = (1 + s) (m / D)^a / (1 + s (m / D)^a) of the largest deflection m so far. One first loading to D ends at G = 1; c
-  is the part that grows on when it is repeated, s says how far growth has saturated (slip and set only).
-  A clamp also slips, and a film tears, at once: `jump` is the part of it that comes at `place`.
+  does not follow the power of a textbook: G = (1 - c) H + c (a + 1) [(1 - q) int (x / D)^a dx / D over all loading
+  + q int (x / D)^a v dt / D], with H = (1 + s) (m / D)^a / (1 + s (m / D)^a) of the largest deflection m so far and v
+  the mean speed of the first loading. One first loading to D at one speed ends at G = 1; c is the part that grows on
+  when it is repeated, q what of that creeps, in a hold too, and s says how far growth has saturated.
+  A clamp also slips at once where a deflection is reached, and a tear runs at some moment and comes to rest.
 - One-sided effects have their null value as a bound.
 - Lengths, forces and their rates are parts of what a test reaches: priors and bounds stand here as on OP1 of the source
   (91.5 mm of full range, 2.25 N, 35 s), and grow with the full range D, the largest force and the duration. Where

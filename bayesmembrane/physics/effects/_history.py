@@ -114,7 +114,7 @@ def relaxing(values: Array, gap: Array, times: Array) -> Array:
     """
     out = np.zeros_like(values)
     _relax(values, np.ascontiguousarray(gap, dtype=float), np.ascontiguousarray(times, dtype=float), out)
-    return out / times.shape[1]
+    return np.asarray(out / times.shape[1])
 
 
 @compiled(error_model="numpy")

@@ -26,7 +26,7 @@ class PermanentSet(Deflection):
     reference: ClassVar[str] = "A. Dorfmann, R. W. Ogden, Int. J. Solids Struct. 41 (2004) 1855"
     signature: ClassVar[str] = (
         "After each new maximum the film comes back slack: unloading reaches zero force before zero deflection, "
-        "reloading starts there, and the shift grows with the largest deflection, not with time."
+        "reloading starts there, and the shift grows with the largest deflection."
     )
     rank: ClassVar[int] = 1
     of_the_material = True

@@ -17,6 +17,7 @@ from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, Foreign
 from bayesmembrane.diagnosis.explanation.growth import Grown
 from bayesmembrane.diagnosis.explanation.total import NOTHING
+from bayesmembrane.diagnosis.thresholds import TWINS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -136,6 +137,19 @@ def test_a_further_effect_that_nobody_fitted_is_not_excluded(monkeypatch: pytest
         assert p["friction+tearing"] / p["friction"] == pytest.approx(kept)
         assert p["friction+mullins"] / p["friction"] == pytest.approx(nothing["friction+mullins"] / nothing["friction"])
     assert [sum(p.values()) for p in found.values()] == pytest.approx([1.0, 1.0])
+
+
+def test_a_fall_that_stays_is_at_most_twelve_times_less_probable_than_a_tear_that_leaves_its_trace() -> None:
+    """Beside the same effects, with the same energy, and where it stands nearly as well."""
+    base, torn = candidate("friction", log_evidence=-50.0), candidate("friction", "tearing", log_evidence=-20.0)
+    softer = candidate("friction", "mullins", log_evidence=-20.0)
+
+    def least(gain: float, size: float, *others: Candidate) -> float:
+        return total._like_a_tear(Foreign(SUDDEN, base, gain, -5.0, size=size), [base, *others], lambda c: 3.0)
+
+    assert least(25.0, -0.1, torn) == pytest.approx(3.0 - np.log(BELIEFS.apart))
+    for gain, size, other in ((25.0, 0.1, torn), (25.0 - 1.01 * TWINS.behind, -0.1, torn), (25.0, -0.1, softer)):
+        assert least(gain, size, other) == -np.inf
 
 
 def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monkeypatch: pytest.MonkeyPatch) -> None:
