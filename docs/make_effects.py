@@ -108,7 +108,8 @@ Effects act in this order, in whatever order they are named, and each is one fil
 {stages}
 
 - Histories (slip, set, tearing, softening) are functions of the deflections reached, relative to the full range D of
-  the measurement. What has been left out of a fit (other cycles, points beyond a limit) is still remembered.
+  the measurement, and of time where they creep or run at a moment. What has been left out of a fit (other cycles,
+  points beyond a limit) is still remembered.
 - A slack film carries no force: where no deflection is left for the film its force is zero. Of a film that relaxation
   would push, `viscoelastic.withstood` is the part that it withstands: none if it is thin, all if it is a block.
 - Without times, the clock of `viscoelastic` and `force_drift` is the distance travelled at 1 mm/s, so that their

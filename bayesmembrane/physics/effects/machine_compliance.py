@@ -19,9 +19,10 @@ class MachineCompliance(Compliance):
     """delta_film = delta - compliance F |F / 1 N|^(exponent - 1).
 
     Beams and load cells yield in proportion to the force (1), contacts of round bodies as F^(2/3) (H. Hertz, J. Reine
-    Angew. Math. 92 (1882) 156), joints that open the other way round: the compliance of real frames changes with the
-    load, by tens of percents. And frames differ by orders of magnitude: a prior that falls like a normal one would
-    rather let the film be softer than the frame.
+    Angew. Math. 92 (1882) 156), rough seats, whose stiffness grows with the force, more nearly as its logarithm, joints
+    that open the other way round: the compliance of real frames changes with the load, by tens of percents. And frames
+    differ by orders of magnitude: a prior that falls like a normal one would rather let the film be softer than the
+    frame.
     """
 
     name: ClassVar[str] = "machine_compliance"
