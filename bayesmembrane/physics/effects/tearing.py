@@ -63,7 +63,7 @@ class Tearing(Carried):
 
     @property
     def starts(self) -> list[dict[str, float]]:
-        whole = self.coordinates[5].bounds[1]
+        whole = next(c.bounds[1] for c in self.coordinates if c.name == "moment")
         return [{"jump": 0.05}, *({"jump": 0.6, "moment": part * whole, "takes": 0.03 * whole} for part in PLACES)]
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
