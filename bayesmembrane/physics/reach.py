@@ -38,7 +38,7 @@ class Reach:
         return self.by_unit.get(unit, 1.0) / SOURCE.by_unit.get(unit, 1.0)
 
     @property
-    def lasts(self) -> float:
+    def times_as_long(self) -> float:
         """How many times as long as `SOURCE`."""
         return self.duration / SOURCE.duration
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import expit
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.compiling import compiled
@@ -27,13 +26,8 @@ CREEPS = EffectParameter(
     "creeps", "-", "part of that which grows with time under load, in holds too", Uniform(0.0, 1.0), (0.0, 1.0)
 )
 JUMP = EffectParameter("jump", "-", "part of it that comes at once", Uniform(0.0, 1.0), (0.0, 1.0))
-PLACE = EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1))
-WIDTH = 0.015
-"""Of the full range, in which a jump comes."""
 STILL = 1e-7
 """Of the full range: a smaller step is none, and the mean of a power over it the power itself."""
-JUMPS = tuple({"jump": 0.6, "place": place} for place in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9))
-"""Shapes to begin a search with: a jump is found from nearby only."""
 
 
 def growth(
@@ -69,48 +63,13 @@ def growth(
     return np.asarray((1 - repeated) * first + repeated * np.cumsum(again, axis=-1))
 
 
-def jumped(jump: Array, place: Array, slow: Array, reached: Array, path: Motion) -> Array:
-    """(B, N) (1 - jump) G + jump / (1 + exp((place - m / D) / w)), w = 0.015: what grows little by little and at once.
-
-    G (B, N) is ``slow``, m (B, N) ``reached``, the largest deflection so far; ``jump`` and ``place`` are (B, 1).
-    """
-    return np.asarray((1 - jump) * slow + jump * expit((reached / path.full_range - place) / WIDTH))
-
-
-def follow(values: Array, gap: Array, start: Array) -> Array:
-    """h (B, N) that relaxes to where ``values`` (B, N) moves it: h_n = e_n h_(n-1) + s_n (v_n - v_(n-1)).
-
-    Exact for values that move evenly over each gap (B, N), which is in relaxation lengths: e = exp(-gap) and
-    s = (1 - e) / gap. The values come from zero to the first one over its own gap; h starts at ``start`` (B,).
-    """
-    out = np.empty_like(values)
-    _follow(values, np.ascontiguousarray(np.broadcast_to(gap, values.shape)), start, out)
-    return out
-
-
-@compiled(error_model="numpy")
-def _follow(values, gap, start, out):  # type: ignore[no-untyped-def]
-    for b in range(values.shape[0]):
-        h, before = start[b], 0.0
-        for n in range(values.shape[1]):
-            g = gap[b, n]
-            if g > 1e-6:
-                e = np.exp(-g)
-                s = (1.0 - e) / g
-            else:
-                e = 1.0 - g
-                s = 1.0 - 0.5 * g
-            h = e * h + s * (values[b, n] - before)
-            before = values[b, n]
-            out[b, n] = h
-
-
 def relaxing(values: Array, gap: Array, times: Array) -> Array:
-    """(B, N) mean over T ``times`` (B, T) of h, which relaxes to where ``values`` (B, N) moves it:
+    """(B, N) mean over T ``times`` (B, T) of h, which relaxes to zero and is moved by ``values`` (B, N):
     h_n = e_n h_(n-1) + s_n (v_n - v_(n-1)), from zero.
 
     Exact for values that move evenly over each ``gap`` (N,) of time, with g the gap in relaxation times: e = exp(-g)
-    and s = (1 - e) / g. The values come from zero to the first one over its own gap.
+    and s = (1 - e) / g. The values come from zero to the first one over its own gap. What relaxes with the way has
+    gaps and lengths of that instead.
     """
     out = np.zeros_like(values)
     _relax(values, np.ascontiguousarray(gap, dtype=float), np.ascontiguousarray(times, dtype=float), out)
@@ -121,11 +80,11 @@ def relaxing(values: Array, gap: Array, times: Array) -> Array:
 def _relax(values, gap, times, out):  # type: ignore[no-untyped-def]
     for b in range(values.shape[0]):
         for t in range(times.shape[1]):
-            h, before, length, e, s = 0.0, 0.0, -1.0, 1.0, 1.0
+            h, before, last, e, s = 0.0, 0.0, -1.0, 1.0, 1.0
             for n in range(values.shape[1]):
-                if gap[n] != length:  # of an even clock one exponential is enough
-                    length = gap[n]
-                    g = length / times[b, t]
+                if gap[n] != last:  # of an even clock one exponential is enough
+                    last = gap[n]
+                    g = last / times[b, t]
                     if g > 1e-6:
                         e = np.exp(-g)
                         s = (1.0 - e) / g

@@ -40,7 +40,7 @@ class EffectParameter(Parameter):
 
     def on(self, reach: Reach) -> Self:
         """The same where a test goes so far: what is a part of that grows with it."""
-        factor = reach.lasts if self.of_the_test else reach.times(self.unit)
+        factor = reach.times_as_long if self.of_the_test else reach.times(self.unit)
         low, high = self.bounds
         null = None if self.null is None else factor * self.null
         return replace(self, prior=self.prior.times(factor), bounds=(factor * low, factor * high), null=null)

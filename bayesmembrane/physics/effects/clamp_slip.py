@@ -5,20 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from scipy.special import expit
+
 from bayesmembrane.data.motion import Motion
-from bayesmembrane.ground.parameters import Array, HalfNormal
-from bayesmembrane.physics.effects._history import (
-    CREEPS,
-    EXPONENT,
-    JUMP,
-    JUMPS,
-    PLACE,
-    REPEATED,
-    SATURATION,
-    growth,
-    jumped,
-)
+from bayesmembrane.ground.parameters import Array, HalfNormal, Uniform
+from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, growth
 from bayesmembrane.physics.effects.base import EffectParameter, Slack, running_max
+
+PLACE = EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1))
+WIDTH = 0.015
+"""Of the full range, in which a jump comes."""
+JUMPS = tuple({"jump": 0.6, "place": place} for place in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9))
+"""Shapes to begin a search with: a jump is found from nearby only."""
 
 
 @dataclass(frozen=True)
@@ -58,5 +57,5 @@ class ClampSlip(Slack):
 
     def excess(self, p: Array, deflection: Array, path: Motion) -> Array:
         slow = growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4], p[:, 6:7])
-        reached = running_max(deflection)
-        return p[:, :1] * jumped(p[:, 4:5], p[:, 5:6], slow, reached, path)
+        at_once = expit((running_max(deflection) / path.full_range - p[:, 5:6]) / WIDTH)
+        return np.asarray(p[:, :1] * ((1 - p[:, 4:5]) * slow + p[:, 4:5] * at_once))

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal
-from bayesmembrane.physics.effects._history import follow
+from bayesmembrane.physics.effects._history import relaxing
 from bayesmembrane.physics.effects.base import EffectParameter, Sensor
 
 
@@ -37,9 +37,8 @@ class Friction(Sensor):
     )
 
     def read(self, p: Array, force: Array, path: Motion) -> Array:
-        gap = path.steps / p[:, 1:2]
         # A pull of one per length travelled, and its own relaxation: z = direction (1 - exp(-s / travel)).
         signed = np.cumsum(path.steps * path.leg) / p[:, 1:2]
-        z = follow(signed, gap, np.zeros(len(p)))
+        z = relaxing(signed, path.steps, p[:, 1:2])
         part = np.minimum(np.abs(path.deflection) / path.full_range, 1.0)
         return np.asarray(force + p[:, :1] * (1.0 + p[:, 2:3] * part) * z)
