@@ -28,17 +28,17 @@ from bayesmembrane.physics.effects.base import (
     ordered,
 )
 from bayesmembrane.physics.mechanics.solution import Status
+from bayesmembrane.physics.series import in_series
 
 Law = Any
 """(deflection (B, N), excess (B, N) or None) -> (force (B, N), slope (B, N)), and ``status`` (B,) where it is nan."""
 
-MOST_ITERATIONS = 40
-CLOSED = 1e-11  # of the largest deflection: the loop around the frame ends there
-SHORT, STEEP = 1e-7, 5.0  # a secant over a shorter step is round-off, a steeper one no slope
 # Steps of differences: in material coordinates, which are of order one, and relative to an effect's expected size; a
 # film that is mounted differently is solved again, to a tenth of 1e-6.
 MATERIAL_STEP, EFFECT_STEP, MOUNTING_STEP = 1e-6, 1e-5, 3e-3
-BACK = 0.9  # of its way to a deflection at which there is no force is what a film is tried at instead
+REMEMBERED = (0.5, 10.0)
+"""Least and most of the slope without memory that a film is taken to have: a force that relaxed to nothing still grows.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +62,6 @@ class Composition:
     def _acting(self, stage: type[Any], x: Array) -> list[tuple[Any, Array]]:
         return [(e, e.within_bounds(x[:, at])) for e, at in self._places if isinstance(e, stage)]
 
-    @cached_property
-    def mounting(self) -> NDArray[np.bool_]:
-        """(k,) True for the parameters that change the film as mounted: only these need another film law."""
-        stages = [isinstance(e, Geometry) for e in self.effects for _ in e.coordinates]
-        return np.array(stages, dtype=bool)
-
     @property
     def yields(self) -> bool:
         """True if there is a loop around the frame to close."""
@@ -90,42 +84,36 @@ class Composition:
         """(B,) m: the largest deflection that a film may see."""
         return np.asarray(np.max(self.given(x, self._measured(len(x))), axis=1))
 
-    def __call__(self, law: Law, x: Array, start: Array | None = None) -> tuple[Array, NDArray[np.int8]]:
-        """(reading (B, N) N, status (B, N)) of films with effect parameters x (B, k); ``start`` as in `closed`."""
-        _, force = self.closed(law, x, start)
+    def __call__(self, law: Law, x: Array) -> tuple[Array, NDArray[np.int8]]:
+        """(reading (B, N) N, status (B, N)) of films with effect parameters x (B, k)."""
+        _, force, status = self.closed(law, x)
+        return self.read(x, force, status)
+
+    def read(self, x: Array, force: Array, status: NDArray[np.int8]) -> tuple[Array, NDArray[np.int8]]:
+        """(reading (B, N) N, status (B, N)) of ``force`` (B, N) N, of which ``status`` (B,) says why it is nan."""
         for effect, p in self._acting(Sensor, x):
             force = effect.read(p, force, self.path)
-        status = np.where(np.isfinite(force), Status.OK, law.status[:, None]).astype(np.int8)
-        return np.where(status == Status.OK, force, np.nan), status
+        each = np.where(np.isfinite(force), Status.OK, status[:, None]).astype(np.int8)
+        return np.where(each == Status.OK, force, np.nan), each
 
-    def closed(self, law: Law, x: Array, start: Array | None = None) -> tuple[Array, Array]:
-        """((B, N) m, (B, N) N): deflection and force of the film, with delta + u(F(delta)) = the measured deflection.
-
-        Newton's method, at first with the slope of a film without memory, then with secants, from ``start`` (B, N) or
-        from what is measured.
+    def closed(self, law: Law, x: Array, start: Array | None = None) -> tuple[Array, Array, NDArray[np.int8]]:
+        """((B, N) m, (B, N) N, (B,)): deflection and force of the film, with delta + u(F(delta)) = the measured
+        deflection, from forces ``start`` (B, N) where they are known; and `Status` where the force is nan.
         """
         measured = self._measured(len(x))
         frame = self._acting(Compliance, x)
-        delta = measured if start is None or not frame else start
-        force, slope = self.film(law, x, delta)
         if not frame:
-            return delta, force
-        reach = max(float(np.max(np.abs(measured))), 1e-12)
-        for _ in range(MOST_ITERATIONS):
-            u, du = (np.sum(v, axis=0) for v in zip(*(e.yielding(p, force) for e, p in frame), strict=True))
-            residual = delta + u - measured
-            lost = ~np.isfinite(residual)
-            if np.all(lost | (np.abs(residual) <= CLOSED * reach)):
-                break
-            step = np.where(lost, (BACK - 1) * delta, -residual / (1 + du * slope))
-            delta, before = delta + step, force
-            force, slope = self.film(law, x, delta)
-            # The secant also sees what history adds to the slope.
-            with np.errstate(all="ignore"):
-                secant = (force - before) / step
-            use = (np.abs(step) > SHORT * reach) & (secant > 0) & (secant < STEEP * slope)
-            slope = np.where(use, secant, slope)
-        return delta, force
+            return measured, self.film(law, x, measured)[0], law.status
+
+        def film(rows: NDArray[np.intp], delta: Array) -> tuple[Array, Array]:
+            return self.film(law if rows.size == len(x) else law.of(rows), x[rows], delta)
+
+        def yielding(rows: NDArray[np.intp], force: Array) -> tuple[Array, Array]:
+            parts = [e.yielding(p[rows], force) for e, p in frame]
+            return sum(u for u, _ in parts), sum(du for _, du in parts)
+
+        delta, force, found = in_series(film, yielding, measured, start)
+        return delta, force, np.where(found, law.status, Status.ITERATION_LIMIT).astype(np.int8)
 
     def film(self, law: Law, x: Array, delta: Array) -> tuple[Array, Array]:
         """((B, N) N, (B, N) N/m): force of the film whose edge is at ``delta`` (B, N) m, and about its slope."""
@@ -141,7 +129,7 @@ class Composition:
         for effect, p in self._acting(Memory, x):
             force = effect.remember(p, force, self.path)
         with np.errstate(all="ignore"):
-            part = np.where(virgin > 0, np.clip(force / virgin, 0.0, 10.0), 0.0)
+            part = np.where(virgin > 0, np.clip(force / virgin, *REMEMBERED), 0.0)
         return force, slope * part
 
     def _measured(self, rows: int) -> Array:
@@ -158,26 +146,38 @@ def differences(
     x : (B, k) effect parameters
     jacobian : (B, n, m) d (membrane parameters) / d (material coordinates)
 
-    Differences on the admissible side, all in one batch; a material coordinate varies the law to first order.
+    Differences on the admissible side, in one batch; a material coordinate varies the law to first order. What only the
+    load cell adds needs no other film.
     """
-    laws, points, steps = [law], [x], [np.ones(len(x))]
+    points, steps, laws, block = [x], [], [law], [0]
     for i in range(jacobian.shape[2]):
-        laws.append(law.varied(MATERIAL_STEP * jacobian[:, :, i]))
         points.append(x)
         steps.append(np.full(len(x), MATERIAL_STEP))
-    parameters = [p for e in composition.effects for p in e.coordinates]
-    for i, (p, mounting) in enumerate(zip(parameters, composition.mounting, strict=True)):
+        block.append(len(laws))
+        laws.append(law.varied(MATERIAL_STEP * jacobian[:, :, i]))
+    parameters = [(e, p) for e in composition.effects for p in e.coordinates]
+    for i, (effect, p) in enumerate(parameters):
+        mounting = isinstance(effect, Geometry)
         h = (MOUNTING_STEP if mounting else EFFECT_STEP) * p.scale
         step = np.where(x[:, i] + h <= p.bounds[1], h, -h)
         moved = x.copy()
         moved[:, i] += step
-        laws.append(mounted(moved) if mounting else law)
         points.append(moved)
         steps.append(step)
-    start = None
+        added = isinstance(effect, Sensor)
+        block.append(0 if added else len(laws))
+        if not added:
+            laws.append(mounted(moved) if mounting else law)
+    films = np.concatenate([p for p, b in zip(points, block, strict=True) if p is x or b])
     if composition.yields:
-        start = np.tile(composition.closed(law, x)[0], (len(laws), 1))
-    reading, status = composition(type(law).stack(laws), np.concatenate(points), start)
-    reading = reading.reshape(len(steps), len(x), -1)
-    slopes = (reading[1:] - reading[0]) / np.array(steps[1:]).reshape(-1, len(x), 1)
+        _, plain, why = composition.closed(law, x)
+        others = type(law).stack(laws[1:])
+        rest = composition.closed(others, films[len(x) :], np.tile(plain, (len(laws) - 1, 1)))[1]
+        force = np.concatenate([plain, rest])
+    else:
+        _, force, why = composition.closed(type(law).stack(laws), films)
+    force = force.reshape(len(laws), *force[: len(x)].shape)[block].reshape(-1, force.shape[1])
+    reading, status = composition.read(np.concatenate(points), force, np.tile(why[: len(x)], len(points)))
+    reading = reading.reshape(len(points), len(x), -1)
+    slopes = (reading[1:] - reading[0]) / np.array(steps).reshape(-1, len(x), 1)
     return reading[0], status[: len(x)], np.moveaxis(slopes, 0, 2)

@@ -78,7 +78,7 @@ def test_the_frame_takes_its_part(exponent: float) -> None:
     forward, x = Forward(h, m, m.deflection), vector(h)
     theta = x[None, 3:]
     law, _ = forward.law(h.films(x), theta)
-    delta, total = forward.composition.closed(law, theta)
+    delta, total, _ = forward.composition.closed(law, theta)
     yielded, _ = MachineCompliance().yielding(MachineCompliance().typical[None], total)
     assert np.max(np.abs(delta + yielded - m.deflection)) < 1e-9 * m.full_range
     again, _ = forward.composition.film(law, theta, delta)

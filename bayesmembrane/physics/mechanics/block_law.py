@@ -50,6 +50,10 @@ class BlockLaw:
         """The law of specimens whose parameters differ by ``change`` (B, n)."""
         return BlockLaw(self.strip.varied(change))
 
+    def of(self, rows: NDArray[np.intp] | slice) -> BlockLaw:
+        """The law of some of the specimens."""
+        return BlockLaw(self.strip.of(rows))
+
     @staticmethod
     def stack(laws: Sequence[BlockLaw]) -> BlockLaw:
         """The specimens of all laws, one after the other."""

@@ -58,6 +58,11 @@ class ContourLaw:
         """The law of films whose parameters differ by ``change`` (B, n), to first order."""
         return replace(self, change=change)
 
+    def of(self, rows: NDArray[np.intp] | slice) -> ContourLaw:
+        """The law of some of the films."""
+        change = None if self.change is None else self.change[rows]
+        return replace(self, parameters=self.parameters[rows], change=change)
+
     @staticmethod
     def stack(laws: Sequence[ContourLaw]) -> ContourLaw:
         """The films of all laws, one after the other."""

@@ -104,7 +104,7 @@ class FilmLaw:
         assert self.tangents is not None
         return replace(self, pieces=self.pieces + np.einsum("bjcn,bn->bjc", self.tangents, change), tangents=None)
 
-    def of(self, rows: slice) -> FilmLaw:
+    def of(self, rows: NDArray[np.intp] | slice) -> FilmLaw:
         """The law of some of the films."""
         return FilmLaw(
             self.gap,

@@ -56,6 +56,10 @@ class ShearLaw:
         """The law of specimens whose parameters differ by ``change`` (B, n)."""
         return replace(self, parameters=self.parameters + change)
 
+    def of(self, rows: NDArray[np.intp] | slice) -> ShearLaw:
+        """The law of some of the specimens."""
+        return replace(self, parameters=self.parameters[rows])
+
     @staticmethod
     def stack(laws: Sequence[ShearLaw]) -> ShearLaw:
         """The specimens of all laws, one after the other."""

@@ -98,6 +98,10 @@ class StripLaw:
         """The law of films whose parameters differ by ``change`` (B, n)."""
         return replace(self, parameters=self.parameters + change)
 
+    def of(self, rows: NDArray[np.intp] | slice) -> StripLaw:
+        """The law of some of the films."""
+        return replace(self, parameters=self.parameters[rows])
+
     @staticmethod
     def stack(laws: Sequence[StripLaw]) -> StripLaw:
         """The films of all laws, one after the other."""

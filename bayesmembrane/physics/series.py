@@ -1,0 +1,90 @@
+"""Film and frame in series: the force at which what both give way is what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesmembrane.ground.parameters import Array
+
+MOST_ITERATIONS = 40
+CLOSED = 1e-11  # of the largest deflection: so far what both give way may be from the measured one
+SHORT, STEEP = 1e-7, 5.0  # a secant over a shorter step is round-off, a steeper one no slope
+LONG, TURNS = 0.1, 4
+"""A step longer than this part of the force is made along the curve of the frame, which takes so many turns to find."""
+MORE, PATIENT = 2.0, 12
+"""So many times the force of the frame is tried where the film has none, and so often before a row is left so."""
+
+Rows = NDArray[np.intp]
+Film = Callable[[Rows, Array], tuple[Array, Array]]
+"""Of some rows, at deflections (b, N) m: force (b, N) N, nan where there is none, and about its slope (b, N) N/m."""
+Frame = Callable[[Rows, Array], tuple[Array, Array]]
+"""Of as many rows as there are forces (b, N) N: how far it yields (b, N) m, and the derivative (b, N) m/N."""
+
+
+def in_series(
+    film: Film, frame: Frame, measured: Array, start: Array | None = None
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """(delta (B, N) m, F (B, N) N, found (B,)): F = film(delta) with delta + frame(F) = ``measured`` (B, N) m.
+
+    Newton's method for the force, from ``start`` (B, N) N or from a frame that is rigid. A frame that yields like a
+    power of the force less than one is without bounds soft at no force, where a tangent leads astray: long steps are
+    made along the film's tangent and the frame's own curve. Slopes are at first those of a film without memory, then
+    secants. Rows that are found rest; those with ``found`` False are not, and have no force.
+    """
+    rows, reach = np.arange(len(measured)), max(float(np.max(np.abs(measured))), 1e-12)
+    delta, force, found = np.array(measured), np.full(measured.shape, np.nan), np.zeros(len(measured), np.bool_)
+    held = _rigid(film(rows, measured)[0]) if start is None else start
+    low, high = np.full(measured.shape, -np.inf), np.full(measured.shape, np.inf)
+    before: tuple[Array, Array] | None = None
+    for turn in range(MOST_ITERATIONS):
+        yielded, soft = frame(rows, held)
+        at = measured[rows] - yielded
+        pull, slope = film(rows, at)
+        if before is not None:  # the secant also sees what history adds to the slope
+            way = at - before[0]
+            with np.errstate(all="ignore"):
+                secant = (pull - before[1]) / way
+            use = (np.abs(way) > SHORT * reach) & (secant > 0) & (secant < STEEP * slope)
+            slope = np.where(use, secant, slope)
+        slope = np.maximum(slope, 0.0)
+        with np.errstate(all="ignore"):
+            step = (pull - held) / (1 + soft * slope)
+            near = np.abs(step) * soft <= CLOSED * reach
+        lost = np.isnan(pull)
+        here = np.all(near | (lost & (np.isnan(held) | (turn >= PATIENT))), axis=1)
+        if np.any(here):
+            delta[rows[here]], force[rows[here]], found[rows[here]] = at[here], pull[here], True
+            if np.all(here):
+                break
+        some, new = ~here, held + step
+        far = np.nonzero(some[:, None] & (np.abs(step) > LONG * np.abs(held)))
+        new[far] = _along(frame, rows[far[0]], (pull + slope * yielded)[far], slope[far], held[far])
+        # Where the film has no force the frame has to take more: between what was too little and what was too much.
+        low, high = np.where(lost, held, low), np.where(~lost & (pull < held), held, high)
+        with np.errstate(invalid="ignore"):
+            between = np.where(np.isinf(high), MORE * np.abs(held), 0.5 * (low + high))
+        new = np.where(lost | (new <= low), between, new)
+        rows, held, low, high, before = rows[some], new[some], low[some], high[some], (at[some], pull[some])
+    return delta, force, found
+
+
+def _rigid(force: Array) -> Array:
+    """The forces (B, N) on a frame that does not yield; the largest of its row where the film has none."""
+    most = np.fmax.reduce(np.abs(force), axis=1)[:, None]
+    return np.where(np.isnan(force), np.nan_to_num(most), force)
+
+
+def _along(frame: Frame, rows: Rows, pull: Array, slope: Array, start: Array) -> Array:
+    """F (M,) with F + k u(F) = ``pull`` (M,) N, of films with the slope k (M,): by Newton's method for ln |F|, of which
+    the logarithm of the left side is nearly a straight line.
+    """
+    force = np.where(start * pull > 0, start, pull)
+    with np.errstate(all="ignore"):
+        for _ in range(TURNS):
+            yielded, soft = (v[:, 0] for v in frame(rows, force[:, None]))
+            whole = force + slope * yielded
+            force = force * np.exp(np.log(pull / whole) * whole / (force * (1 + slope * soft)))
+    return np.where((pull == 0) | ~np.isfinite(force), 0.0, force)

@@ -1,0 +1,106 @@
+"""Film and frame in series, against bisection, where a tangent leads astray, and where nothing closes."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.physics.effects.machine_compliance import MachineCompliance
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.mechanics import Status
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from bayesmembrane.physics.series import in_series
+
+MEASURED = np.linspace(0.0, 1.0, 41)
+EXPONENTS = np.array([[0.3], [0.5], [1.0], [1.4]])
+
+
+def film(rows: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Slack up to a quarter of the way, steep beyond, and torn past 0.9."""
+    over = np.maximum(delta - 0.25, 0.0)
+    torn = delta > 0.9
+    return np.where(torn, np.nan, 20 * over + 60 * over**3), np.where(torn, np.nan, (20 + 180 * over**2) * (over > 0))
+
+
+def frame(rows: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    secant = 0.05 * np.maximum(np.abs(force), 1e-9) ** (EXPONENTS[rows] - 1)
+    return secant * force, EXPONENTS[rows] * secant
+
+
+def test_it_is_the_root_that_bisection_finds() -> None:
+    delta, force, found = in_series(film, frame, np.tile(MEASURED, (len(EXPONENTS), 1)))
+    assert np.all(found)
+
+    def left(d: float, at: float, power: float) -> float:
+        over = max(d - 0.25, 0.0)
+        return d + 0.05 * (20 * over + 60 * over**3) ** power - at
+
+    for i, power in enumerate(EXPONENTS[:, 0]):
+        expected = [brentq(left, 0.0, 1.0, args=(at, power), xtol=1e-14) for at in MEASURED]
+        assert delta[i] == pytest.approx(expected, abs=1e-10)
+        assert force[i] == pytest.approx(film(np.array([i]), delta[i])[0])
+
+
+def test_rows_do_not_mix_and_a_start_does_not_matter() -> None:
+    together = in_series(film, frame, np.tile(MEASURED, (len(EXPONENTS), 1)))[1]
+    for i in range(len(EXPONENTS)):
+
+        def one(rows: np.ndarray, force: np.ndarray, i: int = i) -> tuple[np.ndarray, np.ndarray]:
+            return frame(rows + i, force)
+
+        alone = in_series(film, one, MEASURED[None])[1]
+        assert np.array_equal(alone[0], together[i])
+        again = in_series(film, one, MEASURED[None], 1.3 * alone + 0.1)[1]
+        assert again == pytest.approx(alone, rel=1e-8, abs=1e-9)
+
+
+def test_what_does_not_close_has_no_force() -> None:
+    """A film that pulls only where the frame would then slacken it."""
+
+    def clicks(rows: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.where((delta > 0.5) & (rows[:, None] == 0), 1.0, 0.0), np.zeros(delta.shape)
+
+    def rod(rows: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return force, np.ones(force.shape)
+
+    _, force, found = in_series(clicks, rod, np.ones((2, 1)))
+    assert found.tolist() == [False, True]
+    assert np.isnan(force[0, 0])
+    assert force[1, 0] == 0.0
+
+
+def test_a_relaxed_film_on_a_frame_that_is_soft_at_no_force_closes() -> None:
+    """The return of a relaxing strip, whose force falls through zero, on a seat that yields like F^0.3."""
+    strip = Uniaxial(0.1, 0.01)
+    time = np.linspace(0.5, 40.0, 80)
+    way = np.interp(time, [0.0, 20.0, 40.0], [0.0, 0.2, 0.02])
+    m = Measurement(way, np.ones(way.size), strip, Specimen("tape", 1e-3), time=time)
+    h = hypothesis("gent", ["viscoelastic", "machine_compliance"])
+    f = Forward(h.on(m), m, m.deflection)
+    theta = {"viscoelastic": [0.5, 20.0, 0.0, 0.5, -1.5], "machine_compliance": [2e-3, 0.3]}
+    x = np.concatenate([theta[e.name] for e in f.composition.effects])[None]
+    law, _ = f.law(np.array([[20.0, 60.0]]), x)
+    delta, force, status = f.composition.closed(law, x)
+    assert status[0] != Status.ITERATION_LIMIT
+    assert np.min(force) < 0 < np.max(force)
+    yielded, _ = MachineCompliance().yielding(np.array([theta["machine_compliance"]]), force)
+    assert np.max(np.abs(delta + yielded - m.deflection)) < 1e-9 * m.full_range
+
+
+def test_what_the_load_cell_adds_has_the_slopes_of_differences() -> None:
+    """Its rows are not solved again; all others are."""
+    strip = Uniaxial(0.1, 0.01)
+    time = np.linspace(0.5, 40.0, 40)
+    way = np.interp(time, [0.0, 20.0, 40.0], [0.0, 0.2, 0.02])
+    m = Measurement(way, np.ones(way.size), strip, Specimen("tape", 1e-3), time=time)
+    h = hypothesis("gent", ["machine_compliance", "force_drift", "permanent_set"]).on(m)
+    f = Forward(h, m, m.deflection)
+    x = np.concatenate([h.material.to_coordinates(np.array([20.0, 60.0])), *(e.typical for e in h.effects)])[None]
+    slopes = f(x, sensitivities=True).sensitivity
+    assert slopes is not None
+    for i in range(h.curve_size):
+        step = np.zeros(x.shape)
+        step[0, i] = 1e-4 * max(abs(x[0, i]), 1e-9)
+        expected = (f(x + step).force - f(x - step).force)[0] / (2 * step[0, i])
+        assert slopes[0, :, i] == pytest.approx(expected, rel=5e-3, abs=1e-5 * np.max(np.abs(expected)))
