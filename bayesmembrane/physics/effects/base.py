@@ -93,6 +93,7 @@ class Effect(ABC):
     absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
     exact : True if it has no law that could be off: an offset is an offset
     remembers : False if it changes the curve by a function of the deflection alone, alike on every leg
+    proportional : True if forces stay proportional to the film's modulus
     of_the_material : True if all tests of one material have it, or none of them
     constant : True if its parameters are then the same in all of them; those of others belong to what a test reached
     twins_at_one_speed : names of effects that only another speed, or a hold, tells from this one
@@ -118,6 +119,7 @@ class Effect(ABC):
     absorbed: ClassVar[str] = ""
     exact: ClassVar[bool] = False
     remembers: ClassVar[bool] = True
+    proportional: ClassVar[bool] = True
     of_the_material: ClassVar[bool] = False
     constant: ClassVar[bool] = False
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ()
@@ -267,6 +269,7 @@ class Compliance(Effect, ABC):
     """How far the frame yields."""
 
     stage = "compliance"
+    proportional = False
 
     @abstractmethod
     def yielding(self, p: Array, force: Array) -> tuple[Array, Array]:
@@ -277,6 +280,7 @@ class Sensor(Effect, ABC):
     """What the load cell adds."""
 
     stage = "sensor"
+    proportional = False
 
     @abstractmethod
     def read(self, p: Array, force: Array, path: Motion) -> Array:

@@ -106,6 +106,17 @@ def test_it_fades_towards_null(effect: Effect, curve: Measurement, plain: np.nda
 
 
 @every
+def test_it_says_whether_forces_stay_proportional_to_the_modulus(effect: Effect, curve: Measurement) -> None:
+    h = hypothesis("yeoh", [effect.name])
+    f, x = Forward(h, curve, curve.deflection), vector(h)
+    stiffer = x.copy()
+    stiffer[0] += np.log(2.0)
+    once, twice = f(x).force, f(stiffer).force
+    off = np.max(np.abs(twice - 2 * once)) / np.max(np.abs(twice))
+    assert (off < 1e-7) == effect.proportional
+
+
+@every
 def test_the_future_does_not_matter(effect: Effect, curve: Measurement) -> None:
     half = curve.select(np.arange(len(curve)) < len(curve) // 2)
     assert half.full_range == curve.full_range

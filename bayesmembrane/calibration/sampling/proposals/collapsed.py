@@ -22,7 +22,8 @@ with 60 Gent took 1.2 s of a processor instead of 0.8, with 10 and 2 coordinates
 class Collapsed:
     """p(s | y) = int int p(ln_gd, s, ln_sd | y) d ln_gd d ln_sd of the coordinates s (k - 2,) between the two.
 
-    Forces are proportional to the modulus, F = Gd f(s), and whether a film is convex does not hang on it.
+    Forces are proportional to the modulus, F = Gd f(s), with effects that leave them so, too, and whether a film is
+    convex does not hang on it.
     """
 
     posterior: Posterior
@@ -104,17 +105,20 @@ class Collapsed:
 
 
 def collapsed(posterior: object) -> Collapsed | None:
-    """The posterior of the shape alone; None where forces are not proportional to a modulus that is sampled, noise is
-    more than one size, or no coordinate would be left.
+    """The posterior of the shape alone, of energy and effects; None where forces are not proportional to a modulus that
+    is sampled, noise is more than one size, or no coordinate would be left.
     """
     if not isinstance(posterior, Posterior):
         return None
     claim, spectrum = posterior.hypothesis, posterior.noise.spectrum
-    if claim.effects or spectrum is None or claim.material_size < 2 or not posterior.forward.rig.reads_force:
+    left = posterior.size - 2
+    if spectrum is None or left < 1 or not posterior.forward.rig.reads_force:
+        return None
+    if not all(e.proportional for e in claim.effects):
         return None
     if not all(type(p.prior) is Normal for p in (claim.parameters[0], claim.parameters[-1])):
         return None
-    few = _alike(spectrum.variance, posterior.readings)[0].size <= GROUPS * (claim.material_size - 1)
+    few = _alike(spectrum.variance, posterior.readings)[0].size <= GROUPS * left
     return Collapsed(posterior, spectrum) if few else None
 
 

@@ -33,17 +33,19 @@ def strip(noise: str, points: int = 12) -> Measurement:
     return Measurement(0.05 * (stretch - 1), force, Uniaxial(0.05, 0.01), Specimen("band", 5e-4), **stated)  # type: ignore[arg-type]
 
 
-def shapes_of(noise: str, points: int = 12) -> Collapsed:
-    found = collapsed(Posterior(hypothesis("gent"), strip(noise, points)))
+def shapes_of(noise: str, points: int = 12, effects: tuple[str, ...] = ()) -> Collapsed:
+    found = collapsed(Posterior(hypothesis("gent", effects), strip(noise, points)))
     assert found is not None
     return found
 
 
+@pytest.mark.parametrize("effects", [(), ("permanent_set",)])
 @pytest.mark.parametrize("noise", ["none", "sd", "covariance"])
-def test_collapsed_equals_quadrature(noise: str) -> None:
-    shape = shapes_of(noise)
+def test_collapsed_equals_quadrature(noise: str, effects: tuple[str, ...]) -> None:
+    shape = shapes_of(noise, effects=effects)
+    of_effects = np.concatenate([[], *(e.typical for e in shape.posterior.hypothesis.effects)])
     for limit in (2.5, 4.0):  # ln of it
-        s = np.array([[limit]])
+        s = np.append(limit, of_effects)[None]
         x = shape.whole(s)[0]
         best = 0.5 * np.log(np.sum(shape.posterior.measured**2) / np.sum(shape.evaluate(s).force ** 2))
         t, u = np.linspace(best - 0.5, best + 0.5, 801), np.linspace(-14, 1, 181)
@@ -120,7 +122,9 @@ def test_what_is_not_proportional_to_a_modulus_is_not_collapsed() -> None:
     assert collapsed(Posterior(hypothesis("neo_hookean"), m)) is None
     assert collapsed(Posterior(hypothesis("gent", noise="ar1"), m)) is None
     assert collapsed(Posterior(hypothesis("gent", extra_noise=False), m)) is None
-    assert collapsed(Posterior(hypothesis("gent", ["force_offset"]), m)) is None
+    assert collapsed(Posterior(hypothesis("neo_hookean", ["permanent_set"]), m)) is not None
+    for effect in ("force_offset", "machine_compliance"):
+        assert collapsed(Posterior(hypothesis("gent", ["permanent_set", effect]), m)) is None
     assert collapsed(object()) is None
     rig = Contour.example()
     radius = rig.inner_radius + (rig.outer_radius - rig.inner_radius) * np.linspace(0.1, 0.9, 9)
