@@ -27,8 +27,8 @@ from bayesmembrane.physics.effects.base import (
     Slack,
     ordered,
 )
+from bayesmembrane.physics.frame import in_series
 from bayesmembrane.physics.mechanics.solution import Status
-from bayesmembrane.physics.series import in_series
 
 Law = Any
 """(deflection (B, N), excess (B, N) or None) -> (force (B, N), slope (B, N)), and ``status`` (B,) where it is nan."""
@@ -149,35 +149,37 @@ def differences(
     Differences on the admissible side, in one batch; a material coordinate varies the law to first order. What only the
     load cell adds needs no other film.
     """
-    points, steps, laws, block = [x], [], [law], [0]
-    for i in range(jacobian.shape[2]):
-        points.append(x)
-        steps.append(np.full(len(x), MATERIAL_STEP))
-        block.append(len(laws))
-        laws.append(law.varied(MATERIAL_STEP * jacobian[:, :, i]))
-    parameters = [(e, p) for e in composition.effects for p in e.coordinates]
-    for i, (effect, p) in enumerate(parameters):
+    changes = [_Change(x, MATERIAL_STEP, law.varied(MATERIAL_STEP * rate)) for rate in np.moveaxis(jacobian, 2, 0)]
+    for i, (effect, p) in enumerate((e, p) for e in composition.effects for p in e.coordinates):
         mounting = isinstance(effect, Geometry)
         h = (MOUNTING_STEP if mounting else EFFECT_STEP) * p.scale
-        step = np.where(x[:, i] + h <= p.bounds[1], h, -h)
-        moved = x.copy()
+        step, moved = np.where(x[:, i] + h <= p.bounds[1], h, -h), x.copy()
         moved[:, i] += step
-        points.append(moved)
-        steps.append(step)
-        added = isinstance(effect, Sensor)
-        block.append(0 if added else len(laws))
-        if not added:
-            laws.append(mounted(moved) if mounting else law)
-    films = np.concatenate([p for p, b in zip(points, block, strict=True) if p is x or b])
+        film = None if isinstance(effect, Sensor) else mounted(moved) if mounting else law
+        changes.append(_Change(moved, step[:, None], film))
+    laws = [c.law for c in changes if c.law is not None]
+    points = np.concatenate([c.x for c in changes if c.law is not None])
     if composition.yields:
         _, plain, why = composition.closed(law, x)
-        others = type(law).stack(laws[1:])
-        rest = composition.closed(others, films[len(x) :], np.tile(plain, (len(laws) - 1, 1)))[1]
-        force = np.concatenate([plain, rest])
+        others = composition.closed(type(law).stack(laws), points, np.tile(plain, (len(laws), 1)))[1]
     else:
-        _, force, why = composition.closed(type(law).stack(laws), films)
-    force = force.reshape(len(laws), *force[: len(x)].shape)[block].reshape(-1, force.shape[1])
-    reading, status = composition.read(np.concatenate(points), force, np.tile(why[: len(x)], len(points)))
-    reading = reading.reshape(len(points), len(x), -1)
-    slopes = (reading[1:] - reading[0]) / np.array(steps).reshape(-1, len(x), 1)
-    return reading[0], status[: len(x)], np.moveaxis(slopes, 0, 2)
+        _, force, why = composition.closed(type(law).stack([law, *laws]), np.concatenate([x, points]))
+        plain, others = np.split(force, [len(x)])
+    each = iter(np.split(others, len(laws)))
+    forces = [plain, *(plain if c.law is None else next(each) for c in changes)]
+    at = np.concatenate([x, *(c.x for c in changes)])
+    reading, status = composition.read(at, np.concatenate(forces), np.tile(why[: len(x)], len(forces)))
+    first, *rest = np.split(reading, len(forces))
+    slopes = [(r - first) / c.step for r, c in zip(rest, changes, strict=True)]
+    return first, status[: len(x)], np.stack(slopes, axis=2)
+
+
+@dataclass(frozen=True)
+class _Change:
+    """Another point x (B, k) for a difference, ``step`` away, a number or (B, 1), and the law of its films; None where
+    these are as before and only the reading changes.
+    """
+
+    x: Array
+    step: float | Array
+    law: Law | None

@@ -93,7 +93,7 @@ class Effect(ABC):
     absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
     exact : True if it has no law that could be off: an offset is an offset
     remembers : False if it changes the curve by a function of the deflection alone, alike on every leg
-    proportional : True if forces stay proportional to the film's modulus
+    scales_with_modulus : True if forces stay proportional to the modulus, which is relied on; False costs time only
     of_the_material : True if all tests of one material have it, or none of them
     constant : True if its parameters are then the same in all of them; those of others belong to what a test reached
     twins_at_one_speed : names of effects that only another speed, or a hold, tells from this one
@@ -119,7 +119,7 @@ class Effect(ABC):
     absorbed: ClassVar[str] = ""
     exact: ClassVar[bool] = False
     remembers: ClassVar[bool] = True
-    proportional: ClassVar[bool] = True
+    scales_with_modulus: ClassVar[bool] = False
     of_the_material: ClassVar[bool] = False
     constant: ClassVar[bool] = False
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ()
@@ -216,6 +216,7 @@ class Geometry(Effect, ABC):
     """How the film was mounted."""
 
     stage = "geometry"
+    scales_with_modulus = True
 
     @abstractmethod
     def prestretch(self, p: Array) -> Array:
@@ -226,6 +227,7 @@ class Deflection(Effect, ABC):
     """How much of the measured deflection the film gets."""
 
     stage = "deflection"
+    scales_with_modulus = True
 
     @abstractmethod
     def deflect(self, p: Array, deflection: Array, path: Motion) -> Array:
@@ -236,6 +238,7 @@ class Slack(Effect, ABC):
     """Free length that the film gains while it is tested."""
 
     stage = "history-dependent geometry"
+    scales_with_modulus = True
 
     @abstractmethod
     def excess(self, p: Array, deflection: Array, path: Motion) -> Array:
@@ -269,7 +272,6 @@ class Compliance(Effect, ABC):
     """How far the frame yields."""
 
     stage = "compliance"
-    proportional = False
 
     @abstractmethod
     def yielding(self, p: Array, force: Array) -> tuple[Array, Array]:
@@ -280,7 +282,6 @@ class Sensor(Effect, ABC):
     """What the load cell adds."""
 
     stage = "sensor"
-    proportional = False
 
     @abstractmethod
     def read(self, p: Array, force: Array, path: Motion) -> Array:

@@ -28,7 +28,6 @@ class ClampBending(Carried):
     )
     needs_clamp: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
-    proportional: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("stiffness", "N/m", "linear stiffness of the plate", HalfNormal(0.5), (0.0, 50.0), 0.0),
     )

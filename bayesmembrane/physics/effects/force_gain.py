@@ -25,7 +25,7 @@ class ForceGain(Sensor):
     rank: ClassVar[int] = 2
     exact: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
-    proportional: ClassVar[bool] = True
+    scales_with_modulus: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("error", "-", "reading over true force, less one", Normal(0.0, 0.02), (-0.5, 0.5), 0.0),
     )

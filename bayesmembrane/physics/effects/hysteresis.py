@@ -42,6 +42,7 @@ class Hysteresis(Carried):
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("friction",)
     of_the_material = True
     needs_return: ClassVar[bool] = True
+    scales_with_modulus: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("level", "-", "half of the width of a loop over the force", HalfNormal(0.1), (0.0, 0.9), 0.0),
         EffectParameter(

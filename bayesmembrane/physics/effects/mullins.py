@@ -32,6 +32,7 @@ class Mullins(Carried):
     )
     of_the_material = True
     needs_return: ClassVar[bool] = True
+    scales_with_modulus: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "softening",

@@ -30,6 +30,7 @@ class OffCentreDisc(Carried):
     )
     needs_clamp: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
+    scales_with_modulus: ClassVar[bool] = True
     odds: ClassVar[float] = 0.25  # a jig centres it, and the force sees the square of what is left
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(

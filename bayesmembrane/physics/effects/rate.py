@@ -26,6 +26,7 @@ class Rate(Memory):
         "speed the material absorbs it."
     )
     needs_time: ClassVar[bool] = True
+    scales_with_modulus: ClassVar[bool] = True
     rank: ClassVar[int] = 1
     of_the_material = True
     constant = True

@@ -46,6 +46,7 @@ class Viscoelastic(Memory):
     of_the_material = True
     constant = True
     needs_return: ClassVar[bool] = True
+    scales_with_modulus: ClassVar[bool] = True
     shows_at_rest: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(

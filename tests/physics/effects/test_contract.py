@@ -113,7 +113,7 @@ def test_it_says_whether_forces_stay_proportional_to_the_modulus(effect: Effect,
     stiffer[0] += np.log(2.0)
     once, twice = f(x).force, f(stiffer).force
     off = np.max(np.abs(twice - 2 * once)) / np.max(np.abs(twice))
-    assert (off < 1e-7) == effect.proportional
+    assert (off < 1e-7) == effect.scales_with_modulus
 
 
 @every

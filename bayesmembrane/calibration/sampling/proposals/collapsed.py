@@ -114,7 +114,7 @@ def collapsed(posterior: object) -> Collapsed | None:
     left = posterior.size - 2
     if spectrum is None or left < 1 or not posterior.forward.rig.reads_force:
         return None
-    if not all(e.proportional for e in claim.effects):
+    if not all(e.scales_with_modulus for e in claim.effects):
         return None
     if not all(type(p.prior) is Normal for p in (claim.parameters[0], claim.parameters[-1])):
         return None

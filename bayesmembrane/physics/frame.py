@@ -37,38 +37,41 @@ def in_series(
     rows, reach = np.arange(len(measured)), max(float(np.max(np.abs(measured))), 1e-12)
     delta, force, found = np.array(measured), np.full(measured.shape, np.nan), np.zeros(len(measured), np.bool_)
     held = _rigid(film(rows, measured)[0]) if start is None else start
+    # Forces of the frame that were too little, since the film has none where they leave it, and that were too much.
     low, high = np.full(measured.shape, -np.inf), np.full(measured.shape, np.inf)
-    before: tuple[Array, Array] | None = None
+    before = np.full((2, *measured.shape), np.nan)
     for turn in range(MOST_ITERATIONS):
         yielded, soft = frame(rows, held)
         at = measured[rows] - yielded
         pull, slope = film(rows, at)
-        if before is not None:  # the secant also sees what history adds to the slope
-            way = at - before[0]
-            with np.errstate(all="ignore"):
-                secant = (pull - before[1]) / way
-            use = (np.abs(way) > SHORT * reach) & (secant > 0) & (secant < STEEP * slope)
-            slope = np.where(use, secant, slope)
-        slope = np.maximum(slope, 0.0)
+        lost, slope = np.isnan(pull), _seen(at - before[0], pull - before[1], slope, SHORT * reach)
         with np.errstate(all="ignore"):
             step = (pull - held) / (1 + soft * slope)
             near = np.abs(step) * soft <= CLOSED * reach
-        lost = np.isnan(pull)
         here = np.all(near | (lost & (np.isnan(held) | (turn >= PATIENT))), axis=1)
-        if np.any(here):
-            delta[rows[here]], force[rows[here]], found[rows[here]] = at[here], pull[here], True
-            if np.all(here):
-                break
-        some, new = ~here, held + step
-        far = np.nonzero(some[:, None] & (np.abs(step) > LONG * np.abs(held)))
+        delta[rows[here]], force[rows[here]], found[rows[here]] = at[here], pull[here], True
+        if np.all(here):
+            break
+        new = held + step
+        far = np.nonzero(~here[:, None] & (np.abs(step) > LONG * np.abs(held)))
         new[far] = _along(frame, rows[far[0]], (pull + slope * yielded)[far], slope[far], held[far])
-        # Where the film has no force the frame has to take more: between what was too little and what was too much.
         low, high = np.where(lost, held, low), np.where(~lost & (pull < held), held, high)
         with np.errstate(invalid="ignore"):
             between = np.where(np.isinf(high), MORE * np.abs(held), 0.5 * (low + high))
         new = np.where(lost | (new <= low), between, new)
-        rows, held, low, high, before = rows[some], new[some], low[some], high[some], (at[some], pull[some])
+        some, before = ~here, np.stack([at, pull])[:, ~here]
+        rows, held, low, high = rows[some], new[some], low[some], high[some]
     return delta, force, found
+
+
+def _seen(way: Array, gain: Array, slope: Array, shortest: float) -> Array:
+    """The slope of the film's force, no less than 0: that of the last step, which sees what history adds to it, where
+    it was one; all (B, N).
+    """
+    with np.errstate(all="ignore"):
+        secant = gain / way
+    use = (np.abs(way) > shortest) & (secant > 0) & (secant < STEEP * slope)
+    return np.maximum(np.where(use, secant, slope), 0.0)
 
 
 def _rigid(force: Array) -> Array:

@@ -7,10 +7,10 @@ from scipy.optimize import brentq
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.physics.effects.machine_compliance import MachineCompliance
 from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.frame import in_series
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import Status
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
-from bayesmembrane.physics.series import in_series
 
 MEASURED = np.linspace(0.0, 1.0, 41)
 EXPONENTS = np.array([[0.3], [0.5], [1.0], [1.4]])
