@@ -234,8 +234,8 @@ def _raised(grown: Grown, weights: Mapping[int, float], others: Mapping[Key, flo
         rest = [w for (_, own), w in others.items() if own == names]
         total[names] = float(np.logaddexp.reduce([*(weights[id(c)] for c in same), *rest]))
         best = max(same, key=lambda c: weights[id(c)])
-        left = grown.search.excess(best) / before if _plausible(best, grown.search) else np.inf
-        stands[names] = Stands(left, best.log_evidence)
+        left = grown.search.excess(best) / before
+        stands[names] = Stands(left, best.log_evidence, _plausible(best, grown.search))
     return levelled(total, stands, grown.case.twins())
 
 

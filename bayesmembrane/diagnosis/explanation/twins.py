@@ -37,10 +37,16 @@ class Near:
 
 @dataclass(frozen=True)
 class Stands:
-    """How well a set of effects stands: the part of the squares beyond noise that it leaves, and its ln Z."""
+    """How well a set of effects stands.
+
+    left : part of the squares beyond noise of the plain model that it leaves
+    log_evidence : its ln Z
+    plausible : its effects are of sizes that occur: else nothing is told to be as probable as its twin
+    """
 
     left: float
     log_evidence: float = 0.0
+    plausible: bool = True
 
 
 Pairs = Mapping[Set, Near]
@@ -108,4 +114,5 @@ def levelled(weights: Mapping[Set, float], stands: Mapping[Set, Stands], pairs: 
 
 
 def _near(one: Stands, other: Stands, pair: Near) -> bool:
-    return one.left - other.left < pair.left and other.log_evidence - one.log_evidence < pair.behind
+    near = one.left - other.left < pair.left and other.log_evidence - one.log_evidence < pair.behind
+    return one.plausible and near

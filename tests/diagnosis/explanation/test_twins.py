@@ -44,6 +44,17 @@ def test_a_twin_that_is_far_behind_is_told_apart(behind: float, told: float) -> 
     assert weights[B] + levelled(weights, stands, PAIRS)[B] == pytest.approx(told)
 
 
+@pytest.mark.parametrize(("left", "told"), [(0.02, 0.0 - np.log(BELIEFS.apart)), (1.0, -60.0)])
+def test_an_implausible_set_raises_a_twin_that_leaves_as_little_and_no_other(left: float, told: float) -> None:
+    weights, stands = {A: 0.0, B: -60.0}, {A: Stands(0.01, plausible=False), B: Stands(left)}
+    assert weights[B] + levelled(weights, stands, PAIRS)[B] == pytest.approx(told)
+
+
+def test_a_set_that_is_implausible_itself_is_not_raised() -> None:
+    weights, stands = {A: 0.0, B: -60.0}, {A: Stands(0.01, plausible=False), B: Stands(0.01, plausible=False)}
+    assert levelled(weights, stands, PAIRS)[B] == 0.0
+
+
 def test_levels_are_those_of_a_first_look_whoever_is_raised() -> None:
     """b is raised by a, and c by b as it was: no chain of twins lifts what nobody near has."""
     pairs = {frozenset(("a", "b")): Near(0.05), frozenset(("b", "c")): Near(0.05)}
