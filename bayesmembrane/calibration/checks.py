@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesmembrane.data.thinning import MOST
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.symmetric import eigh
 from bayesmembrane.physics.noise.base import Noise, NoiseLikelihood
 
 CURVES = 200
@@ -64,7 +65,7 @@ def directions(rows: Array, count: int) -> Array:
     """
     if rows.shape[1] <= MOST:
         return np.asarray(np.linalg.svd(rows, full_matrices=False)[2][:count])
-    _, u = np.linalg.eigh(rows @ rows.T)
+    _, u = eigh(rows @ rows.T)
     return np.asarray(np.linalg.qr(rows.T @ u[:, ::-1][:, :count])[0].T)
 
 

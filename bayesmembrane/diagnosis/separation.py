@@ -13,6 +13,7 @@ from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.ground.errors import BayesmembraneError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.symmetric import eigh
 from bayesmembrane.next_test.further import FurtherTest, Kind, OnFilm, other_motions
 from bayesmembrane.next_test.gain import confused
 from bayesmembrane.physics.effects.base import Compliance
@@ -101,7 +102,7 @@ def _one(c: Candidate, search: Search, noise: OwnNoise, shown: tuple[Array, Arra
     k = c.x.size
     mean, covariance = search.linear(c).first(c.theta, k)
     own = slopes * search.steepness(c)
-    value, vector = np.linalg.eigh(covariance)
+    value, vector = eigh(covariance)
     open_yet = own @ (vector * np.sqrt(np.maximum(value, 0.0)))
     moved = force + own @ (mean - search.coefficients_at(c))
     white = noise.white(np.column_stack([moved, open_yet, forms]))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.symmetric import eigh
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +31,7 @@ def closest_approach(first: Array, second: Array, covariance: Array) -> Approach
     It is exact for the polylines: every piece of one against every piece of the other (C. Ericson, Real-Time Collision
     Detection, 2005, 5.1.9). Directions that the covariance (k, k) leaves without spread count as infinitely far.
     """
-    values, axes = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    values, axes = eigh(0.5 * (covariance + covariance.T))
     spread = np.sqrt(np.maximum(values, 1e-30 * max(float(np.max(values)), 1e-300)))
     white = axes / spread
     a, b = first @ white, second @ white

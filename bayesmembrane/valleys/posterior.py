@@ -13,6 +13,7 @@ from bayesmembrane.calibration.descent import descend
 from bayesmembrane.calibration.objective import Objective
 from bayesmembrane.calibration.prior import JointPrior
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.symmetric import normal_draws
 from bayesmembrane.physics.convexity import RESTRICTING, ConvexityMode
 from bayesmembrane.physics.form_error import traces
 from bayesmembrane.physics.noise.base import NoiseLikelihood, force_scale
@@ -217,7 +218,7 @@ class NormalPosterior:
         """Mean, covariance and draws of the normal distribution."""
         covariance = np.linalg.inv(self.precision(self.z[None, :])[0])
         covariance = 0.5 * (covariance + covariance.T)
-        draws = np.random.default_rng(seed).multivariate_normal(self.z, covariance, size=size, method="eigh")
+        draws = self.z + normal_draws(covariance, size, np.random.default_rng(seed))
         return Spread(self.z, covariance, draws, "normal")
 
 

@@ -13,6 +13,7 @@ from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.showable import Showable
+from bayesmembrane.ground.symmetric import eigh
 
 if TYPE_CHECKING:
     from bayesmembrane.calibration.hierarchy.next_curve import NextCurve
@@ -162,7 +163,7 @@ def _own(s: Specimens, mean: Array, tau: Array, rng: np.random.Generator) -> Arr
 
 def _normal(mean: Array, covariance: Array, rng: np.random.Generator) -> Array:
     """One draw of N(mean, covariance) for each row; the covariance may be singular."""
-    values, vectors = np.linalg.eigh(0.5 * (covariance + np.swapaxes(covariance, 1, 2)))
+    values, vectors = eigh(0.5 * (covariance + np.swapaxes(covariance, 1, 2)))
     z = np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(mean.shape)
     return np.asarray(mean + np.einsum("bij,bj->bi", vectors, z))
 

@@ -11,6 +11,7 @@ from bayesmembrane.calibration.joint.claim import labelled
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.ground.errors import SettingsError, unknown_name
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.symmetric import eigh
 
 LN_MODULUS = "ln_modulus"
 """ln(G / Pa): the first coordinate of every material less ln(thickness), for films of one rubber share no G d."""
@@ -127,7 +128,7 @@ def _likelihood(run: Run, full: Sequence[str]) -> tuple[Array, Array, float]:
         if name.endswith(".ln_gd"):
             centre[i] -= np.log(run.measurement.specimen.thickness)
     after = np.linalg.inv(covariance)
-    values, vectors = np.linalg.eigh((after - np.diag(before)) / np.sqrt(np.outer(before, before)))
+    values, vectors = eigh((after - np.diag(before)) / np.sqrt(np.outer(before, before)))
     root = np.sqrt(before)
     precision = root[:, None] * (vectors * np.maximum(values, FLAT)) @ vectors.T * root
     value = np.linalg.solve(precision, after @ mean - before * centre)

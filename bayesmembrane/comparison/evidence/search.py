@@ -18,6 +18,7 @@ from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.comparison.evidence.target import Coverage, Problem, smallest
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.sobol import scrambled_sobol
+from bayesmembrane.ground.symmetric import eigh
 
 NEIGHBOURS = 17  # than all of which a start is higher
 FEW, LOOKED_AT = 4, 8192  # dimensions up to which all points are looked at, and how many beyond
@@ -187,7 +188,7 @@ def _spread(problem: Problem, v: Array, slope: Array) -> Array:
     h = 3 * DIFFERENCE * np.eye(k)
     at = np.concatenate([v[:, None] + h, v[:, None] - h]).reshape(-1, k)
     up, down = _slope(problem, at, density(problem, at)).reshape(2, b, k, k)
-    values, vectors = np.linalg.eigh(-0.25 * (up - down + (up - down).transpose(0, 2, 1)) / (3 * DIFFERENCE))
+    values, vectors = eigh(-0.25 * (up - down + (up - down).transpose(0, 2, 1)) / (3 * DIFFERENCE))
     precision = (vectors * np.maximum(np.abs(values), 1.0)[:, None, :]) @ vectors.transpose(0, 2, 1)
     return np.asarray(np.linalg.inv(precision + slope[:, :, None] ** 2 * np.eye(k)))
 
@@ -270,9 +271,9 @@ def joined(fitted: Sequence[Mixture], share: Array) -> Mixture:
 
 
 def _single(centre: Array, covariance: Array) -> Mixture:
-    values, vectors = np.linalg.eigh(covariance)
+    values, vectors = eigh(covariance)
     values = np.clip(values, 1e-14, 4.0)  # the posterior is no wider than the prior, but where the likelihood says so
-    root = np.linalg.cholesky((vectors * values) @ vectors.T)
+    root = np.asarray(np.linalg.cholesky((vectors * values) @ vectors.T), dtype=float)
     return Mixture(np.zeros(1), centre[None], WIDER * root[None], DEGREES)
 
 

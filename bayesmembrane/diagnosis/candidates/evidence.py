@@ -24,6 +24,7 @@ from bayesmembrane.diagnosis.candidates.gram import Gram, Inverse
 from bayesmembrane.diagnosis.thresholds import FORM
 from bayesmembrane.ground.lately import Lately
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.symmetric import eigh
 
 LATTICE = np.abs(2 * np.modf(np.arange(1, 402)[:, None] * np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0]))[0] - 1)
 """(M, 6) points that fill the unit cube evenly (R. D. Richtmyer's, folded)."""
@@ -296,7 +297,7 @@ def _climbed(model: Linear, starts: Sequence[Array]) -> tuple[Array, Density]:
 def _bent(model: Linear, at: Density) -> tuple[Array, Array]:
     """(curvatures (h,) of -ln p in those of the prior, axes (h, h)): -bend = axes diag(curvatures) axes^T."""
     sd = model.priors[:, 1]
-    value, vector = np.linalg.eigh(-at.bend * np.outer(sd, sd))
+    value, vector = eigh(-at.bend * np.outer(sd, sd))
     return value, vector / sd[:, None]
 
 

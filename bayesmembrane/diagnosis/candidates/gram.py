@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.symmetric import eigh
 
 Place = slice | NDArray[np.intp]
 """Numbers of columns; a slice, which costs no copy, where they stand side by side."""
@@ -64,7 +65,7 @@ class Gram:
         factor, fault = lapack.dpotrf(c.T, lower=1)
         if not fault:
             return Inverse(factor, None, part, rest, self.places)
-        value, vector = np.linalg.eigh(c)
+        value, vector = eigh(c)
         value = np.maximum(value, 1.0)  # none is below 1: what is, is round-off
         return Inverse(np.diag(np.sqrt(value)), (vector / value) @ vector.T, part, rest, self.places)
 

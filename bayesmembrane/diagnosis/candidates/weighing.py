@@ -18,6 +18,7 @@ from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.thresholds import FORM, SEARCH, TINY
 from bayesmembrane.ground.lately import Lately
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
+from bayesmembrane.ground.symmetric import eigh
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.form_error import LARGEST, LOCAL
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -243,7 +244,7 @@ class Weighing(ABC):
 
     def _apart(self, columns: Array) -> tuple[Array, Array]:
         white = self.noise.white(columns)
-        turn = np.linalg.eigh(white.T @ white)[1]
+        turn = eigh(white.T @ white)[1]
         return white @ turn, turn
 
     @cached_property
@@ -263,7 +264,7 @@ class Weighing(ABC):
         etas = [1.0 if b.ln_eta is None else _eta(b.ln_eta[0], next(found), capped) for b in forms]
         columns = np.column_stack([eta * b.columns for eta, b in zip(etas, forms, strict=True)])
         # From the products: LAPACK's decomposition of the columns themselves fails where some are next to nothing.
-        square, v = np.linalg.eigh(columns.T @ columns)
+        square, v = eigh(columns.T @ columns)
         keep = square > SEARCH.least_form**2
         q = columns @ (v[:, keep] / np.sqrt(square[keep]))
         return Freeing(self.noise, q, 1 - 1 / np.sqrt(1 + square[keep]))

@@ -11,6 +11,7 @@ import numpy as np
 from bayesmembrane.diagnosis.reference.noise import Whitened
 from bayesmembrane.diagnosis.thresholds import DETECTION
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.symmetric import eigh
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,7 @@ def score_test(model: Whitened, found: Sequence[Signature], rng: np.random.Gener
     s = np.stack([f.direction for f in found])
     one_sided = np.array([f.one_sided for f in found])
     value = _folded(s @ model.residual, one_sided)
-    w, v = np.linalg.eigh(s @ s.T)
+    w, v = eigh(s @ s.T)
     root = v * np.sqrt(np.maximum(w, 0.0))
     z = rng.standard_normal((DETECTION.draws, len(found))) @ root.T
     if np.isfinite(dof):

@@ -15,6 +15,7 @@ from scipy.linalg import solve_triangular
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array, Natural, Parameter
+from bayesmembrane.ground.symmetric import eigh
 from bayesmembrane.physics.form_error import (
     ENERGY,
     LAW,
@@ -95,7 +96,7 @@ class FormLikelihood(NoiseLikelihood):
         self.own, self.spots = np.zeros(len(measurement)), np.zeros(len(measurement))
         self.spots[self.factors.spots] = 1.0
         if measurement.covariance is not None:
-            self.own, self.axes = np.linalg.eigh(measurement.covariance)
+            self.own, self.axes = eigh(measurement.covariance)
         elif measurement.force_sd is not None:
             self.own = measurement.force_sd**2
         self.force = measurement.force[None, :]

@@ -10,6 +10,7 @@ import numpy as np
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array, Natural, Parameter
+from bayesmembrane.ground.symmetric import eigh
 from bayesmembrane.physics.noise.base import LN_SD, SD, Noise, NoiseLikelihood, NoiseSpectrum, conditional, force_scale
 
 
@@ -62,7 +63,7 @@ class WhiteLikelihood(NoiseLikelihood):
         self.size = len(measurement)
         self.variance = np.zeros(self.size)
         if measurement.covariance is not None:
-            self.variance, self.axes = np.linalg.eigh(measurement.covariance)
+            self.variance, self.axes = eigh(measurement.covariance)
         elif measurement.force_sd is not None:
             self.variance = measurement.force_sd**2
         if self.axes is None and np.ptp(self.variance) == 0:

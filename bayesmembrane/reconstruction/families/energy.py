@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import ndtr, ndtri
 
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.symmetric import eigh
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.reconstruction.families.base import CurveFamily
 from bayesmembrane.reconstruction.families.displaced import OFFSET, SHIFT
@@ -212,6 +213,6 @@ def matern_basis(top: float) -> CubicSpline:
     """Functions on [0, top] (m) that span a Gaussian process of standard deviation 1: Matern 5/2."""
     x = np.linspace(0.0, top, 601)
     r = np.sqrt(5.0) * np.abs(x[:, None] - x) / LENGTH
-    sizes, modes = np.linalg.eigh((1 + r + r**2 / 3) * np.exp(-r))
+    sizes, modes = eigh((1 + r + r**2 / 3) * np.exp(-r))
     modes = modes[:, ::-1][:, :MODES] * np.sqrt(sizes[::-1][:MODES])
     return CubicSpline(x, modes * np.sign(modes[-1]))

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.symmetric import eigh
 from bayesmembrane.reconstruction.families.base import CurveFamily
 from bayesmembrane.reconstruction.simulations import Simulations
 
@@ -32,7 +33,7 @@ def wiener_basis(top: float, line: tuple[float, float], rate: Callable[[Array], 
         middle = 0.5 * (s[1:] + s[:-1])
         ramp = np.maximum(s[:, None] - middle, 0.0) * rate(LENGTH * middle) * np.sqrt(s[1])
         kernel = ramp @ ramp.T
-    sizes, modes = np.linalg.eigh(kernel)
+    sizes, modes = eigh(kernel)
     modes = modes[:, ::-1][:, :MODES] * np.sqrt(sizes[::-1][:MODES])
     modes = modes * np.sign(modes[-1])
     return CubicSpline(x, np.column_stack([np.full(x.size, line[0]), line[1] * s, modes]))

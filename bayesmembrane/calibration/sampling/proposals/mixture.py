@@ -10,6 +10,7 @@ from scipy.cluster.vq import kmeans2
 from scipy.special import gammaln
 
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.symmetric import eigh
 
 COUNTS = (1, 2, 4, 7, 11, 16, 24)
 DEGREES = (4.0, 10.0, 50.0)
@@ -130,7 +131,7 @@ def _whitening(x: Array) -> tuple[Array, Array]:
     scale = np.std(x, axis=0)
     if not np.all(scale > SAME * np.max(np.abs(x), axis=0)):
         raise np.linalg.LinAlgError("the draws do not differ")
-    values, vectors = np.linalg.eigh(np.atleast_2d(np.cov((x / scale).T)))
+    values, vectors = eigh(np.atleast_2d(np.cov((x / scale).T)))
     root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 1e-14))
     return np.mean(x, axis=0), root
 
