@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.calibration import prediction_store
 from bayesmembrane.calibration.few import weighing
 from bayesmembrane.calibration.layout import measurement_of
 from bayesmembrane.calibration.outcome import MOST_DRAWS, outcome
@@ -321,6 +322,11 @@ def stored_predictions(run: Run, wanted: Wanted | None = None) -> Predictions | 
     Raises `StorageError` if they are damaged.
     """
     return None if run.path is None else read_predictions(run.path, run.draws_name, wanted)
+
+
+def has_predictions(run: Run) -> bool:
+    """Whether predictions of these draws are stored with a run; raises `StorageError` if they are damaged."""
+    return run.path is not None and prediction_store.has_predictions(run.path, run.draws_name)
 
 
 def _tally(solve: Solve) -> Tally | None:

@@ -15,7 +15,7 @@ from bayesmembrane.calibration.fingerprint import code_of
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.predictions import Wanted, rest_of
 from bayesmembrane.calibration.prior import Mass
-from bayesmembrane.calibration.run import Run, RunSettings, load_run, predictions_of, sample, stored_predictions
+from bayesmembrane.calibration.run import Run, RunSettings, has_predictions, load_run, predictions_of, sample
 from bayesmembrane.calibration.sampling.walk import Progress, Settings
 from bayesmembrane.calibration.starts import starting_points
 from bayesmembrane.calibration.store import describe, run_name
@@ -212,7 +212,7 @@ def _run(job: Job, tell: Tell) -> Run:
 
 def _predict(job: Job, run: Run, tell: Tell) -> None:
     """Store what a report will show of a run, unless that is there."""
-    if run.path is not None and stored_predictions(run) is None:
+    if run.path is not None and not has_predictions(run):
         tell(job.label, "predictions")
         predictions_of(run, Wanted(rest=rest_of(job.measurement, job.whole)))
 

@@ -1,5 +1,6 @@
 """Predictions say what the draws say, and are stored with them."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,15 @@ import pytest
 from bayesmembrane.calibration.beside_paper import BreakPoint
 from bayesmembrane.calibration.prediction_store import FILE
 from bayesmembrane.calibration.predictions import Predictions, Wanted, predict_draws
-from bayesmembrane.calibration.run import Run, RunSettings, load_run, predictions_of, sample, stored_predictions
+from bayesmembrane.calibration.run import (
+    Run,
+    RunSettings,
+    has_predictions,
+    load_run,
+    predictions_of,
+    sample,
+    stored_predictions,
+)
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.errors import StorageError
@@ -150,9 +159,11 @@ def assert_same(a: Predictions, b: Predictions) -> None:
 
 def test_stored_predictions_equal_those_that_were_computed(run: Run) -> None:
     assert stored_predictions(run) is None
+    assert not has_predictions(run)
     fresh = predictions_of(run, Wanted(breaks=(BreakPoint("1", 100e-6, 0.02, 1.0),), draws=10))
     again = stored_predictions(run)
     assert again is not None
+    assert has_predictions(run)
     assert_same(fresh, again)
 
 
@@ -182,9 +193,11 @@ def test_predictions_of_other_draws_do_not_count(run: Run) -> None:
     predictions_of(run, Wanted(up_to=0.05, draws=10))
     other = Run(run.name, run.path, run.settings, {**run.status, "evaluations": 1}, run.data)
     assert stored_predictions(other) is None
+    assert not has_predictions(other)
 
 
-def test_damaged_predictions_are_named(run: Run, tmp_path: Path) -> None:
+@pytest.mark.parametrize("asked", [stored_predictions, has_predictions])
+def test_damaged_predictions_are_named(asked: Callable[[Run], object], run: Run, tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(b"no netCDF")
     with pytest.raises(StorageError, match=r"the file of predictions is damaged"):
-        stored_predictions(Run(run.name, tmp_path, run.settings, run.status, run.data))
+        asked(Run(run.name, tmp_path, run.settings, run.status, run.data))

@@ -10,7 +10,7 @@ import numpy as np
 
 from bayesmembrane.calibration.joint.fit import JointFit
 from bayesmembrane.calibration.joint.run import KIND, JointRun
-from bayesmembrane.calibration.run import stored_predictions
+from bayesmembrane.calibration.run import has_predictions
 from bayesmembrane.ground.parameters import Natural
 from bayesmembrane.ground.registry import components
 from bayesmembrane.ground.stored import read
@@ -166,7 +166,7 @@ def _optimum(fit: JointFit) -> Table:
 
 def _with_predictions(run: JointRun) -> list[Shown]:
     """The tests whose predictions are stored: nothing is solved here."""
-    return [shown_run(part) for part in run.parts if stored_predictions(part) is not None]
+    return [shown_run(part) for part in run.parts if has_predictions(part)]
 
 
 def _bands(run: JointRun, shown: Sequence[Shown]) -> Figure:

@@ -12,7 +12,7 @@ import numpy as np
 
 from bayesmembrane.calibration import store
 from bayesmembrane.calibration.beside_paper import Compared
-from bayesmembrane.calibration.run import Run, stored_predictions
+from bayesmembrane.calibration.run import Run, has_predictions
 from bayesmembrane.report.blocks import Block, Figure, Heading, Part, Text
 from bayesmembrane.report.render import fragment
 from bayesmembrane.report.runs import Shown, in_order, reach, read
@@ -76,14 +76,14 @@ class RunSection(Section):
 
     def text(self, result: Any) -> str:
         """What is known without solving: of a run without predictions, what a reader must know of its draws."""
-        if isinstance(result, Run) and stored_predictions(result) is None:
+        if isinstance(result, Run) and not has_predictions(result):
             told = sentences(result.quality) or (f"{result.draws().shape[0]} draws, no predictions stored.",)
             return "\n".join([f"{spoken(result.hypothesis)}, {result.name}", *told])
         shown = read(result) if isinstance(result, Run) else result
         return "\n".join([f"{shown.name}, fitted up to {shown.end}", *_sentences(shown)])
 
     def html(self, result: Any) -> str:
-        if isinstance(result, Run) and stored_predictions(result) is None:
+        if isinstance(result, Run) and not has_predictions(result):
             return fragment([Text(line) for line in self.text(result).splitlines()])
         return super().html(result)
 
