@@ -21,8 +21,9 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import OTHER_TESTS
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.symmetric import normal_draws
 from bayesmembrane.ground.threads import one_thread
-from bayesmembrane.physics.form_error import FormFactors, joint_factors
+from bayesmembrane.physics.form_error import FormFactors, at_another_speed, joint_factors
 from bayesmembrane.physics.forward import Forward
 
 
@@ -114,7 +115,7 @@ def _draws(search: Search, c: Candidate, other: Measurement, count: int, rng: np
     there = _at(search, c, other)
     if there is None:
         return None
-    z = rng.multivariate_normal(np.zeros(len(there.covariance)), there.covariance, count, method="eigh")
+    z = normal_draws(there.covariance, count, rng)
     return np.asarray(there.force + there.moved + z @ there.columns.T)
 
 
@@ -127,5 +128,6 @@ def _at(search: Search, c: Candidate, other: Measurement) -> Continued | None:
         return None
     rows = n + other.on_path
     factors = FormFactors(both.state[rows], both.progress[rows])
-    there = continued(part, fit, Forward(c.hypothesis, other, other.deflection, part.quick), factors)
+    faster = at_another_speed(search.measurement.path, other.path)
+    there = continued(part, fit, Forward(c.hypothesis, other, other.deflection, part.quick), factors, faster)
     return there if there.complete else None

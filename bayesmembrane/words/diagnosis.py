@@ -407,12 +407,13 @@ def _model(candidate: Candidate) -> str:
 
 
 def _misses(found: Diagnosis) -> str:
+    model = _model(found.null) if found.declared else f"{_model(found.null)}, the nearest of all energies,"
     if found.detection.adequate:
         return (
-            f"{_model(found.null)} follows the curve (p = {found.detection.p_value:.2g}), but with parameters that "
+            f"{model} follows the curve (p = {found.detection.p_value:.2g}), but with parameters that "
             "are less probable than another explanation: "
         )
-    return f"{_model(found.null)} misses something (p {_p(found)}): "
+    return f"{model} misses something (p {_p(found)}): "
 
 
 def _p(found: Diagnosis) -> str:

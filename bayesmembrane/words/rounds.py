@@ -41,9 +41,10 @@ def _settled(r: Round) -> Diagnosis:
 
 def subject(found: Loop) -> str:
     """Film, model, readings and range that a loop started from."""
-    m = found.rounds[0].before.run.measurement
+    m, first = found.rounds[0].before.run.measurement, found.rounds[0].diagnosis
     end = seen(m).place(float(np.max(m.deflection)))
-    return f"{m.specimen.name}, {spoken(found.rounds[0].diagnosis.null.hypothesis)}, {len(m)} readings up to {end}"
+    model = spoken(first.null.hypothesis) if first.declared else "no energy declared"
+    return f"{m.specimen.name}, {model}, {len(m)} readings up to {end}"
 
 
 def validation_sentences(found: Loop) -> list[str]:

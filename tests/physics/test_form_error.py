@@ -8,12 +8,15 @@ from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.form_error import (
     PROGRESS_LENGTHS,
+    SPEED,
     STATE_LENGTHS,
+    at_another_speed,
     form_factors,
     joint_factors,
     progress,
     states,
     traces,
+    unseen_columns,
     unsteady,
 )
 from bayesmembrane.physics.forward import Forward
@@ -66,6 +69,26 @@ def test_joint_factors_are_the_same_process_at_the_readings() -> None:
         np.testing.assert_allclose(a[:n] @ a[:n].T, b @ b.T, atol=4e-3)
     everywhere = np.concatenate([states(m)[:, 0], there.deflection / m.full_range])[:, None]
     np.testing.assert_allclose(joint.state @ joint.state.T, kernel(everywhere, STATE_LENGTHS), atol=2e-3)
+
+
+def test_a_law_is_off_at_another_speed_by_its_logarithm_whichever_is_the_faster() -> None:
+    def at(times: float | None) -> Motion:
+        m = cyclic()
+        return Motion(m.deflection, None if times is None or m.time is None else m.time / times, m.full_range)
+
+    assert at_another_speed(at(1), at(1)) == 0
+    assert at_another_speed(at(1), at(4)) == pytest.approx(SPEED * np.log(4))
+    assert at_another_speed(at(4), at(1)) == pytest.approx(SPEED * np.log(4))
+    assert at_another_speed(at(1), at(None)) == at_another_speed(at(None), at(1)) == 0
+
+
+def test_what_another_speed_may_show_is_as_large_as_trace_and_part_of_the_force_together() -> None:
+    m, h = cyclic(40), hypothesis("neo_hookean", ["force_offset", "friction"])
+    rng = np.random.default_rng(2)
+    force, trace = m.force, rng.standard_normal((2, 40))
+    (columns,) = unseen_columns(form_factors(m), force, h.effects, trace)  # an offset is exact
+    part = np.linalg.norm(trace[1]) / np.linalg.norm(force)
+    assert np.sum(columns**2, axis=1) == pytest.approx(trace[1] ** 2 + (part * force) ** 2)
 
 
 @pytest.mark.parametrize("name", LAWS)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.form_error import FormFactors, form_columns, traces
+from bayesmembrane.physics.form_error import FormFactors, form_columns, traces, unseen_columns
 from bayesmembrane.physics.forward import Forward
 
 
@@ -30,10 +31,11 @@ class Continued:
     complete: bool
 
 
-def continued(part: Search, fit: Candidate, forward: Forward, factors: FormFactors) -> Continued:
+def continued(part: Search, fit: Candidate, forward: Forward, factors: FormFactors, further: float = 0.0) -> Continued:
     """What a ``fit`` to ``part`` says of the readings of ``forward``, which have the ``factors``.
 
     Its form errors go on as far as they are smooth; those without factors there are left out.
+    ``further`` : relative error of every law that nothing here tells of, `unseen_columns`
     """
     new = forward(fit.x[None, :], sensitivities=True, reached=False)
     assert new.sensitivity is not None
@@ -47,4 +49,9 @@ def continued(part: Search, fit: Candidate, forward: Forward, factors: FormFacto
     mean[: fit.x.size] -= part.coefficients_at(fit)
     # What is not steady in one test is another thing in another: its columns are the last, and are not there.
     m = columns.shape[1]
-    return Continued(force, columns @ mean[:m], columns, covariance[:m, :m], complete)
+    moved, covariance = columns @ mean[:m], covariance[:m, :m]
+    if further > 0:
+        unseen = unseen_columns(factors, force, fit.hypothesis.effects, trace)
+        columns = np.column_stack([columns, *(further * c for c in unseen)])
+        covariance = block_diag(covariance, np.eye(columns.shape[1] - m))
+    return Continued(force, moved, columns, covariance, complete)

@@ -31,7 +31,7 @@ from bayesmembrane.words.candidates import candidate_title
 from bayesmembrane.words.diagnosis import document, set_aside
 from bayesmembrane.words.moved import Change, changes, modulus_fitted, modulus_sentence
 from bayesmembrane.words.next_test import spoken_test
-from bayesmembrane.words.rounds import answer, bound_sentences, moved, rival_sentences, validation_sentences
+from bayesmembrane.words.rounds import answer, bound_sentences, moved, rival_sentences, subject, validation_sentences
 from bayesmembrane.words.seen import DISC, seen
 from bayesmembrane.words.units import size_in_words
 from tests.generator.datasets import THICKNESS
@@ -166,6 +166,15 @@ def test_the_answer_tells_every_round(named: Loop) -> None:
     first, second = answer(named)
     assert "misses something (p < 0.0001): friction in the guide" in first
     assert second.startswith("With that: neo-Hookean with friction in the guide describes the curve")
+
+
+def test_an_energy_that_nobody_declared_is_told_as_the_nearest_one(named: Loop) -> None:
+    assert ", neo-Hookean, " in subject(named)
+    first = named.rounds[0]
+    free = replace(first, diagnosis=replace(first.diagnosis, declared=False))
+    assert ", no energy declared, " in subject(Loop((free,), None))
+    told = answer(Loop((free, *named.rounds[1:]), None))
+    assert told[0].startswith("neo-Hookean, the nearest of all energies, misses something")
 
 
 def test_what_the_first_screen_tells_is_not_told_again(ambiguous: Loop) -> None:
