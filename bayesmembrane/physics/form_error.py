@@ -85,8 +85,8 @@ DECADE = 0.3
 SPEED = 0.3
 """Per factor of e in the speed: how far a law is off beside what it was off, where the speed is another one.
 
-Of 12 predictions of VHB 4910 at 1.7 to 5 times the speed or that part of it (peaks 1.5 and 2.5, docs/studies/vhb.md) 90 %
-bands held 62 % of the readings without it, 84 % with 0.2, 89 % with 0.3 and 91 % with 0.4; of the 6 of peak 2.0, which were
+Of 12 predictions of VHB 4910 at other speeds, 1.7 to 5 times apart (peaks 1.5 and 2.5, docs/studies/vhb.md), 90 % bands
+held 62 % of the readings without it, 84 % with 0.2, 89 % with 0.3 and 91 % with 0.4; of the 6 of peak 2.0, which were
 not looked at for that, 64, 81, 88 and 93 %.
 """
 KNOTS = 240
@@ -241,8 +241,8 @@ def unseen_columns(factors: FormFactors, force: Array, effects: Sequence[Effect]
 
         (t^2 + (F |t| / |F|)^2)^(1/2) v(progress),
 
-    with its trace t of ``traces`` (E, N) N and the ``force`` F (N,) N. What relaxed before the first reading, or would in
-    a slower test only, is no part of the trace, but of the force.
+    with its trace t of ``traces`` (E, N) N and the ``force`` F (N,) N. What relaxed before the first reading, or would
+    in a slower test only, is no part of the trace, but of the force.
     """
     laws = [trace for effect, trace in zip(effects, traces, strict=True) if not effect.exact]
     whole = max(float(np.linalg.norm(force)), 1e-300)
