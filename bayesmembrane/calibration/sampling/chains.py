@@ -49,6 +49,11 @@ class Chains:
         return int(self.x.shape[1])
 
     @property
+    def learned(self) -> int:
+        """Steps until the last lesson; what came before does not count."""
+        return self.lessons[-1] if self.lessons else 0
+
+    @property
     def evaluations(self) -> int:
         return sum(self.counts.values())
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.proposals.filling import NEAR, around_largest, joined
 from bayesmembrane.calibration.sampling.proposals.generator import generator_of
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.calibration.sampling.proposals.proposing import Proposing, proposing
@@ -17,6 +18,8 @@ from bayesmembrane.ground.parameters import Array
 
 BLOCK = 32
 """Steps that are solved at once. Blocks end at its multiples, so that a walk that goes on has the same ones."""
+LOOKED_AT, MENDING = 2000, 0.2
+"""States at most that are looked at for where a mixture holds walkers up, and the weight of what is added there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +64,33 @@ def leap(posterior: Posterior, mixture: Mixture, standing: Chains, steps: int, c
 
 
 def offers(chains: Chains) -> Worth:
-    """What all that it offered says of the mixture."""
-    return worth(np.empty(0) if chains.offered is None else chains.offered.ravel())
+    """What all that it offered says of the mixture; what another one offered before the last lesson does not count."""
+    return worth(np.empty(0) if chains.offered is None else chains.offered[:, chains.learned :].ravel())
+
+
+def mended(posterior: Posterior, chains: Chains) -> Mixture | None:
+    """The mixture with more components where walkers are held up; None where what they walked fills no volume.
+
+    A walker stands where w = p / g is large, which a few thousand weights of offers do not show where that is a small
+    place; the walkers do, for they are distributed as the posterior, nearly.
+    """
+    assert chains.mixture is not None
+    first = chains.learned
+    flat = chains.x[:, first:].reshape(-1, chains.x.shape[-1])
+    lp = chains.log_posterior[:, first:].ravel()
+    _, at = np.unique(flat, axis=0, return_index=True)
+    at = np.random.default_rng(chains.steps).permutation(at)[:LOOKED_AT]
+    proposal = proposing(posterior, chains.mixture)
+    w = proposal.log_weights(flat[at], lp[at])
+    places = proposal.places(flat[at])
+    w = np.where(np.isfinite(w), np.exp(w - np.max(w)), 0.0)
+    if len(at) < NEAR:
+        return None
+    try:
+        more = around_largest(places, w, np.atleast_2d(np.cov(places.T)))
+    except np.linalg.LinAlgError:
+        return None
+    return joined([(chains.mixture, 1 - MENDING), (more, MENDING)])
 
 
 def _drawn(proposal: Proposing, state: Any, count: int) -> tuple[Array, Array, Any]:

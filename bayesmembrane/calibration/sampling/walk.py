@@ -18,7 +18,7 @@ from bayesmembrane.calibration.posterior import Outcomes, Posterior, weighed
 from bayesmembrane.calibration.sampling.chains import Chains, joined
 from bayesmembrane.calibration.sampling.convergence import BURN_TAUS, LEAST_STEPS, LEAST_TAUS, Convergence, convergence
 from bayesmembrane.calibration.sampling.growing import picked
-from bayesmembrane.calibration.sampling.leaps import BLOCK, blocks, leap, offers
+from bayesmembrane.calibration.sampling.leaps import BLOCK, blocks, leap, mended, offers
 from bayesmembrane.calibration.sampling.proposals.independent import Independent, independent
 from bayesmembrane.calibration.sampling.proposals.learned import learn, next_lesson
 from bayesmembrane.calibration.sampling.weights import Worth
@@ -39,6 +39,8 @@ they have to walk along a narrow valley."""
 DOUBTED = 5000  # draws of a mixture after which it is looked at for the first time
 GIVEN_UP = 2 * DOUBTED
 """Draws from which on a mixture whose weights are not good is given up; until then no draw of it counts."""
+MENDED = 8
+"""Times that a mixture is mended before ensembles walk instead."""
 GROWTH = 1.25  # a look costs little, but nothing is learned from looking at every step
 
 
@@ -157,6 +159,9 @@ def run_ensembles(
             if walk.chains.steps >= settings.most_steps:
                 status = "step limit"
                 break
+            if not _worth_it(posterior, walk.chains, found) and walk.mend():
+                target = min(settings.most_steps, walk.chains.look)
+                continue
             if walk.chains.steps >= next_lesson(walk.chains) or not _worth_it(posterior, walk.chains, found):
                 walk.learn()
             target = min(settings.most_steps, _next_look(walk.chains, found, settings))
@@ -178,7 +183,8 @@ def _worth_it(posterior: Posterior, chains: Chains, found: Convergence) -> bool:
     of_shapes = chains.mixture.means.shape[1] < posterior.size
     slow = LEAST_TAUS * float(np.max(found.tau)) > (SLOW_SHAPES if of_shapes else SLOW)
     # Few weights that end at a bound, as where the prior is cut, look like a tail: they are given some more.
-    return not slow and (_good(chains) or chains.offered.size < GIVEN_UP)
+    few = chains.offered[:, chains.learned :].size < GIVEN_UP
+    return not slow and (_good(chains) or few)
 
 
 def _next_look(chains: Chains, found: Convergence, settings: Settings) -> int:
@@ -190,11 +196,11 @@ def _next_look(chains: Chains, found: Convergence, settings: Settings) -> int:
     needed = max(LEAST_TAUS * tau, (steps - found.burn) * settings.ess / float(np.min(found.ess)))
     guess = int(np.ceil(needed * 1.02)) + found.burn
     if chains.mixture is not None:
-        judged = offers(chains)
+        judged, twice = offers(chains), 2 * steps - chains.learned
         if not judged.good:
-            return blocks(2 * steps)
-        for_z = _proposals_for_z(judged) / chains.log_posterior[:, 0].size
-        return blocks(min(max(guess, for_z, steps + BLOCK), 2 * steps))
+            return blocks(twice)
+        for_z = chains.learned + _proposals_for_z(judged) / chains.log_posterior[:, 0].size
+        return blocks(min(max(guess, for_z, steps + BLOCK), twice))
     return int(
         min(max(guess, steps + settings.chunk // 2, int(1.1 * steps)), max(int(GROWTH * steps), 2 * settings.chunk))
     )
@@ -317,6 +323,20 @@ class _Walk:
         self.chains = replace(self.chains, lessons=(*self.chains.lessons, self.chains.steps))
         self.standing = (self.chains.steps, self.chains)
         self.known = learn(self.posterior, self.chains)
+
+    def mend(self) -> bool:
+        """Have a mixture propose from now on where it held walkers up, too; False if it was mended often enough."""
+        if self.chains.mixture is None or len(self.chains.lessons) >= MENDED:
+            return False
+        mixture = mended(self.posterior, self.chains)
+        if mixture is None:
+            return False
+        self.save()  # a segment holds steps of one mixture
+        steps, count = self.chains.steps, self.chains.log_posterior[:, 0].size
+        look = steps + blocks(DOUBTED / count)
+        self.chains = replace(self.chains, mixture=mixture, lessons=(*self.chains.lessons, steps), look=look)
+        self.standing = (steps, self.chains)
+        return True
 
     def on_to(self, look: int, asked: StopAsked) -> bool:
         """Walk to the next lesson, or to the ``look`` if that comes first; False if asked to stop before."""

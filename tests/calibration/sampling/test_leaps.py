@@ -1,4 +1,4 @@
-"""Chains proposed by a mixture: exact whatever the mixture, given up where it is bad, continued as if never stopped."""
+"""Chains proposed by a mixture: exact whatever it is, mended where it is bad, continued as if never stopped."""
 
 from collections import Counter
 from dataclasses import replace
@@ -15,7 +15,7 @@ from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.leaps import BLOCK, blocks, leap, offers
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.calibration.sampling.segments import Segments
-from bayesmembrane.calibration.sampling.walk import Meanwhile, Settings, run_ensembles
+from bayesmembrane.calibration.sampling.walk import Meanwhile, Sampled, Settings, run_ensembles
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
@@ -92,21 +92,63 @@ def test_stopped_and_continued_equals_never_stopped(stopped_after: int) -> None:
     assert np.array_equal(rest.chains.offered, whole.chains.offered, equal_nan=True)  # type: ignore[arg-type]
 
 
-def test_a_bad_mixture_is_left_to_emcee() -> None:
-    """Proposals that are far too narrow look well at first; their weights say so, and the ensembles walk instead."""
-    g = Mixture(np.zeros(1), np.zeros((1, 2)), 0.25 * np.eye(2)[None], 50.0)
+NARROW = Mixture(np.zeros(1), np.zeros((1, 2)), 0.25 * np.eye(2)[None], 50.0)
+"""Proposals that are far too narrow look well at first; their weights say so."""
+
+
+def narrow() -> Chains:
+    return replace(begin(5, NARROW, 32), look=10 * BLOCK)
+
+
+def is_cut(found: Sampled) -> None:
+    """Of the two coordinates the mean, and what part lies where the narrow mixture hardly comes."""
+    x = found.chains.x[:, found.convergence.burn :, :, 0]
+    first, sure = truncnorm(-1.0, np.inf), found.convergence.ess[0]
+    assert x.mean() == pytest.approx(first.mean(), abs=5 * first.std() / np.sqrt(sure))
+    assert x.std() == pytest.approx(first.std(), rel=0.1)
+    tail = first.sf(1.5)
+    assert np.mean(x > 1.5) == pytest.approx(tail, abs=5 * np.sqrt(tail * (1 - tail) / sure))
+
+
+def test_a_mixture_that_holds_walkers_up_is_mended_where_it_does() -> None:
     kept: list[Chains] = []
-    begun = replace(begin(5, g, 32), look=10 * BLOCK)
-    found = run_ensembles(Cut(), Settings(ess=1000), 0, chains=begun, beside=Meanwhile(kept.append))  # type: ignore[arg-type]
+    found = run_ensembles(Cut(), Settings(ess=1000), 0, chains=narrow(), beside=Meanwhile(kept.append))  # type: ignore[arg-type]
+    assert found.status == "converged"
+    assert found.chains.mixture is not None
+    assert len(found.chains.mixture.means) > 1
+    assert offers(found.chains).good
+    assert found.convergence.burn >= found.chains.learned >= 10 * BLOCK
+    # Every segment has steps of one mixture, and the first one those of the narrow one.
+    sizes = [len(p.mixture.means) for p in kept if p.mixture is not None]
+    assert sizes == sorted(sizes)
+    assert sizes[0] == 1 < sizes[-1]
+    is_cut(found)
+
+
+@pytest.mark.parametrize("stopped_after", [9, 10, 11, 14])
+def test_stopped_around_a_mending_and_continued_equals_never_stopped(stopped_after: int) -> None:
+    settings = Settings(ess=1000)
+    whole = run_ensembles(Cut(), settings, 0, chains=narrow())  # type: ignore[arg-type]
+    left = iter(range(stopped_after))
+    aside = Meanwhile(stop=lambda: next(left, None) is None)
+    first = run_ensembles(Cut(), settings, 0, chains=narrow(), beside=aside)  # type: ignore[arg-type]
+    assert first.status == "interrupted"
+    rest = run_ensembles(Cut(), settings, 0, chains=first.chains)  # type: ignore[arg-type]
+    assert rest.chains.lessons == whole.chains.lessons
+    assert np.array_equal(rest.chains.x, whole.chains.x)
+    assert offers(rest.chains) == offers(whole.chains)
+
+
+def test_a_bad_mixture_that_is_not_mended_is_left_to_emcee(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(walk, "MENDED", 0)
+    kept: list[Chains] = []
+    found = run_ensembles(Cut(), Settings(ess=1000), 0, chains=narrow(), beside=Meanwhile(kept.append))  # type: ignore[arg-type]
     assert found.status == "converged"
     assert found.chains.mixture is None
     assert found.chains.lessons[0] >= 10 * BLOCK
     assert found.convergence.burn >= found.chains.lessons[0]
     assert [p.mixture is None for p in kept] == sorted(p.mixture is None for p in kept)
-    x = found.chains.x[:, found.convergence.burn :, :, 0]
-    first = truncnorm(-1.0, np.inf)
-    assert x.mean() == pytest.approx(first.mean(), abs=5 * first.std() / np.sqrt(found.convergence.ess[0]))
-    assert x.std() == pytest.approx(first.std(), rel=0.1)
+    is_cut(found)
 
 
 def strip() -> Measurement:

@@ -46,7 +46,7 @@ def filled(g: Mixture, log_density: LogDensity, rng: np.random.Generator) -> Fil
         if np.count_nonzero(w) < NEAR or effective_draws(w) > ENOUGH * len(w):
             break
         some = w > 0
-        more = _around_largest(x[some], w[some])
+        more = around_largest(x[some], w[some], _scatter(x[some], w[some]))
         y = more.draw(rng, EACH)
         parts.append((more, EACH))
         there = np.logaddexp.reduce([part.log_density(y) + np.log(n) for part, n in parts], axis=0)
@@ -75,10 +75,17 @@ def _weights(log_weights: Array) -> Array:
     return np.asarray(w / np.sum(w))
 
 
-def _around_largest(x: Array, w: Array) -> Mixture:
-    """Equal t-distributions around the largest weights w (M,) of x (M, k), none within the neighbours of another."""
-    centre = w @ x
-    scatter = (x - centre).T @ ((x - centre) * w[:, None])
+def _scatter(x: Array, w: Array) -> Array:
+    """(k, k) of x (M, k) by weights (M,) that add up to one."""
+    away = x - w @ x
+    return np.asarray(away.T @ (away * w[:, None]))
+
+
+def around_largest(x: Array, w: Array, scatter: Array) -> Mixture:
+    """Equal t-distributions around the largest weights w (M,) of x (M, k), none within the neighbours of another.
+
+    ``scatter`` (k, k) says who is a neighbour; raises `LinAlgError` where it is flat.
+    """
     root = np.linalg.cholesky(scatter + 1e-9 * np.diag(np.diagonal(scatter)))
     z = x @ np.linalg.inv(root).T
     free, centres, roots = np.ones(len(x), dtype=bool), [], []

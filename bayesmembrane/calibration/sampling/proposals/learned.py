@@ -55,7 +55,7 @@ def learn(posterior: Posterior, chains: Chains) -> Learned:
     parameters, the other where they are not but the posterior is compact. Both follow from the chains alone, so that a
     run that was interrupted learns the same again.
     """
-    if not chains.lessons:
+    if not chains.lessons or chains.mixture is not None:
         return Learned()
     give_back()  # what a walk holds is no use to an emulator
     end = chains.lessons[-1]

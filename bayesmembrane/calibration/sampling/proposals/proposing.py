@@ -38,6 +38,9 @@ class Proposing(Protocol):
     def log_weights(self, x: Array, log_posterior: Array) -> Array:
         """(B,) ln of p over the density of proposals at x (B, k), whose ln p (B,) are known."""
 
+    def places(self, x: Array) -> Array:
+        """(B, m) the coordinates of x (B, k) that the mixture is one of."""
+
 
 @dataclass(frozen=True, eq=False)
 class Whole:
@@ -56,6 +59,9 @@ class Whole:
 
     def log_weights(self, x: Array, log_posterior: Array) -> Array:
         return log_posterior - self.mixture.log_density(x)
+
+    def places(self, x: Array) -> Array:
+        return x
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +85,9 @@ class ShapeFirst:
     def log_weights(self, x: Array, log_posterior: Array) -> Array:
         both = np.concatenate([x, log_posterior[:, None]], axis=1)
         return np.concatenate([self._weighed(part) for part in _parts(both, self.collapsed.readings)])
+
+    def places(self, x: Array) -> Array:
+        return self.collapsed.part(x)
 
     def _solved(self, numbers: Array) -> tuple[Array, Array, Array, NDArray[np.int8]]:
         shapes, u = numbers[:, :-2], numbers[:, -2:]
