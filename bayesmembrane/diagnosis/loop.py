@@ -13,6 +13,7 @@ from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.run import Run, RunSettings, sample
 from bayesmembrane.calibration.sampling.walk import Callback, Settings
+from bayesmembrane.calibration.sampling.weights import GOOD_K
 from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.target import PosteriorTarget
 from bayesmembrane.comparison.leave_out.score import leave_one_out
@@ -43,8 +44,9 @@ Watch = Callable[[str], Callback | None]
 class Stage:
     """One hypothesis, sampled.
 
-    log_evidence, log_evidence_sd : ln Z by bridge sampling, divided by the prior's mass; its error, with what modes
-        that the draws are known to have missed would add
+    log_evidence, log_evidence_sd : ln Z divided by the prior's mass, by the weights of the mixture that proposed the
+        draws, or by bridge sampling where these cannot be relied on; its error, which then has what modes that the
+        draws are known to have missed would add
     elpd_loo, loo_se : expected log predictive density of left-out points, and its standard error
     coverage : part of the measured points inside the 90 % predictive band
     """
@@ -219,19 +221,25 @@ def moved(before: Run, after: Run) -> dict[str, dict[str, float]]:
 
 def _stage(run: Run, solve: Solve, seed: int) -> Stage:
     posterior = Posterior(run.hypothesis, run.measurement, solve)
-    draws = run.draws()
-    z = bridge(PosteriorTarget(posterior), draws, seed=seed, effective=float(run.status["ess_bulk"]))
+    loo = leave_one_out(posterior, run.data, seed)
+    return Stage(run, *(_by_weights(run) or _bridged(run, posterior, seed)), loo.elpd, loo.se, coverage(run))
+
+
+def _by_weights(run: Run) -> tuple[float, float] | None:
+    """ln Z and its error by the weights of a run's proposals; None where that says little."""
+    found = run.status.get("importance")
+    if found is None or found["k_hat"] > GOOD_K or found["log_evidence_sd"] > LOOP.sure:
+        return None
+    return float(found["log_evidence"]), float(found["log_evidence_sd"])
+
+
+def _bridged(run: Run, posterior: Posterior, seed: int) -> tuple[float, float]:
+    """The same by bridge sampling."""
+    z = bridge(PosteriorTarget(posterior), run.draws(), seed=seed, effective=float(run.status["ess_bulk"]))
     mode = run.status["prior_mass"][run.hypothesis.convexity.name]
     mass = Mass(mode["value"], mode["sd"])
-    loo = leave_one_out(posterior, run.data, seed)
-    return Stage(
-        run,
-        z.log_evidence - float(np.log(mass.value)),
-        float(np.linalg.norm([z.sd, mass.sd / mass.value, z.missed])),
-        loo.elpd,
-        loo.se,
-        coverage(run),
-    )
+    sd = float(np.linalg.norm([z.sd, mass.sd / mass.value, z.missed]))
+    return z.log_evidence - float(np.log(mass.value)), sd
 
 
 def coverage(run: Run) -> float:

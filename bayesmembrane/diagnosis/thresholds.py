@@ -489,6 +489,8 @@ class LoopThresholds:
     the paper's curve up to 91.5 mm the first takes minutes, for its parameters go together; the next test decides."""
     band: float = 0.9
     """Part of new readings that a predictive band is to cover."""
+    sure: float = 0.1
+    """Error of ln Z up to which the weights of a run's own proposals do for it."""
 
 
 @dataclass(frozen=True)

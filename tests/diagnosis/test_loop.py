@@ -1,0 +1,45 @@
+"""The posteriors of a closed loop: their evidence, which costs nothing where the proposals tell it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.run import Run, RunSettings, sample
+from bayesmembrane.calibration.sampling.walk import Settings
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.loop import _bridged, _by_weights
+from bayesmembrane.diagnosis.thresholds import LOOP
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+
+
+def run(sampler: str = "auto") -> Run:
+    stretch = np.linspace(1.1, 2.5, 12)
+    force = 100 * (stretch - stretch**-2) + np.random.default_rng(41).standard_normal(12)
+    band = Measurement(stretch, force, Uniaxial(), Specimen("band", 5e-4))
+    how = RunSettings(2, settings=Settings(ess=1000.0, sampler=sampler), predictions=False)
+    return sample(band, hypothesis("gent"), how)
+
+
+@pytest.fixture(scope="module")
+def found() -> Run:
+    return run()
+
+
+def test_weights_equal_bridge(found: Run) -> None:
+    told = _by_weights(found)
+    assert told is not None
+    bridged = _bridged(found, Posterior(found.hypothesis, found.measurement), 0)
+    assert told[0] == pytest.approx(bridged[0], abs=6 * np.hypot(told[1], bridged[1]))
+
+
+@pytest.mark.parametrize("bad", [{"k_hat": 0.8}, {"log_evidence_sd": 2 * LOOP.sure}])
+def test_weights_that_say_little_are_left_to_bridge(found: Run, bad: dict[str, float]) -> None:
+    told = {**found.status, "importance": {**found.status["importance"], **bad}}
+    assert _by_weights(replace(found, status=told)) is None
+
+
+def test_ensembles_have_no_weights() -> None:
+    assert _by_weights(run("emcee")) is None
