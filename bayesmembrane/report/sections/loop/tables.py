@@ -53,9 +53,9 @@ def scores_table(found: Sequence[Waypoint], name: str) -> Table:
     points = len(found[0].of.measurement)
     caption = (
         f"From the posteriors of {points} readings: evidence by the weights of their proposals or by "
-        "bridge sampling, expected log predictive density of points left out one by one (with its standard error), and the part of the measured points that the "
-        "90 % predictive band holds. The band contains the noise that a model infers, so that it can cover what it "
-        "does not explain."
+        "bridge sampling, expected log predictive density of points left out one by one (with its standard error), and "
+        "the part of the measured points that the 90 % predictive band holds. The band contains the noise that a model "
+        "infers, so that it can cover what it does not explain."
     )
     return Table(name, caption, columns, rows)
 
