@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,6 @@ from bayesmembrane.ground.netcdf import packed
 from bayesmembrane.ground.sealed import checked, damaged, sealed
 
 FILE, AGAIN = "predictions.nc", "remove the file and report again"
-_FAULTS = (OSError, KeyError, ValueError, TypeError, AttributeError, RuntimeError)
 
 # Dimensions of the stored arrays, so that other programs read them with names.
 _DIMS = {
@@ -57,12 +57,8 @@ def has_predictions(folder: Path, draws_of: str, wanted: Wanted | None = None) -
         return False
     import h5netcdf  # on demand, as all of HDF5
 
-    checked(path, "the file of predictions", AGAIN)
-    try:
-        with h5netcdf.File(path, "r") as file:
-            return _serves(json.loads(file.attrs["made"]), draws_of, wanted)
-    except _FAULTS as error:
-        raise damaged(path, "the file of predictions", type(error).__name__, AGAIN) from None
+    with _whole(path), h5netcdf.File(path, "r") as file:
+        return _serves(json.loads(file.attrs["made"]), draws_of, wanted)
 
 
 def read_predictions(folder: Path, draws_of: str, wanted: Wanted | None = None) -> Predictions | None:
@@ -75,8 +71,7 @@ def read_predictions(folder: Path, draws_of: str, wanted: Wanted | None = None) 
         return None
     import xarray
 
-    checked(path, "the file of predictions", AGAIN)
-    try:
+    with _whole(path):
         dataset = xarray.load_dataset(path, engine="h5netcdf")
         if not _serves(json.loads(dataset.attrs["made"]), draws_of, wanted):
             return None
@@ -85,7 +80,15 @@ def read_predictions(folder: Path, draws_of: str, wanted: Wanted | None = None) 
         for name in ("reasons", "specimens"):
             values[name] = tuple(values[name])
         return Predictions(**values)
-    except _FAULTS as error:
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[None]:
+    """Raises `StorageError` where the file is not what was written, or what reads it finds it damaged."""
+    checked(path, "the file of predictions", AGAIN)
+    try:
+        yield
+    except (OSError, KeyError, ValueError, TypeError, AttributeError, RuntimeError) as error:
         raise damaged(path, "the file of predictions", type(error).__name__, AGAIN) from None
 
 
