@@ -123,6 +123,15 @@ class Motion:
         fastest = float(np.max(middle))
         return np.maximum(middle, SLOWEST * fastest) if fastest > 0 else np.full(middle.size, NOMINAL_SPEED)
 
+    @cached_property
+    def leg_speed(self) -> Array:
+        """(N,) m/s: median speed on the leg that a point is on, rest left out; `NOMINAL_SPEED` without times."""
+        out = np.empty(self.speed.size)
+        for leg in np.split(np.arange(out.size), np.flatnonzero(np.diff(self.leg)) + 1):
+            speed = self.speed[leg]
+            out[leg] = np.median(speed[speed >= STILL * np.max(speed)])
+        return out
+
 
 def legs(deflection: Array) -> NDArray[np.int8]:
     """(N,) +1 on loading and -1 on unloading legs of the deflections (N,), reversals within `REVERSAL` left aside."""

@@ -128,6 +128,6 @@ def _at(search: Search, c: Candidate, other: Measurement) -> Continued | None:
         return None
     rows = n + other.on_path
     factors = FormFactors(both.state[rows], both.progress[rows])
-    faster = at_another_speed(search.measurement.path, other.path)
+    faster = at_another_speed(search.measurement.path, other.path)[other.on_path]
     there = continued(part, fit, Forward(c.hypothesis, other, other.deflection, part.quick), factors, faster)
     return there if there.complete else None

@@ -162,13 +162,14 @@ def joint_factors(measurement: Measurement, there: Motion, places: NDArray[np.in
     )
 
 
-def at_another_speed(here: Motion, there: Motion) -> float:
-    """`SPEED` |ln (v' / v)|, the relative error of a law at the speed v' of a test that no fit saw, v being that of the
-    first loading; 0 where one of the two was not timed.
+def at_another_speed(here: Motion, there: Motion) -> Array:
+    """(G,) `SPEED` |ln (v' / v)|, the relative error of a law at the speed v' of every leg of a test that no fit saw, v
+    being the nearest speed that was seen ``here``; 0 where one of the two was not timed.
     """
     if here.time is None or there.time is None:
-        return 0.0
-    return float(SPEED * np.abs(np.log(there.pace / here.pace)))
+        return np.zeros(there.deflection.size)
+    seen, asked = np.log(here.leg_speed), np.log(there.leg_speed)
+    return np.asarray(SPEED * np.abs(asked - np.clip(asked, np.min(seen), np.max(seen))))
 
 
 def states(measurement: Measurement) -> Array:

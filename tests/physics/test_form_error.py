@@ -71,15 +71,34 @@ def test_joint_factors_are_the_same_process_at_the_readings() -> None:
     np.testing.assert_allclose(joint.state @ joint.state.T, kernel(everywhere, STATE_LENGTHS), atol=2e-3)
 
 
-def test_a_law_is_off_at_another_speed_by_its_logarithm_whichever_is_the_faster() -> None:
-    def at(times: float | None) -> Motion:
-        m = cyclic()
-        return Motion(m.deflection, None if times is None or m.time is None else m.time / times, m.full_range)
+def at(times: float | None, back: float | None = None) -> Motion:
+    """A cycle ``times`` as fast, back at another speed."""
+    d = np.interp(np.linspace(0, 2, 61), [0, 1, 2], [0, 0.04, 0])
+    if times is None:
+        return Motion(d, None, 0.04)
+    gap = np.where(np.arange(61) <= 30, 1 / times, 1 / (times if back is None else back))
+    return Motion(d, np.cumsum(gap), 0.04)
 
-    assert at_another_speed(at(1), at(1)) == 0
+
+def test_a_law_is_off_at_another_speed_by_its_logarithm_whichever_is_the_faster() -> None:
+    assert not np.any(at_another_speed(at(1), at(1)))
     assert at_another_speed(at(1), at(4)) == pytest.approx(SPEED * np.log(4))
     assert at_another_speed(at(4), at(1)) == pytest.approx(SPEED * np.log(4))
-    assert at_another_speed(at(1), at(None)) == at_another_speed(at(None), at(1)) == 0
+    assert not np.any(at_another_speed(at(1), at(None)))
+    assert not np.any(at_another_speed(at(None), at(1)))
+
+
+def test_a_speed_between_those_of_two_legs_was_seen_and_each_leg_has_its_own() -> None:
+    assert at_another_speed(at(1, 10), at(3)) == pytest.approx(0, abs=1e-9)
+    found = at_another_speed(at(1), at(1, 5))
+    assert found[:29] == pytest.approx(0, abs=1e-9)
+    assert found[33:] == pytest.approx(SPEED * np.log(5))
+
+
+def test_rest_is_no_speed() -> None:
+    d = np.concatenate([np.linspace(0.001, 0.04, 30), np.full(40, 0.04), np.linspace(0.039, 0.001, 30)])
+    held = Motion(d, np.arange(1.0, 101.0), 0.04)
+    assert held.leg_speed == pytest.approx(0.039 / 29, rel=0.05)
 
 
 def test_what_another_speed_may_show_is_as_large_as_trace_and_part_of_the_force_together() -> None:

@@ -31,11 +31,13 @@ class Continued:
     complete: bool
 
 
-def continued(part: Search, fit: Candidate, forward: Forward, factors: FormFactors, further: float = 0.0) -> Continued:
+def continued(
+    part: Search, fit: Candidate, forward: Forward, factors: FormFactors, further: Array | None = None
+) -> Continued:
     """What a ``fit`` to ``part`` says of the readings of ``forward``, which have the ``factors``.
 
     Its form errors go on as far as they are smooth; those without factors there are left out.
-    ``further`` : relative error of every law that nothing here tells of, `unseen_columns`
+    ``further`` : (N,) relative error of every law there that nothing here tells of, `unseen_columns`
     """
     new = forward(fit.x[None, :], sensitivities=True, reached=False)
     assert new.sensitivity is not None
@@ -50,8 +52,8 @@ def continued(part: Search, fit: Candidate, forward: Forward, factors: FormFacto
     # What is not steady in one test is another thing in another: its columns are the last, and are not there.
     m = columns.shape[1]
     moved, covariance = columns @ mean[:m], covariance[:m, :m]
-    if further > 0:
+    if further is not None and np.any(further):
         unseen = unseen_columns(factors, force, fit.hypothesis.effects, trace)
-        columns = np.column_stack([columns, *(further * c for c in unseen)])
+        columns = np.column_stack([columns, *(further[:, None] * c for c in unseen)])
         covariance = block_diag(covariance, np.eye(columns.shape[1] - m))
     return Continued(force, moved, columns, covariance, complete)

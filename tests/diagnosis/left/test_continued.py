@@ -26,7 +26,7 @@ def said(names: list[str], further: float) -> Continued:
     (start,) = search.material_starts(hypothesis("neo_hookean"))[:1]
     fit = search.at(h, np.concatenate([start, *(e.typical for e in h.effects)]))
     assert fit is not None
-    return continued(search, fit, Forward(h, m, m.deflection), form_factors(m), further)
+    return continued(search, fit, Forward(h, m, m.deflection), form_factors(m), np.full(len(m), further))
 
 
 def sd(of: Continued) -> Array:
