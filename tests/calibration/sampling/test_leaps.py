@@ -110,9 +110,16 @@ def is_cut(found: Sampled) -> None:
     assert np.mean(x > 1.5) == pytest.approx(tail, abs=5 * np.sqrt(tail * (1 - tail) / sure))
 
 
-def test_a_mixture_that_holds_walkers_up_is_mended_where_it_does() -> None:
+@pytest.fixture(scope="module")
+def whole() -> tuple[Sampled, list[Chains]]:
+    """What a narrow mixture comes to, and what was kept on the way."""
     kept: list[Chains] = []
-    found = run_ensembles(Cut(), Settings(ess=1000), 0, chains=narrow(), beside=Meanwhile(kept.append))  # type: ignore[arg-type]
+    how = Settings(ess=1000)
+    return run_ensembles(Cut(), how, 0, chains=narrow(), beside=Meanwhile(kept.append)), kept  # type: ignore[arg-type]
+
+
+def test_a_mixture_that_holds_walkers_up_is_mended_where_it_does(whole: tuple[Sampled, list[Chains]]) -> None:
+    found, kept = whole
     assert found.status == "converged"
     assert found.chains.mixture is not None
     assert len(found.chains.mixture.means) > 1
@@ -125,24 +132,25 @@ def test_a_mixture_that_holds_walkers_up_is_mended_where_it_does() -> None:
     is_cut(found)
 
 
-@pytest.mark.parametrize("stopped_after", [9, 10, 11, 14])
-def test_stopped_around_a_mending_and_continued_equals_never_stopped(stopped_after: int) -> None:
-    settings = Settings(ess=1000)
-    whole = run_ensembles(Cut(), settings, 0, chains=narrow())  # type: ignore[arg-type]
+@pytest.mark.parametrize("stopped_after", [10, *(pytest.param(n, marks=pytest.mark.study) for n in (9, 11, 14))])
+def test_stopped_around_a_mending_and_continued_equals_never_stopped(
+    stopped_after: int, whole: tuple[Sampled, list[Chains]]
+) -> None:
+    settings, (wanted, _) = Settings(ess=1000), whole
     left = iter(range(stopped_after))
     aside = Meanwhile(stop=lambda: next(left, None) is None)
     first = run_ensembles(Cut(), settings, 0, chains=narrow(), beside=aside)  # type: ignore[arg-type]
     assert first.status == "interrupted"
     rest = run_ensembles(Cut(), settings, 0, chains=first.chains)  # type: ignore[arg-type]
-    assert rest.chains.lessons == whole.chains.lessons
-    assert np.array_equal(rest.chains.x, whole.chains.x)
-    assert offers(rest.chains) == offers(whole.chains)
+    assert rest.chains.lessons == wanted.chains.lessons
+    assert np.array_equal(rest.chains.x, wanted.chains.x)
+    assert offers(rest.chains) == offers(wanted.chains)
 
 
 def test_a_bad_mixture_that_is_not_mended_is_left_to_emcee(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(walk, "MENDED", 0)
     kept: list[Chains] = []
-    found = run_ensembles(Cut(), Settings(ess=1000), 0, chains=narrow(), beside=Meanwhile(kept.append))  # type: ignore[arg-type]
+    found = run_ensembles(Cut(), Settings(ess=400), 0, chains=narrow(), beside=Meanwhile(kept.append))  # type: ignore[arg-type]
     assert found.status == "converged"
     assert found.chains.mixture is None
     assert found.chains.lessons[0] >= 10 * BLOCK
