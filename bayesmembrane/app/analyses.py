@@ -262,7 +262,7 @@ def valleys_with_draws(
 def diagnose(measurement: Measurement, claim: Hypothesis | Question, work: Work) -> Answer[Diagnosis]:
     """Whether the hypothesis misses something, and what; a `Question` may leave the energy open."""
     question = claim if isinstance(claim, Question) else Question(claim)
-    label = question.hypothesis.label()
+    label = question.label
     settings = {"seed": work.seed, "declared": question.declared, "quick": question.quick}
     what = asked("diagnose", run_diagnose, [measurement], [question.hypothesis], settings, library())
     if (stored := held("diagnosis", what, work.out)) is not None:
@@ -293,7 +293,7 @@ def loop(
     """
     how = replace(how, seed=work.seed, ess=work.ess, out=how.out or work.out)
     question = claim if isinstance(claim, Question) else Question(claim)
-    label = question.hypothesis.label()
+    label = question.label
     settings: dict[str, Any] = {"seed": work.seed, "ess": work.ess, "adapt_noise": how.adapt_noise}
     settings["declared"] = question.declared
     if how.leaders:

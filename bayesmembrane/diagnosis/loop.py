@@ -194,10 +194,10 @@ class _Closing:
         return tuple(predicted(first, other, s.scatter, s.seed) for other in s.predict)
 
     def left(self, last: Diagnosis) -> Discrepancy | None:
-        """What is kept without a name, where the loop abstains."""
+        """What is kept without a name, where the loop abstains: beside the first explanation, if there is one."""
         if last.verdict not in ("unknown", "ambiguous"):
             return None
-        return discrepancy(self.measurement, last.null.residual, last.noise)
+        return discrepancy(self.measurement, last.best.residual, last.noise)
 
 
 def _noise_for(found: Diagnosis, hypothesis: Hypothesis) -> Noise:

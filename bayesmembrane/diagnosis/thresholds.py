@@ -290,6 +290,8 @@ class TwinsThresholds:
     """The same where only another speed or a hold could tell: there no shape of a law counts for much."""
     usual: float = 5.0
     """Times the expected size: a twin as large is told apart by being implausible."""
+    least: float = 1e-3
+    """Times the expected size: as small, a twin is nothing beside what it stands with."""
     added: int = 3
     """Twins of the most probable set that are fitted where they were not, at most."""
 

@@ -6,7 +6,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.total import set_name
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST
-from bayesmembrane.words.diagnosis import experiment_sentence, percent, set_aside
+from bayesmembrane.words.diagnosis import experiment_sentence, percent, set_aside, set_title
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed, spoken_parameter, three_digits
 from bayesmembrane.words.next_test import spoken_test
@@ -35,9 +35,12 @@ def rivals(d: Diagnosis) -> list[str]:
     told = []
     given = d.null.names
     for j in d.members:
-        p = d.probabilities.effects.get(set_name(j.candidate, given), 0.0)
-        size = ", ".join(sizes(j.candidate, d))
-        told.append(f"{candidate_title(j.candidate, d.null)}{f' ({size})' if size else ''}: {percent(p)}.")
+        name = set_name(j.candidate, given)
+        p = percent(d.probabilities.effects.get(name, 0.0))  # summed over all energies
+        other = j.candidate.hypothesis.material is not d.null.hypothesis.material
+        which = [f"most probably with {j.candidate.hypothesis.material.title}"] if other else []
+        how = ", ".join([*sizes(j.candidate, d), *which])
+        told.append(f"{set_title(name)}{f' ({how})' if how else ''}: {p}.")
     clear = [e for e in d.experiments if e.separation >= NEXT_TEST.clear]
     helps = [e for e in d.experiments if NEXT_TEST.helps <= e.separation < NEXT_TEST.clear]
     rest = [e for e in d.experiments if e.separation < NEXT_TEST.helps]

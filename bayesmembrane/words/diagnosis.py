@@ -17,7 +17,7 @@ from bayesmembrane.diagnosis.left.heldout import HeldOut
 from bayesmembrane.diagnosis.reference.outliers import SetAside
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
-from bayesmembrane.diagnosis.thresholds import VERDICT, WORDS
+from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed, spoken_parameter
@@ -36,6 +36,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
             "effects": dict(found.probabilities.effects),
             "energies": dict(found.probabilities.energies),
             "foreign": dict(found.probabilities.foreign),
+            "none": found.probabilities.effects.get(NOTHING, 0.0),
         },
         "remaining": {
             "share": found.remaining.share,
@@ -138,7 +139,9 @@ def percent(p: float) -> str:
         return f"> {100 * (1 - WORDS.nearly):g} %"
     if p < WORDS.nearly:
         return f"< {100 * WORDS.nearly:g} %"
-    return f"{100 * p:.2g} %" if p < WORDS.digits_from else f"{100 * p:.3g} %"
+    text = f"{100 * p:.2g} %" if p < WORDS.digits_from else f"{100 * p:.3g} %"
+    # What is not enough for a name must not look as if it were.
+    return f"{100 * VERDICT.sure - 0.1:.3g} %" if p < VERDICT.sure and text == f"{100 * VERDICT.sure:g} %" else text
 
 
 def remaining_sentence(found: Diagnosis) -> str:
@@ -148,7 +151,7 @@ def remaining_sentence(found: Diagnosis) -> str:
     text = f"Remaining: reduced chi-square {left.reduced_chi2:.2f}"
     if left.share < WORDS.all_of_it:
         text += f", {100 * left.share:.2g} % of the misfit beyond noise"
-    if left.noise:
+    if left.noise or (found.verdict == "adequate" and found.detection.adequate):
         return f"{text}: noise."
     laws = [f"of {100 * e:.2g} % in {effect_title(n)}" for n, e in left.law_errors.items() if e > WORDS.law_error]
     forms = [f"an error of {100 * left.energy_error:.2g} % in the energy", *(f"one {w}" for w in laws)]
@@ -281,14 +284,23 @@ def _material(found: Diagnosis) -> str:
 def _ambiguous(found: Diagnosis) -> str:
     told, more = found.members[: WORDS.listed_sets], len(found.members) - WORDS.listed_sets
     names = "; or ".join(_member(j, found) for j in told) + (
-        f"; or one of {more} less probable sets" if more > 0 else ""
+        f"; or one of {more} less probable sets" if more > 1 else "; or a less probable set" if more else ""
     )
-    nexts = found.experiments
-    advice = f" To tell them apart: {experiment_sentence(nexts[0], found.rig)}." if nexts else ""
     return (
         f"{_misses(found)}{_common(found)}this measurement cannot tell which of these it is: {names}. {_error(found)}"
-        f"{advice}{_beside(found)}"
+        f"{_advice(found)}{_beside(found)}"
     )
+
+
+def _advice(found: Diagnosis) -> str:
+    """The best of the further tests, and whether it is sure to tell explanations apart."""
+    if not found.experiments:
+        return ""
+    best = found.experiments[0]
+    if best.separation < NEXT_TEST.helps:
+        return " No further test that was simulated tells them apart."
+    lead = "To tell them apart" if best.separation >= NEXT_TEST.clear else "What helps most"
+    return f" {lead}: {experiment_sentence(best, found.rig)}."
 
 
 def _common(found: Diagnosis) -> str:
@@ -409,10 +421,10 @@ def _model(candidate: Candidate) -> str:
 def _misses(found: Diagnosis) -> str:
     model = _model(found.null) if found.declared else f"{_model(found.null)}, the nearest of all energies,"
     if found.detection.adequate:
-        return (
-            f"{model} follows the curve (p = {found.detection.p_value:.2g}), but with parameters that "
-            "are less probable than another explanation: "
-        )
+        p = found.probabilities.effects
+        first = max(p, key=lambda name: p[name], default=NOTHING) == NOTHING
+        but = "and others do as well" if first else "but by parameters that are less probable than those of another one"
+        return f"{model} follows the curve (p = {found.detection.p_value:.2g}), {but}: "
     return f"{model} misses something (p {_p(found)}): "
 
 
@@ -424,6 +436,9 @@ def _p(found: Diagnosis) -> str:
 def _error(found: Diagnosis) -> str:
     factor, unit = _units(found)["N"]
     before, after = (factor * e.rmse_N for e in (found.before, found.after))
+    if found.best.label == found.null.label:
+        chi2 = f"{found.after.reduced_chi2:.2f} in reduced chi-square"
+        return f"The first leaves {after:.3g} {unit} root mean square, {chi2}."
     return (
         f"The residual falls from {before:.3g} to {after:.3g} {unit} root mean square, "
         f"{found.after.reduced_chi2:.2f} in reduced chi-square."

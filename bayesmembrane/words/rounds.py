@@ -89,9 +89,8 @@ def _fitted_rivals(last: Round) -> list[str]:
     moduli = [modulus_fitted(c, d.measurement) for c in told]
     fitted = listed(f"{g:.4g} MPa in {spoken(c.hypothesis)}" for g, c in zip(moduli, told, strict=True))
     (mean, sd), model = modulus_of(last.before.run), spoken(last.before.run.hypothesis)
-    spread = (
-        "" if len(told) == 1 else f" They lie {100 * np.ptp(moduli) / np.mean(moduli):.0f} % apart from end to end."
-    )
+    apart = f"{100 * np.ptp(moduli) / np.mean(moduli):.0f} % apart from end to end"
+    spread = "" if len(told) == 1 else f" Those fitted lie {apart}."
     return [f"The shear modulus is {mean:.4g} +- {sd:.2g} MPa in {model}; as fitted, not sampled, {fitted}.{spread}"]
 
 

@@ -11,7 +11,7 @@ from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.base import Rig
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
-from bayesmembrane.words.diagnosis import thinning_sentence
+from bayesmembrane.words.diagnosis import percent, thinning_sentence
 from bayesmembrane.words.shape import shape_in_words
 from bayesmembrane.words.units import SCALES, size_in_words
 
@@ -80,3 +80,7 @@ def test_it_is_said_how_many_readings_were_taken_and_only_where_some_were_left_o
     assert thinning(whole, whole) is None
     assert (found := thinning(whole, part)) == Thinned(20, 60)
     assert thinning_sentence(found).startswith("20 of the 60 readings were diagnosed, one in 3: ")
+
+
+def test_what_is_not_enough_for_a_name_does_not_look_as_if_it_were() -> None:
+    assert [percent(p) for p in (0.9449, 0.94994, 0.95, 0.954)] == ["94.5 %", "94.9 %", "95 %", "95.4 %"]

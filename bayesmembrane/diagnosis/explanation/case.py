@@ -54,6 +54,11 @@ class Question:
         """The name of the energy that was declared."""
         return self.hypothesis.material.name if self.declared else None
 
+    @property
+    def label(self) -> str:
+        """What is asked about, as its progress is told under."""
+        return self.hypothesis.label() if self.declared else "the curve"
+
 
 @dataclass(frozen=True, eq=False)
 class DiagnosisCase(ABC):
@@ -162,7 +167,7 @@ def opened(measurement: Measurement, question: Question, seed: int, solve: Solve
     """
     question = replace(question, hypothesis=question.hypothesis.on(measurement))
     hypothesis = question.hypothesis
-    _check_size(measurement, hypothesis)
+    _check_size(measurement, question)
     smooth = smooth_reference(measurement)
     search = Search(measurement, own_noise(measurement, smooth), seed, solve)
     plain = _energies(search, question, tell)
@@ -217,6 +222,8 @@ def _energies(search: Search, question: Question, tell: Tell) -> dict[str, Candi
         if candidate is not None:
             found[name] = candidate
     if not found:
+        if not np.any(search.measurement.force):
+            raise SettingsError("all forces are zero", remedy="use a curve that was measured")
         raise SettingsError("no film of any energy reaches the data", remedy="use a shorter range")
     return found
 
@@ -237,11 +244,12 @@ def _reaching(search: Search, hypothesis: Hypothesis, needed: bool) -> Candidate
     return found
 
 
-def _check_size(measurement: Measurement, hypothesis: Hypothesis) -> None:
-    enough_points(hypothesis, measurement)
-    least = hypothesis.curve_size + SEARCH.spare_points
+def _check_size(measurement: Measurement, question: Question) -> None:
+    enough_points(question.hypothesis, measurement)
+    least = question.hypothesis.curve_size + SEARCH.spare_points
     if len(measurement) < least:
+        what = f"{question.hypothesis.label()} misses" if question.declared else "is missing"
         raise SettingsError(
-            f"{len(measurement)} points leave too little to tell what {hypothesis.label()} misses",
+            f"{len(measurement)} points leave too little to tell what {what}",
             remedy=f"use at least {least} points, or a material with fewer parameters",
         )

@@ -240,14 +240,12 @@ def _raised(grown: Grown, weights: Mapping[int, float], others: Mapping[Key, flo
 
 
 def _plausible(candidate: Candidate, search: Weighing) -> bool:
-    """True if every effect of it is of a size that occurs, and away from its bound."""
+    """True if every effect of it is of a size that occurs, is there at all, and away from its bound."""
     for e in candidate.hypothesis.effects:
         for i, expected in zip(e.sizes, search.expected_sizes(e).tolist(), strict=True):
             p, name = e.coordinates[i], f"{e.name}.{e.coordinates[i].name}"
-            if (
-                name in candidate.at_bound
-                or abs(candidate.parameters[name] - (p.null or 0.0)) >= TWINS.usual * expected
-            ):
+            size = abs(candidate.parameters[name] - (p.null or 0.0))
+            if name in candidate.at_bound or not TWINS.least * expected < size < TWINS.usual * expected:
                 return False
     return True
 

@@ -16,7 +16,8 @@ from bayesmembrane.diagnosis.thresholds import VERDICT
 class Remaining:
     """What is left.
 
-    share : part of the squares beyond noise that the plain model leaves; 1 where it is the plain model's own
+    share : part of the squares beyond noise that the plain model leaves; 1 where it is the plain model's own, 0 where
+        that leaves no more than noise does by chance
     reduced_chi2, dof : of what is left, by the measurement's own noise; the degrees of freedom of that
     carried : part of what is left beyond noise that the form error takes: smooth, and no effect
     rms : N, root mean square of the form error
@@ -50,8 +51,9 @@ def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining
     dof = max(model.residual.size - model.x.size, 1)
     left, before = search.excess(model), search.excess(plain)
     rest = beyond_noise(search.noise.white(model.residual - model.form), model)
+    beyond = before > VERDICT.chance * float(np.sqrt(2.0 * dof))
     return Remaining(
-        share=float(np.clip(left / before, 0.0, 1.0)) if before > 0 else 0.0,
+        share=float(np.clip(left / before, 0.0, 1.0)) if beyond else 0.0,
         reduced_chi2=float(np.sum(search.noise.white(search.adapted(model)) ** 2)) / dof,
         carried=1 - min(rest / left, 1.0) if left > 0 else 0.0,
         rms=float(np.sqrt(np.mean(model.form**2))),

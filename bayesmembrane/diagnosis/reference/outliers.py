@@ -9,6 +9,7 @@ each of them has neighbours like it: then nothing is set aside. P. J. Huber, E. 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +29,28 @@ class SetAside:
     """Readings that were left out of a diagnosis.
 
     numbers : of the readings, from 1, of ``measured`` ones
-    farthest : of them, in robust standard deviations off the reference
+    farthest : of them, in robust standard deviations of the others off a line between their neighbours
     """
 
     numbers: tuple[int, ...]
     measured: int
     farthest: float
+
+
+class _Beside(NamedTuple):
+    """Readings y (N,) over their stated standard deviations, if there are any, beside a smooth reference.
+
+    q : (N, r) its orthonormal columns; spare : (N,) what they leave of each reading; seen : (N,) where that is enough
+    raw, root : (N,) residuals, 0 where they are not seen, and what to divide them by; stated : the least deviation
+    """
+
+    y: Array
+    q: Array
+    spare: Array
+    seen: NDArray[np.bool_]
+    raw: Array
+    root: Array
+    stated: float
 
 
 def without_outliers(measurement: Measurement) -> tuple[Measurement, SetAside | None]:
@@ -46,7 +63,7 @@ def without_outliers(measurement: Measurement) -> tuple[Measurement, SetAside | 
     most = int(OUTLIERS.share * n)
     if most < 1 or measurement.across is not None or measurement.covariance is not None:
         return measurement, None
-    keep, part, farthest = np.arange(n), measurement, 0.0
+    keep, part = np.arange(n), measurement
     while True:
         off = _off(part)
         worst = int(np.argmax(off))
@@ -54,12 +71,12 @@ def without_outliers(measurement: Measurement) -> tuple[Measurement, SetAside | 
             break
         if n - keep.size == most:
             return measurement, None
-        farthest = max(farthest, float(off[worst]))
         keep = np.delete(keep, worst)
         part = measurement.select(keep)
     if keep.size == n:
         return measurement, None
-    return part, SetAside(tuple(int(i) + 1 for i in np.setdiff1d(np.arange(n), keep)), n, farthest)
+    numbers = tuple(int(i) + 1 for i in np.setdiff1d(np.arange(n), keep))
+    return part, SetAside(numbers, n, _farthest(measurement, keep, part))
 
 
 def _off(m: Measurement) -> Array:
@@ -68,13 +85,7 @@ def _off(m: Measurement) -> Array:
     Where the reference follows them anyway, one just after a turn may be the start of a relaxation; not one that goes
     against the way and comes back at once.
     """
-    profile = np.ones(len(m)) if m.force_sd is None else m.force_sd
-    q = orthonormal(smooth_reference(m) / profile[:, None])
-    y = m.force / profile
-    spare = 1.0 - np.sum(q**2, axis=1)
-    seen = spare > OUTLIERS.least_spare
-    raw = np.where(seen, y - q @ (q.T @ y), 0.0)
-    root, stated = np.sqrt(np.where(seen, spare, 1.0)), 0.0 if m.force_sd is None else 1.0
+    y, q, spare, seen, raw, root, stated = _beside(m)
     off = np.maximum(_alone(raw / root), _against(y, m.deflection, ~seen) / np.sqrt(2.0)) / _scale(raw / root, stated)
     for end, inwards in ((0, 1), (len(m) - 1, -1)):
         if seen[end]:
@@ -82,6 +93,29 @@ def _off(m: Measurement) -> Array:
             others = np.delete(without / root, end)
             off[end] = _at_end(without, end, inwards) * root[end] / _scale(others, stated)[min(end, others.size - 1)]
     return np.asarray(off)
+
+
+def _beside(m: Measurement) -> _Beside:
+    profile = _profile(m)
+    q = orthonormal(smooth_reference(m) / profile[:, None])
+    y = m.force / profile
+    spare = 1.0 - np.sum(q**2, axis=1)
+    seen = spare > OUTLIERS.least_spare
+    raw = np.where(seen, y - q @ (q.T @ y), 0.0)
+    return _Beside(y, q, spare, seen, raw, np.sqrt(np.where(seen, spare, 1.0)), 0.0 if m.force_sd is None else 1.0)
+
+
+def _profile(m: Measurement) -> Array:
+    """(N,) the stated standard deviations, or ones."""
+    return np.ones(len(m)) if m.force_sd is None else m.force_sd
+
+
+def _farthest(measurement: Measurement, keep: NDArray[np.intp], part: Measurement) -> float:
+    """Of readings that are not kept, `SetAside.farthest`; ``part`` has those that are."""
+    gone = np.setdiff1d(np.arange(len(measurement)), keep)
+    kept = _beside(part)
+    away = np.abs(measurement.force[gone] - np.interp(gone, keep, part.force)) / _profile(measurement)[gone]
+    return float(np.max(away / np.interp(gone, keep, _scale(kept.raw / kept.root, kept.stated))))
 
 
 def _at_end(rest: Array, end: int, inwards: int) -> float:

@@ -1,10 +1,15 @@
 """What a model leaves: noise, what a small error of the forms carries, or something else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bayesmembrane.diagnosis.left.remaining import Remaining
+from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.left.remaining import Remaining, remaining
 from bayesmembrane.diagnosis.thresholds import VERDICT
+from bayesmembrane.physics.hypothesis import hypothesis
+from tests.diagnosis.curves import SD, measured, triangle, white_noise
 
 SMALL, LARGE = 0.5 * VERDICT.law_small, 2 * VERDICT.law_small
 A_LOT, MANY = 2 * VERDICT.noise_chi2, 400
@@ -32,3 +37,18 @@ def test_few_readings_scatter_by_chance() -> None:
     assert within > VERDICT.noise_chi2
     assert not Remaining(0.3, within, 0.0, 0.0, 0.0, {}, few).strange
     assert Remaining(0.3, within, 0.0, 0.0, 0.0, {}, MANY).strange
+
+
+@pytest.mark.parametrize(("off", "share"), [(0.0, 0.0), (0.2, 1.0)])
+def test_a_model_that_leaves_noise_alone_leaves_no_share_of_it(off: float, share: float) -> None:
+    d = triangle(200)
+    noise = SD * np.random.default_rng(8).standard_normal(d.size)
+    m = measured(8 * d + off * np.sin(300 * d) + noise, d)
+    search, h = Search(m, white_noise(m, SD)), hypothesis("neo_hookean")
+    fit = search.fit(h, search.material_starts(h)[:1])
+    assert fit is not None
+    # Round numbers of a film that is nearly as straight; what it leaves is noise, or the wave.
+    straight = replace(fit, residual=m.force - 8 * d, slopes=d[:, None])
+    found = remaining(search, straight, straight)
+    assert found.share == share
+    assert found.noise is (share == 0)

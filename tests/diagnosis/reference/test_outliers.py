@@ -56,6 +56,15 @@ def test_one_reading_at_a_turn_or_anywhere_is(seed: int) -> None:
         assert np.array_equal(part.path.deflection, m.deflection)
 
 
+@seeds
+def test_how_far_off_it_is_does_not_know_of_the_reading_itself(seed: int) -> None:
+    change = np.zeros(300)
+    change[120] = 150 * SD
+    _, aside = without_outliers(moved(cycles(seed), change))
+    assert aside is not None
+    assert aside.farthest == pytest.approx(150, rel=0.4)  # the scale is that of some neighbours
+
+
 def stairs(seed: int) -> Measurement:
     """Up and down in steps with holds, whose first readings relax within a few."""
     up = np.concatenate([np.concatenate([np.linspace(a, a + 0.01, 20)[1:], np.full(20, a + 0.01)]) for a in STEPS])

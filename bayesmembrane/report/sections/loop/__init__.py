@@ -159,8 +159,8 @@ def _left(found: Loop, last: Diagnosis) -> list[Block]:
         f"{kept} Lines and bands: mean and two standard deviations of the process that is kept "
         "for it along the test; it has no name, and predicts nothing for another test."
     )
-    picture = discrepancy_picture(_place(found), last.null.residual, found.left.mean, found.left.sd)
-    model = spoken(last.null.hypothesis)
+    picture = discrepancy_picture(_place(found), last.best.residual, found.left.mean, found.left.sd)
+    model = spoken(last.best.hypothesis)
     alt = f"What {model} leaves, with the mean and the band of the process kept for it"
     return [
         Heading("What is left, without a name"),
