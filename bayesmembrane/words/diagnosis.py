@@ -330,12 +330,21 @@ def _beside(found: Diagnosis) -> str:
 def _member(j: Judged, found: Diagnosis) -> str:
     have = set(found.null.names)
     if set(j.candidate.names) == have:
+        if _foreign_alone(found):
+            return "no effect, but something foreign"
         material = j.candidate.hypothesis.material
         same = material is found.null.hypothesis.material
         if same:
             return f"no effect, but a form that is {100 * j.candidate.energy_error:.2g} % off {material.title}"
         return f"no effect, but the energy {material.title}"
     return _added(j.candidate, found)
+
+
+def _foreign_alone(found: Diagnosis) -> bool:
+    """True if nothing speaks for a model without effects but what is foreign beside it."""
+    f, p = found.foreign, found.probabilities
+    alone = f is not None and set_name(f.base, found.null.names) == NOTHING
+    return alone and not found.detection.adequate and 0.99 * p.effects.get(NOTHING, 0.0) < p.anything_foreign
 
 
 def _unknown(found: Diagnosis) -> str:

@@ -9,6 +9,8 @@ from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.words.language import spoken_parameter
 from bayesmembrane.words.units import SCALES, Units, size_in_words
 
+NOTHING = 1e-4
+"""Times the usual size, below which a number would only say that a search ended there."""
 IMPLAUSIBLE = 5.0
 """Times the usual size, from which on a size is flagged."""
 
@@ -21,10 +23,12 @@ def usual_size(effect: Effect, measurement: Measurement, shown: Units = SCALES) 
 def flagged_size(effect: Effect, candidate: Candidate, measurement: Measurement) -> str:
     """``loss 0.66, implausible: usual 0.1``: the size of one of its effects, with what must be known of it."""
     shown = measurement.rig.shown(measurement.specimen.thickness)
-    p = effect.size
+    p, name = effect.size, spoken_parameter(f"{effect.name}.{effect.size.name}")
     value = candidate.parameters[f"{effect.name}.{p.name}"]
-    told = [f"{spoken_parameter(f'{effect.name}.{p.name}')} {size_in_words(value, p.unit, shown)}"]
     times = abs(value - (p.null or 0.0)) / expected_size(effect, measurement)
+    if times < NOTHING:
+        return f"{name} too small to show"
+    told = [f"{name} {size_in_words(value, p.unit, shown)}"]
     if times >= IMPLAUSIBLE:
         told.append(f"implausible: usual {usual_size(effect, measurement, shown)}")
     own = [n.partition(".")[2] for n in candidate.at_bound if n.startswith(f"{effect.name}.")]
