@@ -17,6 +17,7 @@ from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, decid
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
 from bayesmembrane.diagnosis.left.remaining import remaining
 from bayesmembrane.diagnosis.left.shape import residual_shape
+from bayesmembrane.diagnosis.left.turning import at_a_turn
 from bayesmembrane.diagnosis.reference.outliers import without_outliers
 from bayesmembrane.diagnosis.result import Diagnosis, thinning
 from bayesmembrane.diagnosis.separation import Experiment, experiments
@@ -131,10 +132,14 @@ def _predicting(found: Verdict, validation: HeldOut | None) -> Verdict:
 
 
 def _finished(search: Search, found: Verdict, null: Candidate) -> Verdict:
-    """An effect that leaves structure, which no small error of the forms carries, is not the whole of it: no name."""
-    if found.verdict == "named" and remaining(search, found.members[0].candidate, null).strange:
-        return replace(found, verdict="unknown")
-    return found
+    """An effect that leaves structure, which no small error of the forms carries, is not the whole of it: no name. Nor
+    has one that comes where the test turns, beside a law of loops.
+    """
+    if found.verdict != "named":
+        return found
+    first = found.members[0].candidate
+    doubtful = remaining(search, first, null).strange or at_a_turn(first, search.measurement) is not None
+    return replace(found, verdict="unknown") if doubtful else found
 
 
 def _validated(case: OpenCase, search: Search, found: Verdict) -> HeldOut | None:

@@ -404,6 +404,9 @@ class VerdictThresholds:
     """Share of the misfit up to which that holds."""
     form_carries: float = 0.5
     """Of what is left beyond noise: then the form error is said to carry it."""
+    at_a_turn: float = 0.02
+    """Of the time of a test about a turn: what begins there, beside what makes loops, is not named. A cycle of acrylic
+    tape was named hysteresis and a tear at its turn (97 %, one energy declared), and the tape relaxes."""
     law_small: float = 0.1
     """Relative error of a law, twice what is expected, up to which it may carry what a name leaves."""
     chance: float = 3.0

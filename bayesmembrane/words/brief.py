@@ -19,7 +19,7 @@ from bayesmembrane.diagnosis.loop import Loop, Stage
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.words import language
-from bayesmembrane.words.diagnosis import laws_off, percent, set_title, smallest_sizes, too_far, why_not
+from bayesmembrane.words.diagnosis import certain, laws_off, percent, set_title, smallest_sizes, too_far, why_not
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.moved import MATTERS, modulus_of, settled
@@ -290,7 +290,7 @@ def _strange(d: Diagnosis) -> Foreign | None:
 
 def _certain(d: Diagnosis) -> str:
     """Effects that are in all that is probable; "" if there is none, or nothing else is probable anyway."""
-    sure = d.probabilities.sure()
+    sure = certain(d)
     alone = d.probabilities.effects.get("+".join(sure), 0.0) >= VERDICT.sure
     return "" if alone else listed(map(effect_title, sure))
 

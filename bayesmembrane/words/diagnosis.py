@@ -14,6 +14,7 @@ from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, UNNAMED, WAVE, Foreign
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, set_name
 from bayesmembrane.diagnosis.left.heldout import HeldOut
+from bayesmembrane.diagnosis.left.turning import at_a_turn
 from bayesmembrane.diagnosis.reference.outliers import SetAside
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
@@ -396,14 +397,22 @@ def why_not(found: Diagnosis) -> str:
         return (
             f"its 90 % band holds only {100 * v.covered_after:.0f} % of the points that were set aside ({set_aside(v)})"
         )
+    if found.members and (turned := at_a_turn(found.members[0].candidate, found.measurement)) is not None:
+        return f"{turned.title} comes where the test turns, where laws of loops are farthest off"
     left = found.remaining
     return f"what it leaves (reduced chi-square {left.reduced_chi2:.2f}) is no noise, and no small error of the forms"
 
 
 def _certain(found: Diagnosis) -> str:
     """Effects that are in all that is probable: what is known where the whole is not."""
-    sure = found.probabilities.sure()
+    sure = certain(found)
     return f"{_at_work(sure)} all that is probable, yet " if sure else ""
+
+
+def certain(found: Diagnosis) -> list[str]:
+    """Effects that are in all that is probable, but for one that comes where the test turns."""
+    turned = at_a_turn(found.ranking[0].candidate, found.measurement) if found.ranking else None
+    return [n for n in found.probabilities.sure() if turned is None or n != turned.name]
 
 
 _ANSWERS = {

@@ -37,7 +37,7 @@ class SetAside:
     farthest: float
 
 
-class _Beside(NamedTuple):
+class _Spared(NamedTuple):
     """Readings y (N,) over their stated standard deviations, if there are any, beside a smooth reference.
 
     q : (N, r) its orthonormal columns; spare : (N,) what they leave of each reading; seen : (N,) where that is enough
@@ -95,14 +95,14 @@ def _off(m: Measurement) -> Array:
     return np.asarray(off)
 
 
-def _beside(m: Measurement) -> _Beside:
+def _beside(m: Measurement) -> _Spared:
     profile = _profile(m)
     q = orthonormal(smooth_reference(m) / profile[:, None])
     y = m.force / profile
     spare = 1.0 - np.sum(q**2, axis=1)
     seen = spare > OUTLIERS.least_spare
     raw = np.where(seen, y - q @ (q.T @ y), 0.0)
-    return _Beside(y, q, spare, seen, raw, np.sqrt(np.where(seen, spare, 1.0)), 0.0 if m.force_sd is None else 1.0)
+    return _Spared(y, q, spare, seen, raw, np.sqrt(np.where(seen, spare, 1.0)), 0.0 if m.force_sd is None else 1.0)
 
 
 def _profile(m: Measurement) -> Array:

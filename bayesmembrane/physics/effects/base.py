@@ -98,6 +98,7 @@ class Effect(ABC):
     constant : True if its parameters are then the same in all of them; those of others belong to what a test reached
     twins_at_one_speed : names of effects that only another speed, or a hold, tells from this one
     twins_at_any_speed : names of effects that only the shape of its law tells from this one, whatever the motion
+    begins : the coordinate that says when it comes, in s since the start; "" where it comes with the way
     sudden : True if it may come at any moment, which no test tells from a fall of the force that no effect describes
     odds : how often it is met beside the others, before anything is measured
     rank : orders effects within a stage; equal ranks go by name
@@ -125,6 +126,7 @@ class Effect(ABC):
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ()
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ()
     sudden: ClassVar[bool] = False
+    begins: ClassVar[str] = ""
     odds: ClassVar[float] = 1.0
     rank: ClassVar[int] = 0
     stage: ClassVar[str]

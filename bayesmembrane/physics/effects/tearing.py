@@ -34,6 +34,7 @@ class Tearing(Carried):
     )
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("mullins",)  # with damage alone both are less by what was reached
     sudden: ClassVar[bool] = True
+    begins: ClassVar[str] = "moment"
     scales_with_modulus: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
