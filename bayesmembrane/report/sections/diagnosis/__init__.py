@@ -50,23 +50,35 @@ class DiagnosisSection(Section):
         return [_part(d, f" {number}" if several else "") for number, d in enumerate(found, 1)]
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
-        return [words.sentence(d) for d in of_kind(results, Diagnosis)]
+        found = of_kind(results, Diagnosis)
+        if len(found) == 1:
+            return [words.sentence(found[0])]
+        return [f"{asked(d)}: {words.sentence(d)}" for d in found]
 
     def lead(self, results: Sequence[Any]) -> Lead | None:
         found = of_kind(results, Diagnosis)
         return lead_of(found[0]) if len(found) == 1 else None
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
-        return [Glance("diagnosis", spoken(d.null.hypothesis), finding(d)) for d in of_kind(results, Diagnosis)]
+        return [Glance("diagnosis", asked(d), finding(d)) for d in of_kind(results, Diagnosis)]
 
     def subject(self, results: Sequence[Any]) -> Subject | None:
         found = of_kind(results, Diagnosis)
         if not found:
             return None
-        names = ", ".join(spoken(d.null.hypothesis) for d in found)
+        names = "; ".join(map(asked, found)) if len(found) > 1 else _model(found[0])
         curves = list(dict.fromkeys(seen(d.measurement).curve for d in found))
         films = tuple(dict.fromkeys(d.measurement.specimen.name for d in found))
         return Subject(films, f"A diagnosis of {names}.", curves[0] if len(curves) == 1 else "force curve")
+
+
+def asked(d: Diagnosis) -> str:
+    """The film and the model that were asked about."""
+    return f"{d.measurement.specimen.name}, {_model(d)}"
+
+
+def _model(d: Diagnosis) -> str:
+    return spoken(d.null.hypothesis) if d.declared else "no energy declared"
 
 
 def finding(d: Diagnosis) -> str:
@@ -92,7 +104,7 @@ def _part(d: Diagnosis, end: str) -> Part:
     if d.verdict != "adequate":
         blocks += explanations(d, "What could explain it", f"diagnosis candidates{end}")
     blocks += limits(d, d, ("diagnosis confounded" + end, "diagnosis power" + end))
-    return Part(f"diagnosis{end.strip()}", f"What may be missing: {spoken(d.null.hypothesis)}", tuple(blocks))
+    return Part(f"diagnosis{end.strip()}", f"What may be missing: {asked(d) if end else _model(d)}", tuple(blocks))
 
 
 def place_of(d: Diagnosis, sd: Array | None = None) -> Place:
