@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -14,6 +14,7 @@ import numpy as np
 from bayesmembrane.calibration.fingerprint import fingerprint
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import BayesmembraneError
+from bayesmembrane.ground.files import ensure_writable
 from bayesmembrane.ground.pieces import drop, keeping
 from bayesmembrane.ground.stored import answer, read, store
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -89,16 +90,18 @@ def asked(
 
 
 def held(kind: str, what: Asked, out: str | Path | None) -> Answer[Any] | None:
-    """The answer that `kept` stored when the same was asked; None if there is none, or it cannot be read any more."""
+    """The answer that `kept` stored when the same was asked; None if there is none, or it cannot be read any more.
+
+    Raises `StorageError` where there is none, and none could be stored: nobody should wait for that.
+    """
     if out is None:
         return None
     folder = Path(out) / what.name
-    try:
+    with suppress(BayesmembraneError):  # damaged, or made of runs that were sampled anew: it is made again
         document = answer(folder, kind)
         if document is not None:
             return Answer(read(folder, kind), {**document, "stored": str(folder)})
-    except BayesmembraneError:
-        return None  # damaged, or made of runs that were sampled anew: it is made again
+    ensure_writable(Path(out))
     return None
 
 

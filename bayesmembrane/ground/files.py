@@ -59,6 +59,19 @@ def make_folder(path: Path) -> Path:
     return path
 
 
+def ensure_writable(folder: Path, what: str = "the answer") -> None:
+    """Make the folder, and see that something can be written there, before work is done for it.
+
+    Raises `StorageError` that says ``what`` cannot be written, where and why.
+    """
+    try:
+        handle, name = tempfile.mkstemp(dir=make_folder(folder), prefix=".writable.")
+        os.close(handle)
+        Path(name).unlink()
+    except OSError as error:
+        raise unwritable(what, folder, error) from None
+
+
 def remove_parts(folder: Path, name: str) -> None:
     """Remove what a process that was killed left of files called ``name`` (a pattern) while it wrote them.
 

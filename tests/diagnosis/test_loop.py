@@ -1,6 +1,8 @@
 """The posteriors of a closed loop: their evidence, which costs nothing where the proposals tell it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -9,10 +11,12 @@ from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.run import Run, RunSettings, sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.diagnosis.loop import _bridged, _by_weights
+from bayesmembrane.diagnosis.loop import LoopSettings, _bridged, _by_weights, _Closing
+from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import LOOP
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from tests.diagnosis.curves import SD, measured, triangle, white_noise
 
 
 @pytest.fixture(scope="module")
@@ -38,3 +42,17 @@ def test_weights_that_say_little_are_left_to_bridge(found: Run, bad: dict[str, f
 
 def test_ensembles_have_no_weights(found: Run) -> None:
     assert _by_weights(replace(found, status={**found.status, "importance": None})) is None
+
+
+@pytest.mark.parametrize(("verdict", "told"), [("ambiguous", True), ("unknown", True), ("named", False)])
+def test_what_is_kept_without_a_name_is_what_the_answer_leaves(verdict: str, told: bool) -> None:
+    """Not what the plain model leaves, where there are explanations of that."""
+    d = triangle(120)
+    wave = np.sin(200 * d)
+    m = measured(8 * d + 5 * SD * wave, d)
+    large, small = (SimpleNamespace(residual=size * SD * wave) for size in (100, 5))
+    last = SimpleNamespace(verdict=verdict, null=large, best=small, noise=white_noise(m, SD))
+    left = _Closing(m, LoopSettings(), lambda _: None, None).left(cast(Diagnosis, last))
+    assert (left is not None) is told
+    if left is not None:
+        assert left.amplitude < 20 * SD

@@ -7,7 +7,7 @@ import pytest
 
 from bayesmembrane.ground import files
 from bayesmembrane.ground.errors import StorageError
-from bayesmembrane.ground.files import write_text, write_whole
+from bayesmembrane.ground.files import ensure_writable, write_text, write_whole
 
 
 def test_what_was_written_is_read(tmp_path):
@@ -62,3 +62,12 @@ def test_new_folders_are_synced_into_those_that_hold_them(tmp_path, monkeypatch)
     files.make_folder(tmp_path / "a" / "b")
     assert (tmp_path / "a" / "b").is_dir()
     assert seen == [tmp_path, tmp_path / "a"]
+
+
+def test_what_cannot_be_written_is_told_before_the_work(tmp_path):
+    ensure_writable(tmp_path / "new" / "folder")
+    assert list((tmp_path / "new" / "folder").iterdir()) == []
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StorageError, match=r"the answer cannot be written \(.*") as fault:
+        ensure_writable(tmp_path / "file" / "folder")
+    assert "name another one" in str(fault.value)
