@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from bayesmembrane.calibration.beside_paper import Compared
+from bayesmembrane.diagnosis.loop import Loop
 from bayesmembrane.ground.stored import read
 from bayesmembrane.report.blocks import PLAIN, Block, Column, Figure, Picture, Table, Text, points
 from bayesmembrane.report.canvas import Interval, draw_interval, encoded, new_figure, style
@@ -54,7 +55,7 @@ class CalibrationsSection(Section):
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
         shown = in_order(of_kind(results, Shown))
-        return answer(cases(shown)) if shown else ()
+        return [*answer(cases(shown)), *refuted(shown, of_kind(results, Loop))] if shown else ()
 
     def subject(self, results: Sequence[Any]) -> Subject | None:
         shown = in_order(of_kind(results, Shown))
@@ -63,6 +64,22 @@ class CalibrationsSection(Section):
         films = tuple(dict.fromkeys(s.film.name for s in shown))
         curves = list(dict.fromkeys(s.how.curve for s in shown))
         return Subject(films, overview(cases(shown)), curves[0] if len(curves) == 1 else "force curve")
+
+
+def refuted(shown: Sequence[Shown], loops: Sequence[Loop]) -> list[str]:
+    """Of runs that no stated noise judges: which of them miss something by the diagnosis of their loop."""
+    missing = {
+        (r.before.run.measurement.data_hash, r.before.run.hypothesis.label())
+        for found in loops
+        for r in found.rounds
+        if r.diagnosis.verdict != "adequate" and not r.diagnosis.detection.adequate
+    }
+    told = [s for s in shown if s.case.verdict == "unknown" and (s.data_hash, s.hypothesis.label()) in missing]
+    return [
+        f"{s.name} misses something by its diagnosis (above): this modulus, and what {s.name} predicts, are those of a "
+        "film in which nothing else is at work."
+        for s in told
+    ]
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------

@@ -5,6 +5,8 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -377,3 +379,19 @@ def test_other_tests_stand_with_their_errors_and_their_band(named: Loop) -> None
     told = loop_words.document(replace(named, others=(other,)))["predicted"]
     assert [t["inside_90"] for t in told] == [other.covered]
     assert "no fit saw" in told[0]["sentence"]
+
+
+@pytest.mark.parametrize(("judged", "told"), [("unknown", 1), ("misses", 0)])
+def test_a_run_that_no_noise_judges_is_judged_by_its_loop(named: Loop, judged: str, told: int) -> None:
+    """Its modulus must not stand alone beside an answer that refutes it."""
+    run = named.rounds[0].before.run
+    shown = SimpleNamespace(
+        name="neo-Hookean",
+        case=SimpleNamespace(verdict=judged),
+        data_hash=run.measurement.data_hash,
+        hypothesis=run.hypothesis,
+    )
+    other = SimpleNamespace(**{**vars(shown), "hypothesis": hypothesis("gent")})
+    found = refuted(cast(Any, [shown, other]), [named])
+    assert len(found) == told
+    assert not refuted(cast(Any, [shown]), [Loop(named.rounds[1:], None)])
