@@ -19,6 +19,7 @@ from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.report.blocks import Figure, Points, Table, Text
 from bayesmembrane.report.page import PAGE, TWIN, write_report
 from bayesmembrane.report.runs import Shown
+from bayesmembrane.report.sections.calibrations import refuted
 from bayesmembrane.report.sections.diagnosis import asked, limits, place_of
 from bayesmembrane.report.sections.diagnosis.figures import Place, Residual, discrepancy_picture, residual_picture
 from bayesmembrane.report.sections.diagnosis.tables import confounded_table, power_table, ranking_table
