@@ -504,6 +504,8 @@ class WordsThresholds:
 
     likely: float = 0.5
     """Probability of an effect, summed over sets, from which on an ambiguous answer says so."""
+    rounded: float = 0.25
+    """Part of the variance of the noise that is rounding, from which on it is told."""
     listed_sets: int = 4
     """Sets of an ambiguous answer that are told with their sizes; of more the rest are counted."""
     listed_readings: int = 6

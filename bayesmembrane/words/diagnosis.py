@@ -14,6 +14,7 @@ from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, UNNAMED, WAVE, Foreign
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, set_name
 from bayesmembrane.diagnosis.left.heldout import HeldOut
+from bayesmembrane.diagnosis.left.shape import resolution_of
 from bayesmembrane.diagnosis.left.turning import at_a_turn
 from bayesmembrane.diagnosis.reference.outliers import SetAside
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned
@@ -116,7 +117,19 @@ def _with_the_rest(answer: str, found: Diagnosis) -> str:
     thinned = "" if found.thinned is None else f" {thinning_sentence(found.thinned)}"
     aside = "" if found.set_aside is None else f" {set_aside_sentence(found.set_aside)}"
     left = "" if found.verdict == "adequate" else f" {remaining_sentence(found)}"
-    return f"{answer.strip()}{left}{_noise(found)}{aside}{thinned}"
+    return f"{answer.strip()}{left}{_noise(found)}{_rounded(found)}{aside}{thinned}"
+
+
+def _rounded(found: Diagnosis) -> str:
+    """That readings are multiples of a step, where that makes a good part of their noise."""
+    step = resolution_of(found.measurement.force)
+    share = min(step**2 / 12 / max(float(np.median(found.noise.each)) ** 2, 1e-300), 1.0)
+    if share < WORDS.rounded:
+        return ""
+    return (
+        f" The readings are multiples of {size_in_words(step, 'N', _units(found))}, and {100 * share:.0f} % of their "
+        "noise is that: a finer range of the load cell would show more."
+    )
 
 
 def probability_sentence(found: Diagnosis) -> str:

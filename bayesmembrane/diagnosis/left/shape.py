@@ -77,6 +77,16 @@ def residual_shape(measurement: Measurement, residual: Array) -> ResidualShape:
     )
 
 
+def resolution_of(y: Array) -> float:
+    """N: the step of which all readings (N,) are multiples, from the first one on; 0 if there is none."""
+    gaps = np.diff(np.unique(y))
+    gaps = gaps[gaps > 1e-9 * np.ptp(y)]
+    if gaps.size < 3:
+        return 0.0
+    many = gaps / np.min(gaps)
+    return float(np.min(gaps)) if np.all(np.abs(many - np.round(many)) < WORDS.same_reading) else 0.0
+
+
 def plateau_of(y: Array) -> Plateau | None:
     """Many readings (N,) that share the largest or the smallest value."""
     quantum = np.min(np.diff(np.unique(y))) if np.unique(y).size > 1 else 0.0
