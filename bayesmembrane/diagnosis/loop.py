@@ -195,7 +195,7 @@ class _Closing:
 
     def left(self, last: Diagnosis) -> Discrepancy | None:
         """What is kept without a name, where the loop abstains: beside the first explanation, if there is one."""
-        if last.verdict not in ("unknown", "ambiguous"):
+        if last.verdict not in ("unknown", "ambiguous") or (last.best is not last.null and last.remaining.noise):
             return None
         return discrepancy(self.measurement, last.best.residual, last.noise)
 

@@ -44,14 +44,18 @@ def test_ensembles_have_no_weights(found: Run) -> None:
     assert _by_weights(replace(found, status={**found.status, "importance": None})) is None
 
 
-@pytest.mark.parametrize(("verdict", "told"), [("ambiguous", True), ("unknown", True), ("named", False)])
-def test_what_is_kept_without_a_name_is_what_the_answer_leaves(verdict: str, told: bool) -> None:
-    """Not what the plain model leaves, where there are explanations of that."""
+@pytest.mark.parametrize(
+    ("verdict", "noise", "told"),
+    [("ambiguous", False, True), ("unknown", False, True), ("named", False, False), ("ambiguous", True, False)],
+)
+def test_what_is_kept_without_a_name_is_what_the_answer_leaves(verdict: str, noise: bool, told: bool) -> None:
+    """Not what the plain model leaves, where there are explanations of that; and not noise."""
     d = triangle(120)
     wave = np.sin(200 * d)
     m = measured(8 * d + 5 * SD * wave, d)
     large, small = (SimpleNamespace(residual=size * SD * wave) for size in (100, 5))
-    last = SimpleNamespace(verdict=verdict, null=large, best=small, noise=white_noise(m, SD))
+    left_by = SimpleNamespace(noise=noise)
+    last = SimpleNamespace(verdict=verdict, null=large, best=small, noise=white_noise(m, SD), remaining=left_by)
     left = _Closing(m, LoopSettings(), lambda _: None, None).left(cast(Diagnosis, last))
     assert (left is not None) is told
     if left is not None:
