@@ -28,7 +28,8 @@ def flagged_size(effect: Effect, candidate: Candidate, measurement: Measurement)
     times = abs(value - (p.null or 0.0)) / expected_size(effect, measurement)
     if times < NOTHING:
         return f"{name} too small to show"
-    told = [f"{name} {size_in_words(value, p.unit, shown)}"]
+    assumed = " at an assumed 1 mm/s" if measurement.time is None and p.unit.endswith("/s") else ""  # `NOMINAL_SPEED`
+    told = [f"{name} {size_in_words(value, p.unit, shown)}{assumed}"]
     if times >= IMPLAUSIBLE:
         told.append(f"implausible: usual {usual_size(effect, measurement, shown)}")
     own = [n.partition(".")[2] for n in candidate.at_bound if n.startswith(f"{effect.name}.")]

@@ -4,15 +4,18 @@ import numpy as np
 import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.left.shape import residual_shape
 from bayesmembrane.diagnosis.result import Thinned, thinning
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.base import Rig
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.words.diagnosis import percent, thinning_sentence
 from bayesmembrane.words.shape import shape_in_words
+from bayesmembrane.words.sizes import flagged_size
 from bayesmembrane.words.units import SCALES, size_in_words
 
 THICKNESS = 1e-3
@@ -84,3 +87,16 @@ def test_it_is_said_how_many_readings_were_taken_and_only_where_some_were_left_o
 
 def test_what_is_not_enough_for_a_name_does_not_look_as_if_it_were() -> None:
     assert [percent(p) for p in (0.9449, 0.94994, 0.95, 0.954)] == ["94.5 %", "94.9 %", "95 %", "95.4 %"]
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_a_rate_of_a_test_that_nobody_timed_says_what_is_assumed(timed: bool) -> None:
+    d = np.linspace(0.001, 0.03, 30)
+    time = np.arange(30.0) if timed else None
+    m = Measurement(d, 8 * d, Annulus(0.010, 0.035), Specimen("film", 50e-6), time=time)
+    h = hypothesis("neo_hookean", ["force_drift"]).on(m)
+    (effect,), nothing = h.effects, np.zeros(30)
+    x = np.array([2.0, *effect.typical])
+    x[1 + effect.sizes[0]] = 1e-4
+    drifts = Candidate(h, x, nothing, nothing[:, None], 0.0, (), nothing[None], np.zeros(3), nothing)
+    assert ("assumed 1 mm/s" in flagged_size(effect, drifts, m)) is not timed
