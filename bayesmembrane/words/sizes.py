@@ -9,7 +9,7 @@ from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.words.language import spoken_parameter
 from bayesmembrane.words.units import SCALES, Units, size_in_words
 
-NOTHING = 1e-4
+LEAST = 1e-4
 """Times the usual size, below which a number would only say that a search ended there."""
 IMPLAUSIBLE = 5.0
 """Times the usual size, from which on a size is flagged."""
@@ -26,7 +26,7 @@ def flagged_size(effect: Effect, candidate: Candidate, measurement: Measurement)
     p, name = effect.size, spoken_parameter(f"{effect.name}.{effect.size.name}")
     value = candidate.parameters[f"{effect.name}.{p.name}"]
     times = abs(value - (p.null or 0.0)) / expected_size(effect, measurement)
-    if times < NOTHING:
+    if times < LEAST:
         return f"{name} too small to show"
     assumed = " at an assumed 1 mm/s" if measurement.time is None and p.unit.endswith("/s") else ""  # `NOMINAL_SPEED`
     told = [f"{name} {size_in_words(value, p.unit, shown)}{assumed}"]
