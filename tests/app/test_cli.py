@@ -219,6 +219,16 @@ def test_a_biaxial_measurement_is_sampled_compared_and_diagnosed(run: Run, tmp_p
     assert len(json.loads(out)["table"]) == 1
 
 
+@pytest.mark.parametrize("option", ["--out", "--report"])
+def test_a_loop_says_at_once_that_its_answer_could_not_be_written(run: Run, tmp_path: Path, option: str) -> None:
+    (tmp_path / "taken").write_text("")
+    code, out, err = run("loop", CURVE, "--specimen", SPECIMEN, option, tmp_path / "taken" / "folder")
+    assert (code, out) == (1, "")
+    assert "cannot be written" in err
+    assert "name another one" in err
+    assert not (tmp_path / "chains").exists()  # nothing was computed
+
+
 def test_a_long_measurement_is_thinned_and_it_is_said(run: Run, tmp_path: Path) -> None:
     stretch = np.concatenate([np.linspace(1.01, 2.0, 1000), np.linspace(1.999, 1.02, 900)])
     stress = 0.3 * (stretch - stretch**-2.0) + 2e-3 * np.random.default_rng(9).standard_normal(1900)

@@ -22,7 +22,9 @@ def verb(
     """Reconstruct, fit and sample five materials on both ranges of the data that ship, compare, close loops, report."""
     from bayesmembrane.app.analyses import Work
     from bayesmembrane.app.demo import demo
+    from bayesmembrane.ground.files import ensure_writable
 
+    ensure_writable(page_folder, "the page")
     note("Five materials on two ranges; the first run compiles the solvers, which takes about a minute.")
     with resumable(chains), bars() as tell:
         document = demo(page_folder, Work(output.seed, chains, sampling.ess, tell))

@@ -58,11 +58,13 @@ def verb(
     from bayesmembrane.app import analyses
     from bayesmembrane.diagnosis.explanation.case import Question
     from bayesmembrane.diagnosis.loop import LoopSettings
+    from bayesmembrane.ground.files import ensure_writable
     from bayesmembrane.report.page import write_report
 
     adapt = beside.noise == "auto"
     claim = beside.with_material(material.name, noise="white" if adapt else "")
     measurement = used.of(curve.read())
+    ensure_writable(output.report_folder, "the page")
     say_thinning(measurement)
     with resumable(output.folder), lines() as tell:
         work = analyses.Work(output.seed, output.folder, sampling.ess, tell)
