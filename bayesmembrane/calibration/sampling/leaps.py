@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.sampling.chains import Chains
+from bayesmembrane.calibration.sampling.growing import picked
 from bayesmembrane.calibration.sampling.proposals.filling import NEAR, around_largest, joined
 from bayesmembrane.calibration.sampling.proposals.generator import generator_of
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
@@ -18,8 +19,9 @@ from bayesmembrane.ground.parameters import Array
 
 BLOCK = 32
 """Steps that are solved at once. Blocks end at its multiples, so that a walk that goes on has the same ones."""
-LOOKED_AT, MENDING = 2000, 0.2
-"""States at most that are looked at for where a mixture holds walkers up, and the weight of what is added there."""
+MANY, LOOKED_AT, MENDING = 2**18, 2000, 0.2
+"""States of a long walk among which distinct ones are sought, those that are looked at for where a mixture holds
+walkers up, and the weight of what is added there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +77,10 @@ def mended(posterior: Posterior, chains: Chains) -> Mixture | None:
     place; the walkers do, for they are distributed as the posterior, nearly.
     """
     assert chains.mixture is not None
-    first = chains.learned
-    flat = chains.x[:, first:].reshape(-1, chains.x.shape[-1])
-    lp = chains.log_posterior[:, first:].ravel()
+    first, each = chains.learned, chains.log_posterior[:, 0].size
+    steps = np.arange(first, chains.steps, -(-(chains.steps - first) * each // MANY))
+    flat = picked(chains.x, steps).reshape(-1, chains.x.shape[-1])
+    lp = picked(chains.log_posterior, steps).ravel()
     _, at = np.unique(flat, axis=0, return_index=True)
     at = np.random.default_rng(chains.steps).permutation(at)[:LOOKED_AT]
     proposal = proposing(posterior, chains.mixture)
