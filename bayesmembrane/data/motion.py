@@ -111,7 +111,7 @@ class Motion:
             return np.full(self.deflection.size, NOMINAL_SPEED)
         speed = np.abs(np.diff(self.deflection)) / np.diff(self.time)
         middle = np.empty(self.deflection.size)
-        for leg in np.split(np.arange(middle.size), np.flatnonzero(np.diff(self.leg)) + 1):
+        for leg in self._each_leg:
             # The steps that end and begin on this leg; a leg of one point has those around it.
             low, high = max(leg[0] - (leg.size < 2), 0), max(leg[-1], leg[0] + 1)
             inner = speed[low:high]
@@ -123,11 +123,16 @@ class Motion:
         fastest = float(np.max(middle))
         return np.maximum(middle, SLOWEST * fastest) if fastest > 0 else np.full(middle.size, NOMINAL_SPEED)
 
+    @property
+    def _each_leg(self) -> list[NDArray[np.intp]]:
+        """The points of every leg, in order."""
+        return np.split(np.arange(self.leg.size), np.flatnonzero(np.diff(self.leg)) + 1)
+
     @cached_property
     def leg_speed(self) -> Array:
         """(N,) m/s: median speed on the leg that a point is on, rest left out; `NOMINAL_SPEED` without times."""
         out = np.empty(self.speed.size)
-        for leg in np.split(np.arange(out.size), np.flatnonzero(np.diff(self.leg)) + 1):
+        for leg in self._each_leg:
             speed = self.speed[leg]
             out[leg] = np.median(speed[speed >= STILL * np.max(speed)])
         return out

@@ -23,7 +23,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.symmetric import normal_draws
 from bayesmembrane.ground.threads import one_thread
-from bayesmembrane.physics.form_error import FormFactors, at_another_speed, joint_factors
+from bayesmembrane.physics.form_error import FormFactors, error_at_another_speed, joint_factors
 from bayesmembrane.physics.forward import Forward
 
 
@@ -128,6 +128,6 @@ def _at(search: Search, c: Candidate, other: Measurement) -> Continued | None:
         return None
     rows = n + other.on_path
     factors = FormFactors(both.state[rows], both.progress[rows])
-    faster = at_another_speed(search.measurement.path, other.path)[other.on_path]
+    faster = error_at_another_speed(search.measurement.path, other.path)[other.on_path]
     there = continued(part, fit, Forward(c.hypothesis, other, other.deflection, part.quick), factors, faster)
     return there if there.complete else None

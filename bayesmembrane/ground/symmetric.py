@@ -12,7 +12,7 @@ def eigh(a: Array) -> tuple[Array, Array]:
     """(values (..., m) rising, vectors (..., m, m)) of a = V diag(w) V^T, of symmetric a (..., m, m).
 
     NumPy divides and conquers, which OpenBLAS's LAPACK may give up though all is in order (a covariance of 49
-    coefficients, of condition 1e8, on x86 with AVX-512); QR's iterations are slower and do not. Raises `LinAlgError`
+    coefficients, of condition 1e8); QR's iterations are slower and found those. Raises `LinAlgError`
     where a number is not finite.
     """
     try:

@@ -82,7 +82,7 @@ PROGRESS_LENGTHS = (0.3, 1.0, 3.0)
 """Of the whole range, along the way of the disc: over how much of it the error of a law changes."""
 DECADE = 0.3
 """Of the whole range: how much of the way a decade of time counts in a hold, where the disc stands still."""
-SPEED = 0.3
+SPEED_ERROR = 0.3
 """Per factor of e in the speed: how far a law is off beside what it was off, where the speed is another one.
 
 Of 12 predictions of VHB 4910 at other speeds, 1.7 to 5 times apart (peaks 1.5 and 2.5, docs/studies/vhb.md), 90 % bands
@@ -162,14 +162,14 @@ def joint_factors(measurement: Measurement, there: Motion, places: NDArray[np.in
     )
 
 
-def at_another_speed(here: Motion, there: Motion) -> Array:
-    """(G,) `SPEED` |ln (v' / v)|, the relative error of a law at the speed v' of every leg of a test that no fit saw, v
-    being the nearest speed that was seen ``here``; 0 where one of the two was not timed.
+def error_at_another_speed(here: Motion, there: Motion) -> Array:
+    """(G,) `SPEED_ERROR` |ln (v' / v)|, the relative error of a law at the speed v' of every leg of a test that no fit
+    saw, v being the nearest speed that was seen ``here``; 0 where one of the two was not timed.
     """
     if here.time is None or there.time is None:
         return np.zeros(there.deflection.size)
     seen, asked = np.log(here.leg_speed), np.log(there.leg_speed)
-    return np.asarray(SPEED * np.abs(asked - np.clip(asked, np.min(seen), np.max(seen))))
+    return np.asarray(SPEED_ERROR * np.abs(asked - np.clip(asked, np.min(seen), np.max(seen))))
 
 
 def states(measurement: Measurement) -> Array:

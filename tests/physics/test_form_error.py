@@ -8,9 +8,9 @@ from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.form_error import (
     PROGRESS_LENGTHS,
-    SPEED,
+    SPEED_ERROR,
     STATE_LENGTHS,
-    at_another_speed,
+    error_at_another_speed,
     form_factors,
     joint_factors,
     progress,
@@ -81,18 +81,18 @@ def at(times: float | None, back: float | None = None) -> Motion:
 
 
 def test_a_law_is_off_at_another_speed_by_its_logarithm_whichever_is_the_faster() -> None:
-    assert not np.any(at_another_speed(at(1), at(1)))
-    assert at_another_speed(at(1), at(4)) == pytest.approx(SPEED * np.log(4))
-    assert at_another_speed(at(4), at(1)) == pytest.approx(SPEED * np.log(4))
-    assert not np.any(at_another_speed(at(1), at(None)))
-    assert not np.any(at_another_speed(at(None), at(1)))
+    assert not np.any(error_at_another_speed(at(1), at(1)))
+    assert error_at_another_speed(at(1), at(4)) == pytest.approx(SPEED_ERROR * np.log(4))
+    assert error_at_another_speed(at(4), at(1)) == pytest.approx(SPEED_ERROR * np.log(4))
+    assert not np.any(error_at_another_speed(at(1), at(None)))
+    assert not np.any(error_at_another_speed(at(None), at(1)))
 
 
 def test_a_speed_between_those_of_two_legs_was_seen_and_each_leg_has_its_own() -> None:
-    assert at_another_speed(at(1, 10), at(3)) == pytest.approx(0, abs=1e-9)
-    found = at_another_speed(at(1), at(1, 5))
+    assert error_at_another_speed(at(1, 10), at(3)) == pytest.approx(0, abs=1e-9)
+    found = error_at_another_speed(at(1), at(1, 5))
     assert found[:29] == pytest.approx(0, abs=1e-9)
-    assert found[33:] == pytest.approx(SPEED * np.log(5))
+    assert found[33:] == pytest.approx(SPEED_ERROR * np.log(5))
 
 
 def test_rest_is_no_speed() -> None:

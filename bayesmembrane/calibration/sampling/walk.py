@@ -39,7 +39,7 @@ they have to walk along a narrow valley."""
 DOUBTED = 5000  # draws of a mixture after which it is looked at for the first time
 GIVEN_UP = 2 * DOUBTED
 """Draws from which on a mixture whose weights are not good is given up; until then no draw of it counts."""
-MENDED = 8
+MOST_MENDINGS = 8
 """Times that a mixture is mended before ensembles walk instead."""
 GROWTH = 1.25  # a look costs little, but nothing is learned from looking at every step
 
@@ -326,7 +326,7 @@ class _Walk:
 
     def mend(self) -> bool:
         """Have a mixture propose from now on where it held walkers up, too; False if it was mended often enough."""
-        if self.chains.mixture is None or len(self.chains.lessons) >= MENDED:
+        if self.chains.mixture is None or len(self.chains.lessons) >= MOST_MENDINGS:
             return False
         mixture = mended(self.posterior, self.chains)
         if mixture is None:

@@ -148,7 +148,7 @@ def test_stopped_around_a_mending_and_continued_equals_never_stopped(
 
 
 def test_a_bad_mixture_that_is_not_mended_is_left_to_emcee(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(walk, "MENDED", 0)
+    monkeypatch.setattr(walk, "MOST_MENDINGS", 0)
     kept: list[Chains] = []
     found = run_ensembles(Cut(), Settings(ess=400), 0, chains=narrow(), beside=Meanwhile(kept.append))  # type: ignore[arg-type]
     assert found.status == "converged"

@@ -20,7 +20,7 @@ from bayesmembrane.report.blocks import Figure, Points, Table, Text
 from bayesmembrane.report.page import PAGE, TWIN, write_report
 from bayesmembrane.report.runs import Shown
 from bayesmembrane.report.sections.calibrations import refuted
-from bayesmembrane.report.sections.diagnosis import asked, limits, place_of
+from bayesmembrane.report.sections.diagnosis import film_and_model, limits, place_of
 from bayesmembrane.report.sections.diagnosis.figures import Place, Residual, discrepancy_picture, residual_picture
 from bayesmembrane.report.sections.diagnosis.tables import confounded_table, power_table, ranking_table
 from bayesmembrane.report.sections.loop import LoopSection, loops_of, residual_rows
@@ -347,8 +347,8 @@ def test_a_loop_and_a_diagnosis_stand_alone(tmp_path: Path, named: Loop) -> None
     assert 'id="diagnosis1"' in page
     both = d, named.rounds[-1].diagnosis
     # Of several, each says of which film it is.
-    assert twin["answer"] == [f"{asked(x)}: {diagnosis_words.sentence(x)}" for x in both]
-    assert all(x.measurement.specimen.name in asked(x) for x in both)
+    assert twin["answer"] == [f"{film_and_model(x)}: {diagnosis_words.sentence(x)}" for x in both]
+    assert all(x.measurement.specimen.name in film_and_model(x) for x in both)
     before, after = twin["tables"]["diagnosis errors 1"]
     assert (before["model"], after["model"]) == ("neo-Hookean", "neo-Hookean with friction in the guide")
     assert after["heldout_rmse_mN"] < before["heldout_rmse_mN"]

@@ -53,26 +53,26 @@ class DiagnosisSection(Section):
         found = of_kind(results, Diagnosis)
         if len(found) == 1:
             return [words.sentence(found[0])]
-        return [f"{asked(d)}: {words.sentence(d)}" for d in found]
+        return [f"{film_and_model(d)}: {words.sentence(d)}" for d in found]
 
     def lead(self, results: Sequence[Any]) -> Lead | None:
         found = of_kind(results, Diagnosis)
         return lead_of(found[0]) if len(found) == 1 else None
 
     def glances(self, results: Sequence[Any]) -> Sequence[Glance]:
-        return [Glance("diagnosis", asked(d), finding(d)) for d in of_kind(results, Diagnosis)]
+        return [Glance("diagnosis", film_and_model(d), finding(d)) for d in of_kind(results, Diagnosis)]
 
     def subject(self, results: Sequence[Any]) -> Subject | None:
         found = of_kind(results, Diagnosis)
         if not found:
             return None
-        names = "; ".join(map(asked, found)) if len(found) > 1 else _model(found[0])
+        names = "; ".join(map(film_and_model, found)) if len(found) > 1 else _model(found[0])
         curves = list(dict.fromkeys(seen(d.measurement).curve for d in found))
         films = tuple(dict.fromkeys(d.measurement.specimen.name for d in found))
         return Subject(films, f"A diagnosis of {names}.", curves[0] if len(curves) == 1 else "force curve")
 
 
-def asked(d: Diagnosis) -> str:
+def film_and_model(d: Diagnosis) -> str:
     """The film and the model that were asked about."""
     return f"{d.measurement.specimen.name}, {_model(d)}"
 
@@ -104,7 +104,9 @@ def _part(d: Diagnosis, end: str) -> Part:
     if d.verdict != "adequate":
         blocks += explanations(d, "What could explain it", f"diagnosis candidates{end}")
     blocks += limits(d, d, ("diagnosis confounded" + end, "diagnosis power" + end))
-    return Part(f"diagnosis{end.strip()}", f"What may be missing: {asked(d) if end else _model(d)}", tuple(blocks))
+    return Part(
+        f"diagnosis{end.strip()}", f"What may be missing: {film_and_model(d) if end else _model(d)}", tuple(blocks)
+    )
 
 
 def place_of(d: Diagnosis, sd: Array | None = None) -> Place:
