@@ -25,8 +25,8 @@ from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.shape import shape_in_words
-from bayesmembrane.words.sizes import flagged_size
-from bayesmembrane.words.units import Units, size_in_words
+from bayesmembrane.words.sizes import flagged_size, units_of
+from bayesmembrane.words.units import Units, read_as, size_in_words
 
 
 def document(found: Diagnosis) -> dict[str, Any]:
@@ -65,6 +65,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
                 "probability": j.probability,
                 "log_bayes_factor": j.gain,
                 "parameters": j.candidate.parameters,
+                "units": units_of(j.candidate.parameters),
                 "unexplained": j.unexplained,
                 "energy_error": j.candidate.energy_error,
                 "law_errors": j.candidate.law_errors,
@@ -87,6 +88,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "smallest_visible": dict(found.power),
         "absorbed": absorbed_sentences(found),
         "unsought": list(found.unsought),
+        "read_as": read_as(_units(found)),
         "next_measurements": [
             {
                 "what": spoken_test(e.test, found.rig),

@@ -13,7 +13,8 @@ from bayesmembrane.words.diagnosis import foreign_sentence, percent, set_aside_s
 from bayesmembrane.words.hypothesis import effect_title, material_title
 from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.seen import seen
-from bayesmembrane.words.units import size_in_words
+from bayesmembrane.words.sizes import units_of
+from bayesmembrane.words.units import read_as, size_in_words
 
 
 def document(found: JointDiagnosis) -> dict[str, Any]:
@@ -44,6 +45,7 @@ def document(found: JointDiagnosis) -> dict[str, Any]:
                 "probability": m.probability,
                 "log_bayes_factor": m.gain,
                 "parameters": dict(m.parameters),
+                "units": units_of(m.parameters),
                 "unexplained": m.unexplained,
                 "energy_error": m.energy_error,
                 "law_errors": dict(m.law_errors),
@@ -58,6 +60,7 @@ def document(found: JointDiagnosis) -> dict[str, Any]:
                 "error": {"before": asdict(t.before), "after": asdict(t.after)},
                 "noise": {"sd_N": t.noise_sd, "stated": t.stated},
                 "set_aside_readings": 0 if t.set_aside is None else len(t.set_aside.numbers),
+                "read_as": read_as(t.measurement.rig.shown(t.measurement.specimen.thickness)),
             }
             for t in found.tests
         },

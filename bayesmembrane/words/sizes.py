@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.standard import expected_size
+from bayesmembrane.diagnosis.joint.effects import AT
+from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.words.language import spoken_parameter
 from bayesmembrane.words.units import SCALES, Units, size_in_words
@@ -13,6 +17,16 @@ LEAST = 1e-4
 """Times the usual size, below which a number would only say that a search ended there."""
 IMPLAUSIBLE = 5.0
 """Times the usual size, from which on a size is flagged."""
+
+
+def units_of(names: Iterable[str]) -> dict[str, str]:
+    """SI unit of each parameter of an effect: ``machine_compliance.compliance``, ``mullins@strip.softening``."""
+    known, units = components("effects"), {}
+    for name in names:
+        effect, _, own = name.partition(".")
+        declared = known[effect.partition(AT)[0]].coordinates
+        units[name] = next(p.unit for p in declared if p.name == own)
+    return units
 
 
 def usual_size(effect: Effect, measurement: Measurement, shown: Units = SCALES) -> str:

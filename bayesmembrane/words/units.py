@@ -13,8 +13,18 @@ SCALES: Units = {"m": (1e3, "mm"), "m/N": (1e3, "mm/N"), "N": (1e3, "mN"), "N/s"
 """Those of a lifted disc."""
 
 
+NOTHING_LEFT = 1e-30
+"""Below it a size in any unit is what a search left at a bound: none."""
+
+
+def read_as(shown: Units) -> dict[str, dict[str, float | str]]:
+    """By SI unit, the factor and the unit in which this rig's numbers are read, as plain values."""
+    return {unit: {"factor": factor, "unit": name} for unit, (factor, name) in shown.items()}
+
+
 def size_in_words(value: float, unit: str, shown: Units = SCALES) -> str:
     """A value in SI in the unit that people read."""
     factor, name = shown.get(unit, (1.0, unit.removeprefix("-")))
+    value = 0.0 if abs(value) < NOTHING_LEFT else value
     digits = 5 if unit == "-" and abs(value - 1) < WORDS.near_one else 3
     return f"{factor * value:.{digits}g} {name}".strip()

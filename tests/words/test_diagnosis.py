@@ -15,8 +15,8 @@ from bayesmembrane.physics.rigs.base import Rig
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.words.diagnosis import percent, thinning_sentence
 from bayesmembrane.words.shape import shape_in_words
-from bayesmembrane.words.sizes import flagged_size
-from bayesmembrane.words.units import SCALES, size_in_words
+from bayesmembrane.words.sizes import flagged_size, units_of
+from bayesmembrane.words.units import SCALES, read_as, size_in_words
 
 THICKNESS = 1e-3
 STRETCH = np.concatenate([np.linspace(1.01, 1.5, 30), np.linspace(1.49, 1.01, 30)])
@@ -67,6 +67,19 @@ def test_units_of_a_strip_undo_what_its_size_does() -> None:
     assert size_in_words(3e3 * area, "N/s", shown) == "0.003 MPa/s"
     assert size_in_words(0.25 * 0.08 / (3e3 * area), "m/N", shown) == "83.3 1/MPa"
     assert size_in_words(0.5, "-", shown) == "0.5"
+    assert size_in_words(1.2e-83, "-", shown) == "0"
+    told = read_as(shown)
+    assert told["N"] == {"factor": pytest.approx(1e-6 / area), "unit": "MPa"}
+    assert set(told) == set(shown)
+
+
+def test_every_effect_says_the_unit_of_each_of_its_parameters() -> None:
+    for name, effect in components("effects").items():
+        declared = {f"{name}.{p.name}": p.unit for p in effect.coordinates}
+        assert units_of(declared) == declared
+        assert units_of([f"{name}@strip.{effect.coordinates[0].name}"]) == {
+            f"{name}@strip.{effect.coordinates[0].name}": effect.coordinates[0].unit
+        }
 
 
 def test_every_rig_shows_the_same_quantities() -> None:

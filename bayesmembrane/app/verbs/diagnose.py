@@ -91,7 +91,10 @@ def _row_name(row: dict[str, Any], several: bool) -> str:
 
 def show(document: dict[str, Any], measurement: Measurement) -> None:
     """A diagnosis on the terminal, in the units of the rig."""
-    factor, unit = measurement.rig.shown(measurement.specimen.thickness)["N"]
+    from bayesmembrane.words.units import size_in_words
+
+    shown = measurement.rig.shown(measurement.specimen.thickness)
+    factor, unit = shown["N"]
     say(document["sentence"])
     several = len({r["material"] for r in document["ranking"]}) > 1
     rows = [
@@ -100,11 +103,13 @@ def show(document: dict[str, Any], measurement: Measurement) -> None:
             f"{100 * r['probability']:.1f} %",
             f"{r['log_bayes_factor']:.1f}",
             f"{100 * r['unexplained']:.0f} %",
-            ", ".join(f"{k.split('.')[-1]} {v:.4g}" for k, v in r["parameters"].items()),
+            ", ".join(
+                f"{k.split('.')[-1]} {size_in_words(v, r['units'][k], shown)}" for k, v in r["parameters"].items()
+            ),
         ]
         for r in document["ranking"][:CANDIDATES]
     ]
-    table("Candidates", ["effect or energy", "probability", "ln Bayes factor", "unexplained", "parameters, SI"], rows)
+    table("Candidates", ["effect or energy", "probability", "ln Bayes factor", "unexplained", "parameters"], rows)
     errors = [
         [when, f"{factor * e['rmse_N']:.3g}", f"{factor * e['max_N']:.3g}", f"{e['reduced_chi2']:.2f}"]
         for when, e in document["error"].items()

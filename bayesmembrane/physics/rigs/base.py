@@ -163,7 +163,8 @@ class Homogeneous(Rig, ABC):
         shown = self.shown(thickness)
         return (
             f"forces are nominal stress times width times thickness, 1 N for {shown['N'][0]:.4g} MPa, and 1 mm of "
-            f"deflection is {1e-3 * shown['m'][0]:.4g} of {self.axes[0]}"
+            f"deflection is {1e-3 * shown['m'][0]:.4g} of {self.axes[0]}; where the specimen file gives no length and "
+            "width, 50 mm and 10 mm are taken, and no stress depends on them"
         )
 
     def filed(self, deflection: float) -> tuple[str, str]:
