@@ -27,7 +27,7 @@ from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.seen import MEASURED, seen
 from bayesmembrane.words.shape import PARTS
 from bayesmembrane.words.sizes import bound_of_material as _bound
-from bayesmembrane.words.sizes import flagged_size
+from bayesmembrane.words.sizes import flagged_size, hardly_met
 from bayesmembrane.words.units import size_in_words
 
 ROOM = 82
@@ -248,7 +248,10 @@ def _ambiguous(course: Course) -> str:
     sure, among = _certain(d), _in_all(d) if course.detail.sums else ""
     which = f"only {sure} is certain" if sure else f"{among}this curve cannot tell which"
     first = "the first" if course.detail.told > 1 else "it"
-    return f"{which}; {first} explains {_explained(d)}{_beside(d)}"
+    size = (
+        ", yet at a size that is hardly met" if d.members and hardly_met(d.members[0].candidate, d.measurement) else ""
+    )
+    return f"{which}; {first} explains {_explained(d)}{size}{_beside(d)}"
 
 
 def _in_all(d: Diagnosis) -> str:

@@ -34,12 +34,23 @@ def usual_size(effect: Effect, measurement: Measurement, shown: Units = SCALES) 
     return size_in_words(expected_size(effect, measurement), effect.size.unit, shown)
 
 
+def times_usual(effect: Effect, candidate: Candidate, measurement: Measurement) -> float:
+    """The size of one of its effects over what is usual before the data."""
+    p = effect.size
+    value = candidate.parameters[f"{effect.name}.{p.name}"]
+    return abs(value - (p.null or 0.0)) / expected_size(effect, measurement)
+
+
+def hardly_met(candidate: Candidate, measurement: Measurement) -> bool:
+    """Whether one of its effects is of a size that is flagged as implausible."""
+    return any(times_usual(e, candidate, measurement) >= IMPLAUSIBLE for e in candidate.hypothesis.effects)
+
+
 def flagged_size(effect: Effect, candidate: Candidate, measurement: Measurement) -> str:
     """``loss 0.66, implausible: usual 0.1``: the size of one of its effects, with what must be known of it."""
     shown = measurement.rig.shown(measurement.specimen.thickness)
     p, name = effect.size, spoken_parameter(f"{effect.name}.{effect.size.name}")
-    value = candidate.parameters[f"{effect.name}.{p.name}"]
-    times = abs(value - (p.null or 0.0)) / expected_size(effect, measurement)
+    value, times = candidate.parameters[f"{effect.name}.{p.name}"], times_usual(effect, candidate, measurement)
     if times < LEAST:
         return f"{name} too small to show"
     assumed = " at an assumed 1 mm/s" if measurement.time is None and p.unit.endswith("/s") else ""  # `NOMINAL_SPEED`

@@ -174,6 +174,8 @@ def test_an_estimate_at_its_bound_and_an_implausible_size_are_flagged_where_they
     assert sizes(far, d) == [size[1]]
     assert "implausible" not in lead_of(d).brief.answer
     assert "bound" not in lead_of(d).brief.answer
+    assert "at a size that is hardly met" not in lead_of(replace(d, verdict="ambiguous")).brief.answer
+    assert "at a size that is hardly met" in lead_of(replace(flagged, verdict="ambiguous")).brief.answer
 
 
 def test_a_strip_is_told_in_stretch_and_stress(strip: Diagnosis, tmp_path: Path) -> None:
