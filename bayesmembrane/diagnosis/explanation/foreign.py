@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import expit
 
 from bayesmembrane.data.measurement import Measurement
@@ -95,21 +96,24 @@ def beside(search: Search, bases: Sequence[Candidate], others: Sequence[Candidat
 
 @dataclass(frozen=True, eq=False)
 class _Family:
-    """Traces (N, m) of one unit of their expected size, in groups of ``width`` that act together; in N.
+    """Traces of one unit of their expected size, in groups of ``width`` that act together; in N.
 
+    count : how many groups there are
+    traces : (N, width m) those of the groups with the numbers (m,)
     told : what is found, with what its most probable member, of that number and coefficient, says of itself
     """
 
     kind: str
-    traces: Array
+    count: int
+    traces: Callable[[NDArray[np.intp]], Array]
     told: Callable[[Foreign, int, float], Foreign]
     width: int = 1
 
-    def pieces(self) -> Iterator[Array]:
-        """The traces some groups at a time: with what is made of them, those of a long test fill the memory."""
-        step = max(PIECE // len(self.traces) // self.width, 1) * self.width
-        for first in range(0, self.traces.shape[1], step):
-            yield self.traces[:, first : first + step]
+    def pieces(self, readings: int) -> Iterator[Array]:
+        """All traces, some groups at a time: those of a long test fill the memory."""
+        step = max(PIECE // readings // self.width, 1)
+        for first in range(0, self.count, step):
+            yield self.traces(np.arange(first, min(first + step, self.count)))
 
 
 def foreign(search: Search, base: Candidate) -> list[Foreign]:
@@ -158,15 +162,16 @@ def _of_family(base: Candidate, family: _Family, search: Search, _before: Foreig
     model = search.linear(base)
     # Beside noise and form error as they are expected: what is foreign has driven the fitted ones up.
     plain = np.minimum(base.theta, model.priors[:, 0])
-    gains = np.concatenate([_gains(search, model, plain, part, family.width) for part in family.pieces()])
+    pieces = family.pieces(len(search.measurement))
+    gains = np.concatenate([_gains(search, model, plain, part, family.width) for part in pieces])
     best = int(np.argmax(gains))
-    members = slice(best * family.width, (best + 1) * family.width)
+    members = family.traces(np.array([best]))
     spread = float(np.logaddexp.reduce(gains) - np.log(gains.size) - gains[best])
-    wider = extended(model, [Block(search.noise.white(family.traces[:, members]))])
+    wider = extended(model, [Block(search.noise.white(members))])
     z = weighed(wider, base.theta)
     mean = wider.mean(z.theta)
     own = mean[-family.width :]
-    trace = family.traces[:, members] @ own
+    trace = members @ own
     gain = z.log_evidence - weighed(model, base.theta).log_evidence + spread
     found = Foreign(family.kind, base, gain, spread, trace=trace, share=_share(search, base, trace))
     return family.told(found, best, float(own[0]))
@@ -205,21 +210,34 @@ def _steps(m: Measurement, base: Candidate) -> _Family:
     factor.
     """
     clock, places = m.path.clock[m.on_path], _places(m)
-    since = (clock[:, None] - clock[places]) / np.ptp(clock)
-    steps = [expit(since / width) for width in FOREIGN.widths]
-    after = np.concatenate([*steps, *(-np.expm1(-np.maximum(since, 0.0) / t) for t in FOREIGN.rests)], axis=1)
+    kinds = [partial(_stepping, width) for width in FOREIGN.widths] + [partial(_resting, t) for t in FOREIGN.rests]
     fitted = m.force - base.residual
     largest = float(np.max(np.abs(m.force)))
-    traces = FOREIGN.size * np.concatenate([after * largest, after * fitted[:, None]], axis=1)
+    each = len(kinds) * places.size
+
+    def traces(numbers: NDArray[np.intp]) -> Array:
+        since = (clock[:, None] - clock[places[numbers % places.size]]) / np.ptp(clock)
+        for k, kind in enumerate(kinds):
+            own = numbers % each // places.size == k
+            since[:, own] = kind(since[:, own])
+        return np.asarray(FOREIGN.size * (since * np.where(numbers < each, largest, fitted[:, None])))
 
     def told(found: Foreign, best: int, coefficient: float) -> Foreign:
         place = int(places[best % places.size])
-        relative = best >= after.shape[1]
+        relative = best >= each
         size = coefficient * FOREIGN.size * (1.0 if relative else largest)
         moment = None if m.time is None else float(m.time[place])
         return replace(found, size=size, relative=relative, place=place, moment=moment)
 
-    return _Family(SUDDEN, traces, told)
+    return _Family(SUDDEN, 2 * each, traces, told)
+
+
+def _stepping(width: float, since: Array) -> Array:
+    return np.asarray(expit(since / width))
+
+
+def _resting(time: float, since: Array) -> Array:
+    return -np.expm1(-np.maximum(since, 0.0) / time)
 
 
 def _frequencies(readings: int) -> Array:
@@ -236,11 +254,12 @@ def _waves(m: Measurement) -> _Family:
     places = [("time", m.path.clock[m.on_path], _frequencies(len(m)))]
     if moving >= FOREIGN.least_points:  # a wave of the deflection stands still in a hold, like the disc
         places.append(("deflection", m.deflection, _frequencies(moving)))
-    phase = np.concatenate([_phase(place, frequencies) for _, place, frequencies in places], axis=1)
-    both = np.empty((*phase.shape, 2))  # filled in place: these are the largest arrays of a diagnosis
-    np.cos(phase, out=both[..., 0])
-    np.sin(phase, out=both[..., 1])
-    both *= size
+    phases = [(_phase(place), frequencies) for _, place, frequencies in places]
+
+    def traces(numbers: NDArray[np.intp]) -> Array:
+        along = np.concatenate([phase[:, None] * waves for phase, waves in _of_each(phases, numbers)], axis=1)
+        return np.asarray(size * np.stack([np.cos(along), np.sin(along)], axis=-1).reshape(len(m), -1))
+
     periods = [(against, float(np.ptp(place)) / f) for against, place, waves in places for f in waves.tolist()]
 
     def told(found: Foreign, best: int, _: float) -> Foreign:
@@ -248,12 +267,22 @@ def _waves(m: Measurement) -> _Family:
         against, period = periods[best]
         return replace(found, size=float(np.max(np.abs(found.trace))), period=period, against=against)
 
-    return _Family(WAVE, both.reshape(len(m), -1), told, 2)
+    return _Family(WAVE, len(periods), traces, told, 2)
 
 
-def _phase(place: Array, frequencies: Array) -> Array:
+def _of_each(phases: Sequence[tuple[Array, Array]], numbers: NDArray[np.intp]) -> Iterator[tuple[Array, Array]]:
+    """The phases of one wave, and the frequencies with these ``numbers``, counted through all of them."""
+    first = 0
+    for phase, frequencies in phases:
+        own = numbers - first
+        yield phase, frequencies[own[(own >= 0) & (own < frequencies.size)]]
+        first += frequencies.size
+
+
+def _phase(place: Array) -> Array:
+    """(N,) of one wave over all of the test."""
     span = float(np.ptp(place)) or 1.0  # where the disc stands still, nothing repeats with the deflection
-    return np.asarray(2 * np.pi * ((place - place.min()) / span)[:, None] * frequencies)
+    return np.asarray(2 * np.pi * ((place - place.min()) / span))
 
 
 def _plays(m: Measurement, base: Candidate) -> _Family:
@@ -270,8 +299,12 @@ def _plays(m: Measurement, base: Candidate) -> _Family:
             kept = np.exp(-path.steps[i] / travel)
             lag[i] = lag[i - 1] * kept + (1 - kept) * (path.leg[i] < 0)
         out.append(slope * lag[m.on_path])
-    traces = unit * np.column_stack(out)
-    return _Family(PLAY, traces, lambda found, _, coefficient: replace(found, size=abs(coefficient) * unit))
+    lags = unit * np.column_stack(out)
+
+    def told(found: Foreign, _: int, coefficient: float) -> Foreign:
+        return replace(found, size=abs(coefficient) * unit)
+
+    return _Family(PLAY, lags.shape[1], lambda numbers: lags[:, numbers], told)
 
 
 def _slope(deflection: Array, force: Array) -> Array:
