@@ -223,8 +223,9 @@ def test_valleys_with_and_without_an_effect_lie_beside_each_other(film: Film, tm
 def test_the_command_answers_with_the_promised_fields(film: Film, tmp_path: Path) -> None:
     m = film("mooney_rivlin", (6.0, 1.5), end=0.03, points=8, noise=0.003)
     write_measurement(m, tmp_path / "curve.csv", tmp_path / "film.toml")
-    asked = ["valleys", str(tmp_path / "curve.csv"), "--specimen", str(tmp_path / "film.toml")]
-    done = CliRunner().invoke(assembled(), [*asked, "--material", "neo_hookean", "--ranges-mm", "20,30", "--json"])
+    asked = ["valleys", str(tmp_path / "curve.csv"), "--specimen", str(tmp_path / "film.toml"), "--json"]
+    asked += ["--material", "neo_hookean", "--ranges-mm", "20,30", "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(assembled(), asked)
     assert done.exit_code == 0, done.output
     answer = json.loads(done.stdout)
     assert [r["max_deflection_mm"] for r in answer["ranges"]] == pytest.approx([1e3 * 0.03 / 8 * 5, 30])
