@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.special import erf
 
+from bayesmembrane.ground.compiling import compiled
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 
@@ -65,11 +66,31 @@ class Mullins(Carried):
         return [{"damage": 0.05}, {"damage": 0.95}]
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
-        m, full = state.reached, state.path.full_range
-        with np.errstate(all="ignore"):
-            part = np.where(m > 0, np.maximum(state.deflection, 0.0) / m, 1.0)
-            wide = p[:, 1:2] * (full / np.maximum(m, 1e-6 * full)) ** p[:, 2:3]
-        back = erf((1.0 - part ** p[:, 3:4]) / wide) / erf(1.0 / p[:, 1:2])
-        ever = np.expm1(-((m / full) ** p[:, 3:4]) / p[:, 1:2]) / np.expm1(-1.0 / p[:, 1:2])
-        lost = (1.0 - p[:, 4:5]) * back + p[:, 4:5] * ever
+        at, reached = (np.atleast_2d(np.asarray(v, dtype=float)) for v in (state.deflection, state.reached))
+        lost = np.empty(np.broadcast_shapes(force.shape, at.shape, (len(p), 1)))
+        _lost(
+            np.ascontiguousarray(p),
+            np.ascontiguousarray(at),
+            np.ascontiguousarray(reached),
+            state.path.full_range,
+            lost,
+        )
         return np.asarray(force * np.maximum(1.0 - p[:, :1] * lost, 0.0))
+
+
+@compiled(error_model="numpy")
+def _lost(p, deflection, reached, full, out):  # type: ignore[no-untyped-def]
+    """(B, N) what stands in brackets: most readings reach no further, and of three powers one is new at each."""
+    for b in range(out.shape[0]):
+        width, fading, power, damage = p[b, 1], p[b, 2], p[b, 3], p[b, 4]
+        i, before, wide, ever = b if deflection.shape[0] > 1 else 0, -1.0, 1.0, 0.0
+        back_whole, ever_whole = math.erf(1.0 / width), np.expm1(-1.0 / width)
+        for n in range(out.shape[1]):
+            m, x = reached[i, n], deflection[i, n]
+            if m != before:
+                before = m
+                wide = width * (full / max(m, 1e-6 * full)) ** fading
+                ever = np.expm1(-((m / full) ** power) / width) / ever_whole
+            part = (x / m if x > 0.0 else 0.0) if m > 0.0 else 1.0
+            back = math.erf((1.0 - part**power) / wide) / back_whole if part < 1.0 else 0.0
+            out[b, n] = (1.0 - damage) * back + damage * ever
