@@ -314,7 +314,7 @@ def pair_maps(surface: Surface, best: Array, found: list[LossProfile], points: i
     starts = [_starts(best, inverse, found, p, a) for p, a in zip(pairs, axes, strict=True)]
     start, other = (np.concatenate(part) for part in zip(*starts, strict=True))
     better = surface.loss(other) < surface.loss(start)
-    z, size = surface.minimise(np.where(better[:, None], other, start), held, ITERATIONS_OF_A_MAP)
+    z, size = surface.minimise(np.where(better[:, None], other, start), held, ITERATIONS_OF_A_MAP, rooted=False)
     place = np.arange(len(z)).reshape(len(pairs), points, points)
     for step in ((1, 1), (1, -1), (2, 1), (2, -1)):
         z, size = _from_neighbours(surface, z, size, place, step, held)
@@ -337,14 +337,14 @@ def _starts(
     return start, other
 
 
-ITERATIONS_OF_A_MAP = 15
+ITERATIONS_OF_A_MAP = 40
 WORSE = 5e-2  # relative: a cell this much above its neighbour is tried again from there
 
 
 def _from_neighbours(
     surface: Surface, z: Array, size: Array, place: NDArray[Any], step: tuple[int, int], held: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Cells above their neighbour's loss, tried again from the neighbour's film.
+    """Cells above their neighbour's loss, tried again from the neighbour's film where that is below it, too.
 
     ``place`` (P, A, B) numbers the cells; ``step`` is the axis, and how far along it the neighbour lies.
     """
@@ -357,7 +357,9 @@ def _from_neighbours(
     if not again.size:
         return z, size
     start = np.where(held[again], z[again], z[neighbour[again]])
-    found, norm = surface.minimise(start, held[again], ITERATIONS_OF_A_MAP)
+    promises = surface.loss(start) < size[again]
+    again, start = again[promises], start[promises]
+    found, norm = surface.minimise(start, held[again], ITERATIONS_OF_A_MAP, rooted=False)
     better = norm < size[again]
     z, size = z.copy(), size.copy()
     z[again[better]], size[again[better]] = found[better], norm[better]

@@ -168,8 +168,13 @@ class Surface:
         size = np.linalg.norm(self.batch(z)[0], axis=1)
         return np.where(np.isfinite(size), size, np.inf)
 
-    def minimise(self, start: Array, held: NDArray[np.bool_], iterations: int = ITERATIONS) -> tuple[Array, Array]:
-        """(z (M, k), L (M,)): least squares from each row of ``start`` over what is not ``held`` (k,) or (M, k)."""
+    def minimise(
+        self, start: Array, held: NDArray[np.bool_], iterations: int = ITERATIONS, rooted: bool = True
+    ) -> tuple[Array, Array]:
+        """(z (M, k), L (M,)): least squares from each row of ``start`` over what is not ``held`` (k,) or (M, k).
+
+        Without ``rooted`` a single free parameter stays as good as the loss tells: to the root of its round-off.
+        """
         held = np.broadcast_to(held, start.shape)
         low, high = self.chart.limits
         start = np.where(held, start, np.clip(start, low, high))
@@ -178,7 +183,7 @@ class Surface:
         low, high = np.minimum(low, np.min(start, axis=0)), np.maximum(high, np.max(start, axis=0))
         z, size = descend(self.batch, start, (low, high), iterations, held)
         single = np.flatnonzero((np.sum(~held, axis=1) == 1) & np.isfinite(size))
-        if single.size:
+        if rooted and single.size:
             z[single], size[single] = self._rooted(z[single], size[single], np.argmin(held[single], axis=1))
         return z, size
 
