@@ -5,7 +5,7 @@ Nothing here knows a particular effect. See `effects.base` for the stages and th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -136,13 +136,28 @@ class Composition:
         return np.broadcast_to(self.path.deflection, (rows, self.path.deflection.size))
 
 
+def mountings(composition: Composition, x: Array) -> list[Array]:
+    """Points (B, k) whose films are mounted in another way than those at x (B, k): what `differences` needs laws of."""
+    mounting = (isinstance(e, Geometry) for e in composition.effects for _ in e.coordinates)
+    return [_moved(composition, x, i)[0] for i, other in enumerate(mounting) if other]
+
+
+def _moved(composition: Composition, x: Array, number: int) -> tuple[Array, Array]:
+    """x (B, k) with one coordinate moved for a difference, on the admissible side, and by how much (B,)."""
+    effect, p = [(e, p) for e in composition.effects for p in e.coordinates][number]
+    h = (MOUNTING_STEP if isinstance(effect, Geometry) else EFFECT_STEP) * p.scale
+    step, moved = np.where(x[:, number] + h <= p.bounds[1], h, -h), x.copy()
+    moved[:, number] += step
+    return moved, step
+
+
 def differences(
-    composition: Composition, law: Law, mounted: Callable[[Array], Law], x: Array, jacobian: Array
+    composition: Composition, law: Law, mounted: Sequence[Law], x: Array, jacobian: Array
 ) -> tuple[Array, NDArray[np.int8], Array]:
     """(reading (B, N), status (B, N), d reading / d coordinates (B, N, m + k)).
 
     law : of the films, able to vary
-    mounted : the law for other effect parameters (B, k)
+    mounted : the laws at the `mountings` of x
     x : (B, k) effect parameters
     jacobian : (B, n, m) d (membrane parameters) / d (material coordinates)
 
@@ -150,22 +165,20 @@ def differences(
     load cell adds needs no other film.
     """
     changes = [_Change(x, MATERIAL_STEP, law.varied(MATERIAL_STEP * rate)) for rate in np.moveaxis(jacobian, 2, 0)]
-    for i, (effect, p) in enumerate((e, p) for e in composition.effects for p in e.coordinates):
-        mounting = isinstance(effect, Geometry)
-        h = (MOUNTING_STEP if mounting else EFFECT_STEP) * p.scale
-        step, moved = np.where(x[:, i] + h <= p.bounds[1], h, -h), x.copy()
-        moved[:, i] += step
-        film = None if isinstance(effect, Sensor) else mounted(moved) if mounting else law
+    others = iter(mounted)
+    for i, effect in enumerate(e for e in composition.effects for _ in e.coordinates):
+        moved, step = _moved(composition, x, i)
+        film = None if isinstance(effect, Sensor) else next(others) if isinstance(effect, Geometry) else law
         changes.append(_Change(moved, step[:, None], film))
     laws = [c.law for c in changes if c.law is not None]
     points = np.concatenate([c.x for c in changes if c.law is not None])
     if composition.yields:
         _, plain, why = composition.closed(law, x)
-        others = composition.closed(type(law).stack(laws), points, np.tile(plain, (len(laws), 1)))[1]
+        beside = composition.closed(type(law).stack(laws), points, np.tile(plain, (len(laws), 1)))[1]
     else:
         _, force, why = composition.closed(type(law).stack([law, *laws]), np.concatenate([x, points]))
-        plain, others = np.split(force, [len(x)])
-    each = iter(np.split(others, len(laws)))
+        plain, beside = np.split(force, [len(x)])
+    each = iter(np.split(beside, len(laws)))
     forces = [plain, *(plain if c.law is None else next(each) for c in changes)]
     at = np.concatenate([x, *(c.x for c in changes)])
     reading, status = composition.read(at, np.concatenate(forces), np.tile(why[: len(x)], len(forces)))

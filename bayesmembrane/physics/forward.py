@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import pairwise
@@ -14,7 +15,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.composition import Composition, differences
+from bayesmembrane.physics.composition import Composition, differences, mountings
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.mechanics.convexity import reached_convexity, reached_ellipticity
@@ -212,15 +213,28 @@ class Forward:
         """(B, m) the parameters of the effects of x (B, k)."""
         return x[:, self.hypothesis.material_size : self.hypothesis.curve_size]
 
-    def over(self, x: Array, found: tuple[Law, tuple[Array, Array]], sensitivities: bool) -> Prediction:
-        """Curves of x (B, k) over what `law` ``found`` for them, which can vary if sensitivities are asked for."""
+    def mountings(self, x: Array) -> list[Array]:
+        """Effect parameters (B, m) with which sensitivities at x (B, k) need the films mounted in another way."""
+        return mountings(self.composition, self.effects(x))
+
+    def over(
+        self,
+        x: Array,
+        found: tuple[Law, tuple[Array, Array]],
+        sensitivities: bool,
+        mounted: Sequence[Law] | None = None,
+    ) -> Prediction:
+        """Curves of x (B, k) over what `law` ``found`` for them, which can vary if sensitivities are asked for.
+
+        mounted : the laws at the `mountings`; found here if they are not given
+        """
         (law, at), films, theta = found, self.hypothesis.films(x), self.effects(x)
         slopes = None
         if sensitivities:
             jacobian = self.jacobian(x)[:, :, : self.hypothesis.material_size]
-            force, status, slopes = differences(
-                self.composition, law, lambda moved: self.law(films, moved)[0], theta, jacobian
-            )
+            if mounted is None:
+                mounted = [self.law(films, moved)[0] for moved in self.mountings(x)]
+            force, status, slopes = differences(self.composition, law, mounted, theta, jacobian)
         else:
             force, status = self.composition(law, theta)
         here = self._here

@@ -14,7 +14,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.form_error import rows_without
 from bayesmembrane.physics.forward import AT_ONCE, Forward, Prediction
 from bayesmembrane.physics.materials.base import Material
-from bayesmembrane.physics.rigs.base import Films, Trial
+from bayesmembrane.physics.rigs.base import Films, Law, Trial
 
 Asked = tuple[Forward, Array]
 """A hypothesis at the readings of a measurement, and coordinates x (B, k)."""
@@ -58,20 +58,31 @@ def _drawn_through_points(forward: Forward, rows: int) -> bool:
 
 def _together(asked: Sequence[Asked], sensitivities: bool) -> list[Prediction]:
     """The curves of films of one energy, from one law of all of them."""
+    each = [(f, f.hypothesis.films(x), f.effects(x)) for f, x in asked]
+    found, out = iter(_laws(each, sensitivities)), []
+    # Films in another mounting, for differences, are so few of each that they are solved together, too.
+    moved = [f.mountings(x) if sensitivities else [] for f, x in asked]
+    others = iter(_laws([(f, p, m) for (f, p, _), ms in zip(each, moved, strict=True) for m in ms], False))
+    for (forward, x), ms in zip(asked, moved, strict=True):
+        mounted = [next(others)[0] for _ in ms]
+        out.append(forward.over(x, next(found), sensitivities, mounted))
+    return out
+
+
+def _laws(asked: Sequence[tuple[Forward, Array, Array]], sensitivities: bool) -> list[tuple[Law, tuple[Array, Array]]]:
+    """What `Forward.law` finds for films (B, n) with effect parameters (B, k) of each, all of one energy."""
+    if not asked:
+        return []
     first = asked[0][0]
-    each = [(f.composition, f.effects(x)) for f, x in asked]
     trial = Trial(
         first.measurement,
         first.path,
-        np.concatenate([c.prestretch(theta) for c, theta in each]),
-        np.concatenate([c.end(theta) for c, theta in each]),
+        np.concatenate([f.composition.prestretch(theta) for f, _, theta in asked]),
+        np.concatenate([f.composition.end(theta) for f, _, theta in asked]),
     )
-    parameters = np.concatenate([f.hypothesis.films(x) for f, x in asked])
+    parameters = np.concatenate([p for _, p, _ in asked])
     films = Films(first.hypothesis.material, parameters, sensitivities, solve=first.solve)
     law, margins = first.rig.law(films, trial)
-    out, begin = [], 0
-    for forward, x in asked:
-        rows = slice(begin, begin + len(x))
-        out.append(forward.over(x, (law.of(rows), (margins[0][rows], margins[1][rows])), sensitivities))
-        begin += len(x)
-    return out
+    ends = np.cumsum([len(p) for _, p, _ in asked])
+    rows = [slice(e - len(p), e) for e, (_, p, _) in zip(ends, asked, strict=True)]
+    return [(law.of(some), (margins[0][some], margins[1][some])) for some in rows]
