@@ -230,3 +230,5 @@ def test_the_command_answers_with_the_promised_fields(film: Film, tmp_path: Path
     answer = json.loads(done.stdout)
     assert [r["max_deflection_mm"] for r in answer["ranges"]] == pytest.approx([1e3 * 0.03 / 8 * 5, 30])
     assert set(answer["closest_approach"]) >= {"distance", "cross", "sentence"}
+    other = json.loads(CliRunner().invoke(assembled(), [*asked, "--loss-rise", "0.2"]).stdout)
+    assert len({*answer["files"], *other["files"]}) == 4

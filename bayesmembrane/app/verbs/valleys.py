@@ -61,7 +61,8 @@ def verb(
         found = analyses.valleys(measurement, claim, work, ends=ranges.ends, rise=loss_rise)
     document = found.document
     if output.folder is not None:
-        document |= {"files": [str(f) for f in write_valleys(found.result, output.folder)]}
+        name = "valleys" if found.folder is None else found.folder.name  # no other answer in there is written over
+        document |= {"files": [str(f) for f in write_valleys(found.result, output.folder, name)]}
     title = f"Valleys of {claim.material.title} on {curve.shown}"
     answer(document, output.as_json, lambda: show(found.result, title))
 

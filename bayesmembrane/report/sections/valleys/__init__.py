@@ -22,8 +22,6 @@ from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.valleys import document, sentences
 
-ANSWER, PICTURE, BESIDE = "valleys.json", "valleys.png", "valleys_beside.png"
-
 
 class ValleysSection(Section):
     """A table of all valleys, then of each hypothesis the picture, the sentences, and what to measure next."""
@@ -90,17 +88,17 @@ def _blocks(found: Valleys | Beside) -> list[Block]:
     return [*out, figure, Points(sentences(found)), *(next_table(v) for v in added.ranges if v.next_tests)]
 
 
-def write_valleys(found: Valleys | Beside, out: Path) -> tuple[Path, ...]:
+def write_valleys(found: Valleys | Beside, out: Path, name: str = "valleys") -> tuple[Path, ...]:
     """Write ``valleys.json`` and ``valleys.png`` into ``out``, with effects also ``valleys_beside.png``.
 
-    Raises `StorageError` if that cannot be done.
+    Of several answers in one folder each has a ``name`` of its own. Raises `StorageError` if that cannot be done.
     """
     added = found.added if isinstance(found, Beside) else found
-    pictures: dict[str, Picture] = {BESIDE: beside_picture(found)} if isinstance(found, Beside) else {}
-    pictures[PICTURE] = valley_picture(added)
-    written = [write_text(out / ANSWER, json_text(document(found)), "the valleys")]
-    for name, picture in pictures.items():
-        written.append(write_whole(out / name, partial(_fill, picture), "the valleys"))
+    pictures: dict[str, Picture] = {f"{name}_beside.png": beside_picture(found)} if isinstance(found, Beside) else {}
+    pictures[f"{name}.png"] = valley_picture(added)
+    written = [write_text(out / f"{name}.json", json_text(document(found)), "the valleys")]
+    for file, picture in pictures.items():
+        written.append(write_whole(out / file, partial(_fill, picture), "the valleys"))
     return tuple(written)
 
 
