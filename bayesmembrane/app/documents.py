@@ -30,6 +30,7 @@ from bayesmembrane.words import (
     sampling,
     valleys,
 )
+from bayesmembrane.words.units import read_as
 
 
 def document(result: Any) -> dict[str, Any]:
@@ -39,7 +40,10 @@ def document(result: Any) -> dict[str, Any]:
 
 def _document(result: Any) -> Mapping[str, Any]:
     match result:
-        case Fit() | JointFit():
+        case Fit():
+            known = {} if result.rig is None else {"read_as": read_as(result.rig.shown(result.thickness))}
+            return {**result.summary(), **known}
+        case JointFit():
             return result.summary()
         case Population():
             return {**result.summary(), "sentences": list(population.sentences(result))}

@@ -118,10 +118,25 @@ class Objective:
                 start = np.concatenate([start, candidates[: len(start), n:]], axis=1)
                 order = np.argsort(size, kind="stable")
                 return start[order], size[order]
-        raise SettingsError(
-            f"no {self.hypothesis.label()} film with admissible parameters reaches "
-            f"{1e3 * np.max(self.measurement.deflection):g} mm",
-            remedy="use a shorter range or another material, and check the units of the deflection",
+        raise self._refusal(films)
+
+    def _refusal(self, films: Array) -> SettingsError:
+        """Why none of the films (B, n) is a start: none reaches the deflections, or none the forces."""
+        force, y = self.forward.film_force(films), self.measurement.force
+        force = force[np.all(np.isfinite(force), axis=1)]
+        label, far = self.hypothesis.label(), f"{1e3 * np.max(self.measurement.deflection):g} mm"
+        if not len(force):
+            return SettingsError(
+                f"no {label} film with admissible parameters reaches {far}",
+                remedy="use a shorter range or another material, and check the units of the deflection",
+            )
+        if not np.any(y):
+            return SettingsError("all forces are zero", remedy="use a curve that was measured")
+        least, most = (float(np.exp(v[0])) for v in (self.low, self.high))
+        return SettingsError(
+            f"no {label} film with a shear modulus times thickness of {least:.2g} to {most:.2g} N/m carries "
+            f"{np.max(y):.3g} N at {far}",
+            remedy="check the units and signs of deflection and force",
         )
 
     def _likely(self, films: Array) -> NDArray[np.bool_]:

@@ -53,7 +53,9 @@ def ranges_of(whole: Measurement, ends: Sequence[float]) -> dict[str, Range]:
     for end in ends or [float(np.max(whole.deflection))]:
         part = whole.up_to(end)
         rest = whole if len(part) < len(whole) else None
-        found[f"up to {1e3 * float(np.max(part.deflection)):.4g} mm"] = Range(part, rest)
+        reached = float(np.max(part.deflection))
+        place = whole.rig.place(reached) if whole.rig.homogeneous else f"{1e3 * reached:.4g} mm"
+        found[f"up to {place}"] = Range(part, rest)
     return found
 
 

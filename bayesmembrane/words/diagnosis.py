@@ -86,6 +86,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         },
         "noise": {"sd_N": noise.sd, "rho": noise.rho, "stated": noise.stated, "times_stated": noise.excess},
         "smallest_visible": dict(found.power),
+        "smallest_visible_units": {n: components("effects")[n]().size.unit for n in found.power},
         "absorbed": absorbed_sentences(found),
         "unsought": list(found.unsought),
         "read_as": read_as(_units(found)),
@@ -506,7 +507,9 @@ def smallest_sizes(found: Diagnosis) -> list[tuple[str, str]]:
     known, units = components("effects"), _units(found)
     effects = {n: known[n]() for n, size in found.power.items() if np.isfinite(size)}
     order = sorted(effects, key=lambda n: (found.power[n] / expected_size(effects[n], found.measurement), n))
-    return [(known[n].title, size_in_words(found.power[n], effects[n].size.unit, units)) for n in order]
+    sizes = {n: size_in_words(found.power[n], effects[n].size.unit, units) for n in order}
+    bare = {n: f" ({spoken_parameter(f'{n}.{e.size.name}')})" for n, e in effects.items() if e.size.unit == "-"}
+    return [(known[n].title, f"{sizes[n]}{bare.get(n, '')}") for n in order]
 
 
 def _noise(found: Diagnosis) -> str:

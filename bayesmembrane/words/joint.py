@@ -30,8 +30,10 @@ def sentences(run: JointRun) -> tuple[str, ...]:
         said.append(failed)
     if pressed := convexity_sentence(run.status.get("checks", {}).get("ruled_out")):
         said.append(pressed)
-    for label, part in zip(run.joint.labels, run.parts, strict=True):
-        said += [f"{label}: {told}" for told in (noise_sentence(part.quality), smooth_sentence(part.quality)) if told]
+    for label, part, test in zip(run.joint.labels, run.parts, run.joint.parts, strict=True):
+        shown = test.measurement.rig.shown(test.measurement.specimen.thickness)
+        each = noise_sentence(part.quality, shown), smooth_sentence(part.quality)
+        said += [f"{label}: {told}" for told in each if told]
     return tuple(said)
 
 

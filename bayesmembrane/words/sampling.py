@@ -7,20 +7,22 @@ from typing import Any
 from bayesmembrane.calibration.quality import RULED_OUT, Quality
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.calibration.sampling.convergence import LEAST_TAUS
+from bayesmembrane.words.units import SCALES, Units, read_as, size_in_words
 
 
 def document(run: Run) -> dict[str, Any]:
     """The JSON answer of ``sample``: what was stored, and what a reader must know before trusting it."""
-    return {**run.summary(), "sentences": list(sentences(run.quality))}
+    shown = run.measurement.rig.shown(run.measurement.specimen.thickness)
+    return {**run.summary(), "read_as": read_as(shown), "sentences": list(sentences(run.quality, shown))}
 
 
-def sentences(quality: Quality) -> tuple[str, ...]:
-    """What a reader must know before trusting the numbers; none if all is well."""
+def sentences(quality: Quality, shown: Units = SCALES) -> tuple[str, ...]:
+    """What a reader must know before trusting the numbers, in the units of the rig; none if all is well."""
     said = (
         convergence_sentence(quality),
         failure_sentence(quality),
         convexity_sentence(quality.ruled_out),
-        noise_sentence(quality),
+        noise_sentence(quality, shown),
         smooth_sentence(quality),
     )
     return tuple(sentence for sentence in said if sentence)
@@ -62,13 +64,14 @@ def convexity_sentence(gain: float | None) -> str:
     )
 
 
-def noise_sentence(quality: Quality) -> str:
+def noise_sentence(quality: Quality, shown: Units = SCALES) -> str:
     """What an engineer should read when the inferred noise exceeds the stated one; "" if it does not."""
     if quality.own_noise is None or quality.extra_noise is None:
         return ""
+    inferred, stated = (size_in_words(v, "N", shown) for v in (quality.extra_noise, quality.own_noise))
     return (
-        f"The inferred extra noise ({1e3 * quality.extra_noise:.3g} mN) exceeds what the measurement states "
-        f"({1e3 * quality.own_noise:.3g} mN): the model misses something, and its misfit is counted as noise."
+        f"The inferred extra noise ({inferred}) exceeds what the measurement states ({stated}): the model misses "
+        "something, and its misfit is counted as noise."
     )
 
 

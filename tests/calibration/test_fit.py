@@ -31,6 +31,16 @@ FILMS = {
 }
 
 
+def test_what_no_film_can_meet_is_said_by_its_name(film) -> None:  # type: ignore[no-untyped-def]
+    m = film("gent", FILMS["gent"])
+    with pytest.raises(SettingsError, match="all forces are zero"):
+        fit(replace(m, force=0 * m.force), hypothesis("gent"))
+    with pytest.raises(SettingsError, match="check the units and signs of deflection and force"):
+        fit(replace(m, deflection=1e-3 * m.deflection), hypothesis("gent"))
+    with pytest.raises(SettingsError, match=r"no neo_hookean film with a shear modulus .* carries"):
+        fit(replace(m, force=-m.force), hypothesis("neo_hookean"))
+
+
 @pytest.mark.parametrize("name", [n for n in FILMS if n != "ogden"])
 def test_a_film_without_noise_comes_back(film, name: str) -> None:  # type: ignore[no-untyped-def]
     """The curve is the textbook solver's, so that this also says how well the two agree."""

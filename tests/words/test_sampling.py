@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from bayesmembrane.calibration.quality import Quality
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.words.sampling import sentences
 
 GOOD = Quality("converged", 900, 1200.0, 1000.0, 61.0, 1.004, 0, 50000)
@@ -31,6 +32,8 @@ def test_failures_are_told_from_a_tenth_of_a_percent() -> None:
 def test_noise_that_dominates_is_told_with_both_numbers() -> None:
     (sentence,) = sentences(replace(GOOD, own_noise=0.01, extra_noise=0.02))
     assert "(20 mN) exceeds what the measurement states (10 mN)" in sentence
+    (sentence,) = sentences(replace(GOOD, own_noise=0.01, extra_noise=0.02), Uniaxial(0.05, 0.01).shown(1e-3))
+    assert "(0.002 MPa) exceeds what the measurement states (0.001 MPa)" in sentence
 
 
 def test_a_convexity_prior_that_decides_is_told() -> None:

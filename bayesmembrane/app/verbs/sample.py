@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from bayesmembrane.calibration.joint.claim import Joint
     from bayesmembrane.data.project import Listed
     from bayesmembrane.physics.hypothesis import Hypothesis
+    from bayesmembrane.words.units import Units
 
 place = 6
 
@@ -51,7 +53,8 @@ def verb(
         note(f"Interrupted; the run is stored in {found.folder}. The same command resumes it: {command()}")
         raise typer.Exit(INTERRUPTED)
     title = f"{claim.material.title} on {curve.shown}"
-    answer(found.document, output.as_json, lambda: show(found.document, title, claim))
+    shown = whole.rig.shown(whole.specimen.thickness)
+    answer(found.document, output.as_json, lambda: show(found.document, title, claim, shown))
 
 
 def jointly(
@@ -79,13 +82,13 @@ def jointly(
     answer(found.document, output.as_json, lambda: show(found.document, title, claim))
 
 
-def show(run: dict[str, Any], title: str, claim: Hypothesis | Joint) -> None:
-    """Parameters, and how well they were sampled, on the terminal."""
-    both = zip(claim.natural_parameters, run["posterior"].items(), strict=True)
-    rows = [
-        [name, f"{v['mean']:.5g}", f"{v['sd']:.2g}", f"{v['hdi_94'][0]:.5g} to {v['hdi_94'][1]:.5g}", p.unit]
-        for p, (name, v) in both
-    ]
+def show(run: dict[str, Any], title: str, claim: Hypothesis | Joint, shown: Units = MappingProxyType({})) -> None:
+    """Parameters in the units in which they are ``shown``, and how well they were sampled, on the terminal."""
+    rows = []
+    for p, (name, v) in zip(claim.natural_parameters, run["posterior"].items(), strict=True):
+        factor, unit = shown.get(p.unit, (1.0, p.unit))
+        mean, sd, low, high = (factor * x for x in (v["mean"], v["sd"], *v["hdi_94"]))
+        rows.append([name, f"{mean:.5g}", f"{sd:.2g}", f"{low:.5g} to {high:.5g}", unit])
     table(title, ["parameter", "mean", "sd", "94 % interval", "unit"], rows)
     say(f"ESS {run['ess_bulk']:.0f}, R-hat {run['r_hat']:.3f}, {run['evaluations']} curves, {run['seconds']:.1f} s.")
     if (found := run.get("importance")) is not None:

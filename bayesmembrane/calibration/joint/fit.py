@@ -18,6 +18,7 @@ from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.mechanics import api
 
 BEST = 2  # optima that are looked at with all readings
+FLAT = 1e-3  # cosine between the residuals and a coordinate, below which a search has ended at a minimum
 NEAR = 1e-6  # of the width of the bounds: an estimate this close is at the bound
 
 
@@ -56,6 +57,7 @@ class JointFit(Showable):
     names, values, sds : natural parameters of the thinnest film, effects of the tests; nan where nothing sets a scale
     parts : the tests
     objective : root of the sum of squares in units of the noises
+    status : "converged", or "evaluation limit" where the residual still has a slope
     margins : by how much each convexity mode is met in the test that meets it least
     at_bound : coordinates that stopped at a bound
     """
@@ -68,8 +70,15 @@ class JointFit(Showable):
     sds: Array
     parts: tuple[FittedPart, ...]
     objective: float
+    status: str
     margins: dict[str, float]
     at_bound: tuple[str, ...]
+
+    @property
+    def misfit(self) -> Array:
+        """F - y of all tests, one after the other, N."""
+        parts = zip(self.parts, self.joint.parts, strict=True)
+        return np.concatenate([found.force - part.measurement.force for found, part in parts])
 
     @property
     def convex(self) -> bool:
@@ -92,6 +101,9 @@ class JointFit(Showable):
             "parameters": {n: {"value": v, "sd": s} for n, (v, s) in self.parameters.items()},
             "thickness_um": 1e6 * self.joint.thickness,
             "objective": self.objective,
+            "rmse_N": float(np.sqrt(np.mean(self.misfit**2))),
+            "loss_N": float(np.linalg.norm(self.misfit)),
+            "status": self.status,
             "convex": self.convex,
             "margins": {k: v if np.isfinite(v) else None for k, v in self.margins.items()},
             "at_bound": list(self.at_bound),
@@ -156,9 +168,16 @@ def _result(objective: JointObjective, x: Array, noises: Array) -> JointFit:
         sds=sds,
         parts=tuple(parts),
         objective=float(np.linalg.norm(r)),
+        status="converged" if _slope(r, jacobian[:, ~bound]) < FLAT else "evaluation limit",
         margins={name: min(found) for name, found in margins.items()},
         at_bound=tuple(joint.parameters[i].name for i, b in zip(joint.curve, bound, strict=True) if b),
     )
+
+
+def _slope(r: Array, jacobian: Array) -> float:
+    """Largest cosine between the residuals (N,) and what a coordinate changes of them (N, k); 0 at a minimum."""
+    sizes = np.linalg.norm(jacobian, axis=0) * np.linalg.norm(r)
+    return float(np.max(np.abs(jacobian.T @ r) / np.maximum(sizes, 1e-150), initial=0.0))
 
 
 def _part(objective: JointObjective, number: int, force: Array, noise: float, own: Array) -> FittedPart:

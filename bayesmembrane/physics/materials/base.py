@@ -121,7 +121,7 @@ class Material(ABC):
 
     @classmethod
     def from_vector(cls, p: ArrayLike) -> Self:
-        """The film with parameter vector ``p`` of shape (n_fields,); raises `SettingsError` if the length is wrong."""
+        """The film with parameter vector ``p`` of shape (n_fields,); raises `SettingsError` if there is none."""
         values = np.asarray(p, dtype=float).ravel()
         names = cls.field_names()
         if values.size != len(names):
@@ -131,6 +131,12 @@ class Material(ABC):
             )
         if not np.all(np.isfinite(values)):
             raise SettingsError(f"the parameters of {cls.name} must be finite numbers, and {values.tolist()} are not")
+        if not cls.extensibility(values) > 0:
+            raise SettingsError(
+                f"{cls.name} with the parameters {values.tolist()} has no film: its I1 - 3 would have to stay below "
+                f"{float(cls.extensibility(values)):g}",
+                remedy="give a positive limit",
+            )
         return cls(*(float(v) for v in values))
 
     @classmethod

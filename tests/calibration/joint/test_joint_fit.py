@@ -32,6 +32,10 @@ def test_one_test_with_a_stated_noise_is_its_weighted_fit() -> None:
     claim = hypothesis("mooney_rivlin")
     one, alone = fit_jointly(joint([m], claim)), fit(m, claim, loss="weighted")
     assert one.objective == pytest.approx(alone.objective, rel=1e-6)
+    assert {n: one.summary()[n] for n in ("rmse_N", "loss_N")} == pytest.approx(
+        {"rmse_N": alone.rmse_N, "loss_N": alone.loss_N}, rel=1e-6
+    )
+    assert one.summary()["status"] == "converged"
     for name, (value, sd) in one.parameters.items():
         other = alone.parameters[f"mooney_rivlin.{name}"]
         assert value == pytest.approx(other.value, rel=1e-3)
