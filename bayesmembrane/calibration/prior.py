@@ -81,17 +81,17 @@ class JointPrior:
     def inside(self, states: States, mode: ConvexityMode | None = None) -> NDArray[np.bool_]:
         """(B,) True where the convexity prior holds, or another mode."""
         mode = mode or self.hypothesis.convexity
-        return mode.holds(mode.margin(states, self.hypothesis.material))
+        return mode.met(states, self.hypothesis.material)
 
     def surely_inside(self, x: Array) -> NDArray[np.bool_]:
         """(B,) True where x (B, k) are convex in whatever state, and the prior asks for nothing else."""
         if not self.hypothesis.convexity.looks_beyond:
             return np.zeros(len(x), dtype=bool)
-        return self._convex_everywhere(self.hypothesis.films(x))
+        return self.convex_everywhere(x)
 
-    def _convex_everywhere(self, films: Array) -> NDArray[np.bool_]:
-        """(B,) True where ``films`` (B, n) are known to be convex in every state."""
-        return np.asarray(self.hypothesis.material.convex_everywhere(films.T), dtype=bool)
+    def convex_everywhere(self, x: Array) -> NDArray[np.bool_]:
+        """(B,) True where the films of x (B, k) are known to be convex in every state."""
+        return np.asarray(self.hypothesis.material.convex_everywhere(self.hypothesis.films(x).T), dtype=bool)
 
     def scrambled(self, seed: int) -> list[Scrambled]:
         """`SCRAMBLES` independent sequences of points that fill p0 evenly; others for another hypothesis."""
@@ -138,7 +138,7 @@ class JointPrior:
     def _inside_each(self, forward: Forward, x: Array) -> dict[str, NDArray[np.bool_]]:
         """{mode: (B,) whether it holds} of x (B, k); only films that may miss one are followed."""
         films = self.hypothesis.films(x)
-        sure, unknown = self._convex_everywhere(films), np.full(len(x), np.nan)
+        sure, unknown = self.convex_everywhere(x), np.full(len(x), np.nan)
         found = {
             n: self.inside(Margins(films, unknown, unknown, unknown[:, None], unknown[:, None]), mode)
             for n, mode in MODES.items()

@@ -21,6 +21,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.physics.convexity import FREE, MODES, ConvexityMode
+from bayesmembrane.physics.forward import Prediction
 
 WITHIN = "within the range fitted"
 ROUNDS, EACH, LAST = 3, 600, 2000
@@ -118,15 +119,31 @@ class _Target:
     def solved(self, x: Array) -> tuple[Array, Mapping[str, NDArray[np.bool_]]]:
         """ln p (B,) of no convexity at x (B, m), and which modes they meet."""
         whole = x if self.shape is None else self.shape.whole(x)
-        prediction = self.free.forward(whole)
-        ok, lp = prediction.ok, np.full(len(x), -np.inf)
+        sure = self.free.prior.convex_everywhere(whole)
+        force, ok = np.empty((len(x), self.free.readings)), np.empty(len(x), dtype=bool)
+        inside = {n: sure.copy() for n in (*MODES, *([] if self.within is None else [WITHIN]))}
+        for some, beyond in ((sure, False), (~sure, True)):
+            if np.any(some):
+                found = self.free.forward(whole[some], reached=beyond)
+                force[some], ok[some] = found.force, found.ok
+            if beyond and np.any(some):
+                for n, met in self._met(whole[some], found).items():
+                    inside[n][some] = met
+        lp = np.full(len(x), -np.inf)
         if np.any(ok):
             with np.errstate(over="ignore", invalid="ignore"):
-                lp[ok] = self._density(whole[ok], x[ok], prediction.force[ok])
-        inside = {n: self.free.prior.inside(prediction, m) for n, m in MODES.items()}
-        if self.within is not None:
-            inside[WITHIN] = self.free.prior.inside(self.free.forward(whole, reached=False), self.within)
+                lp[ok] = self._density(whole[ok], x[ok], force[ok])
         return np.where(np.isnan(lp), -np.inf, lp), inside
+
+    def _met(self, whole: Array, prediction: Prediction) -> dict[str, NDArray[np.bool_]]:
+        """Which modes films meet; one that does up to the end of the whole range does within that fitted, too."""
+        met = {n: self.free.prior.inside(prediction, m) for n, m in MODES.items()}
+        if self.within is not None:
+            met[WITHIN] = met[self.within.name].copy()
+            if np.any(rest := ~met[WITHIN]):
+                near = self.free.forward(whole[rest], reached=False)
+                met[WITHIN][rest] = self.free.prior.inside(near, self.within)
+        return met
 
     def _density(self, whole: Array, x: Array, force: Array) -> Array:
         if self.shape is not None:

@@ -159,7 +159,7 @@ def _masses(hypothesis: Hypothesis, measurement: Measurement, widest: float, see
     x = np.stack([p.draw(rng, SURVEYED) for p in wide], axis=1)
     mode = hypothesis.convexity
     prediction = Forward(hypothesis, measurement, measurement.deflection, solve)(x, spare=mode.spare)
-    inside = mode.holds(mode.margin(prediction, hypothesis.material))
+    inside = mode.met(prediction, hypothesis.material)
     base = np.stack([p.log_density(x[:, j]) for j, p in enumerate(priors)], axis=1)
     source = sum(p.log_density(x[:, j]) for j, p in enumerate(wide))
 
