@@ -93,6 +93,14 @@ class JointPrior:
         """(B,) True where the films of x (B, k) are known to be convex in every state."""
         return np.asarray(self.hypothesis.material.convex_everywhere(self.hypothesis.films(x).T), dtype=bool)
 
+    def met(self, x: Array, forward: Forward, reached: bool = True) -> NDArray[np.bool_]:
+        """(B,) whether x (B, k) meet the convexity prior; ``forward`` solves only films that may not."""
+        found = self.convex_everywhere(x)
+        if not np.all(found):
+            rest = ~found
+            found[rest] = self.inside(forward(x[rest], reached=reached, spare=self.hypothesis.convexity.spare))
+        return found
+
     def scrambled(self, seed: int) -> list[Scrambled]:
         """`SCRAMBLES` independent sequences of points that fill p0 evenly; others for another hypothesis."""
         h = self.hypothesis
