@@ -136,14 +136,14 @@ class JointPrior:
         rows = max(1, AT_ONCE // min(len(measurement), MOST))
         inside = {n: np.empty(len(x), bool) for n in MODES}
         for part in [slice(i, i + rows) for i in range(0, len(x), rows)]:
-            found = self._inside_each(forward, x[part])  # of some curves at every reading: not for all films at once
+            found = self.inside_each(forward, x[part])  # of some curves at every reading: not for all films at once
             for n in MODES:
                 inside[n][part] = found[n]
         masses = {n: _mass(np.sum(i.reshape(SCRAMBLES, each), axis=1), each) for n, i in inside.items()}
         order = np.random.default_rng([seed, 2]).permutation(len(x))
         return masses, x[order][inside[self.hypothesis.convexity.name][order]]
 
-    def _inside_each(self, forward: Forward, x: Array) -> dict[str, NDArray[np.bool_]]:
+    def inside_each(self, forward: Forward, x: Array) -> dict[str, NDArray[np.bool_]]:
         """{mode: (B,) whether it holds} of x (B, k); only films that may miss one are followed."""
         films = self.hypothesis.films(x)
         sure, unknown = self.convex_everywhere(x), np.full(len(x), np.nan)

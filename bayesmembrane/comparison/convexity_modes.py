@@ -21,7 +21,6 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.physics.convexity import FREE, MODES, ConvexityMode
-from bayesmembrane.physics.forward import Prediction
 
 WITHIN = "within the range fitted"
 ROUNDS, EACH, LAST = 3, 600, 2000
@@ -117,33 +116,19 @@ class _Target:
         return x if self.shape is None else self.shape.part(x)
 
     def solved(self, x: Array) -> tuple[Array, Mapping[str, NDArray[np.bool_]]]:
-        """ln p (B,) of no convexity at x (B, m), and which modes they meet."""
+        """ln p (B,) of no convexity at x (B, m), and which modes they meet; no film without a curve meets one."""
         whole = x if self.shape is None else self.shape.whole(x)
-        sure = self.free.prior.convex_everywhere(whole)
-        force, ok = np.empty((len(x), self.free.readings)), np.empty(len(x), dtype=bool)
-        inside = {n: sure.copy() for n in (*MODES, *([] if self.within is None else [WITHIN]))}
-        for some, beyond in ((sure, False), (~sure, True)):
-            if np.any(some):
-                found = self.free.forward(whole[some], reached=beyond)
-                force[some], ok[some] = found.force, found.ok
-            if beyond and np.any(some):
-                for n, met in self._met(whole[some], found).items():
-                    inside[n][some] = met
-        lp = np.full(len(x), -np.inf)
+        near = self.free.forward(whole, reached=False)
+        ok, lp = near.ok, np.full(len(x), -np.inf)
+        inside = {n: np.zeros(len(x), dtype=bool) for n in MODES}
         if np.any(ok):
             with np.errstate(over="ignore", invalid="ignore"):
-                lp[ok] = self._density(whole[ok], x[ok], force[ok])
-        return np.where(np.isnan(lp), -np.inf, lp), inside
-
-    def _met(self, whole: Array, prediction: Prediction) -> dict[str, NDArray[np.bool_]]:
-        """Which modes films meet; one that does up to the end of the whole range does within that fitted, too."""
-        met = {n: self.free.prior.inside(prediction, m) for n, m in MODES.items()}
+                lp[ok] = self._density(whole[ok], x[ok], near.force[ok])
+            for n, met in self.free.prior.inside_each(self.free.forward, whole[ok]).items():
+                inside[n][ok] = met
         if self.within is not None:
-            met[WITHIN] = met[self.within.name].copy()
-            if np.any(rest := ~met[WITHIN]):
-                near = self.free.forward(whole[rest], reached=False)
-                met[WITHIN][rest] = self.free.prior.inside(near, self.within)
-        return met
+            inside[WITHIN] = ok & self.free.prior.inside(near, self.within)
+        return np.where(np.isnan(lp), -np.inf, lp), inside
 
     def _density(self, whole: Array, x: Array, force: Array) -> Array:
         if self.shape is not None:
