@@ -196,7 +196,7 @@ def predict_draws(
         rest_residual=band(unused.force - rest_force),
         curves_at=band(here.force + carried.at_points()),
         film=films[chosen],
-        convex={m.name: float(np.mean(m.holds(m.margin(here, hypothesis.material)))) for m in RESTRICTING},
+        convex={m.name: float(np.mean(m.met(here, hypothesis.material))) for m in RESTRICTING},
         shape_at=shape_at,
         state_1=states[2],
         state_2=states[3],

@@ -81,17 +81,25 @@ class JointPrior:
     def inside(self, states: States, mode: ConvexityMode | None = None) -> NDArray[np.bool_]:
         """(B,) True where the convexity prior holds, or another mode."""
         mode = mode or self.hypothesis.convexity
-        return mode.holds(mode.margin(states, self.hypothesis.material))
+        return mode.met(states, self.hypothesis.material)
 
     def surely_inside(self, x: Array) -> NDArray[np.bool_]:
         """(B,) True where x (B, k) are convex in whatever state, and the prior asks for nothing else."""
         if not self.hypothesis.convexity.looks_beyond:
             return np.zeros(len(x), dtype=bool)
-        return self._convex_everywhere(self.hypothesis.films(x))
+        return self.convex_everywhere(x)
 
-    def _convex_everywhere(self, films: Array) -> NDArray[np.bool_]:
-        """(B,) True where ``films`` (B, n) are known to be convex in every state."""
-        return np.asarray(self.hypothesis.material.convex_everywhere(films.T), dtype=bool)
+    def convex_everywhere(self, x: Array) -> NDArray[np.bool_]:
+        """(B,) True where the films of x (B, k) are known to be convex in every state."""
+        return np.asarray(self.hypothesis.material.convex_everywhere(self.hypothesis.films(x).T), dtype=bool)
+
+    def met(self, x: Array, forward: Forward, reached: bool = True) -> NDArray[np.bool_]:
+        """(B,) whether x (B, k) meet the convexity prior; ``forward`` solves only films that may not."""
+        found = self.convex_everywhere(x)
+        if not np.all(found):
+            rest = ~found
+            found[rest] = self.inside(forward(x[rest], reached=reached, spare=self.hypothesis.convexity.spare))
+        return found
 
     def scrambled(self, seed: int) -> list[Scrambled]:
         """`SCRAMBLES` independent sequences of points that fill p0 evenly; others for another hypothesis."""
@@ -128,17 +136,17 @@ class JointPrior:
         rows = max(1, AT_ONCE // min(len(measurement), MOST))
         inside = {n: np.empty(len(x), bool) for n in MODES}
         for part in [slice(i, i + rows) for i in range(0, len(x), rows)]:
-            found = self._inside_each(forward, x[part])  # of some curves at every reading: not for all films at once
+            found = self.inside_each(forward, x[part])  # of some curves at every reading: not for all films at once
             for n in MODES:
                 inside[n][part] = found[n]
         masses = {n: _mass(np.sum(i.reshape(SCRAMBLES, each), axis=1), each) for n, i in inside.items()}
         order = np.random.default_rng([seed, 2]).permutation(len(x))
         return masses, x[order][inside[self.hypothesis.convexity.name][order]]
 
-    def _inside_each(self, forward: Forward, x: Array) -> dict[str, NDArray[np.bool_]]:
+    def inside_each(self, forward: Forward, x: Array) -> dict[str, NDArray[np.bool_]]:
         """{mode: (B,) whether it holds} of x (B, k); only films that may miss one are followed."""
         films = self.hypothesis.films(x)
-        sure, unknown = self._convex_everywhere(films), np.full(len(x), np.nan)
+        sure, unknown = self.convex_everywhere(x), np.full(len(x), np.nan)
         found = {
             n: self.inside(Margins(films, unknown, unknown, unknown[:, None], unknown[:, None]), mode)
             for n, mode in MODES.items()

@@ -116,16 +116,18 @@ class _Target:
         return x if self.shape is None else self.shape.part(x)
 
     def solved(self, x: Array) -> tuple[Array, Mapping[str, NDArray[np.bool_]]]:
-        """ln p (B,) of no convexity at x (B, m), and which modes they meet."""
+        """ln p (B,) of no convexity at x (B, m), and which modes they meet; no film without a curve meets one."""
         whole = x if self.shape is None else self.shape.whole(x)
-        prediction = self.free.forward(whole)
-        ok, lp = prediction.ok, np.full(len(x), -np.inf)
+        near = self.free.forward(whole, reached=False)
+        ok, lp = near.ok, np.full(len(x), -np.inf)
+        inside = {n: np.zeros(len(x), dtype=bool) for n in MODES}
         if np.any(ok):
             with np.errstate(over="ignore", invalid="ignore"):
-                lp[ok] = self._density(whole[ok], x[ok], prediction.force[ok])
-        inside = {n: self.free.prior.inside(prediction, m) for n, m in MODES.items()}
+                lp[ok] = self._density(whole[ok], x[ok], near.force[ok])
+            for n, met in self.free.prior.inside_each(self.free.forward, whole[ok]).items():
+                inside[n][ok] = met
         if self.within is not None:
-            inside[WITHIN] = self.free.prior.inside(self.free.forward(whole, reached=False), self.within)
+            inside[WITHIN] = ok & self.free.prior.inside(near, self.within)
         return np.where(np.isnan(lp), -np.inf, lp), inside
 
     def _density(self, whole: Array, x: Array, force: Array) -> Array:

@@ -241,5 +241,4 @@ def _modes(posterior: Posterior, run: Run, found: EvidenceEstimate, mass: Mass, 
 
 def _within(posterior: Posterior, x: Array) -> NDArray[np.bool_]:
     """(B,) whether films meet their own convexity mode up to the last point fitted."""
-    spare = posterior.hypothesis.convexity.spare
-    return posterior.prior.inside(posterior.forward(x, reached=False, spare=spare))
+    return posterior.prior.met(x, posterior.forward, reached=False)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.prior import JointPrior
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array, Prior, Uniform
@@ -157,9 +158,7 @@ def _masses(hypothesis: Hypothesis, measurement: Measurement, widest: float, see
     wide = [scaled(p, widest) or p for p in priors]
     rng = np.random.default_rng([seed, 3])
     x = np.stack([p.draw(rng, SURVEYED) for p in wide], axis=1)
-    mode = hypothesis.convexity
-    prediction = Forward(hypothesis, measurement, measurement.deflection, solve)(x, spare=mode.spare)
-    inside = mode.holds(mode.margin(prediction, hypothesis.material))
+    inside = JointPrior(hypothesis).met(x, Forward(hypothesis, measurement, measurement.deflection, solve))
     base = np.stack([p.log_density(x[:, j]) for j, p in enumerate(priors)], axis=1)
     source = sum(p.log_density(x[:, j]) for j, p in enumerate(wide))
 

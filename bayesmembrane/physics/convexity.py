@@ -68,6 +68,10 @@ class ConvexityMode(ABC):
         """True where a margin satisfies the mode, of any shape."""
         return np.asarray(np.asarray(margin) >= 0)
 
+    def met(self, states: States, material: type[Material]) -> NDArray[np.bool_]:
+        """(B,) whether the mode `holds`."""
+        return self.holds(self.margin(states, material))
+
     def __str__(self) -> str:
         return self.name
 
@@ -97,6 +101,13 @@ class Box(ConvexityMode):
 
     name = "box"
     words = "on the box of stretches"
+
+    def met(self, states: States, material: type[Material]) -> NDArray[np.bool_]:
+        """(B,) whether the mode `holds`; the box of an energy that is convex everywhere is not searched."""
+        found = np.array(material.convex_everywhere(states.films.T), dtype=bool)
+        margin = box_margins(material, states.films[~found], self.low, self.high, sign_only=True)
+        found[~found] = np.isnan(margin) | self.holds(margin)
+        return found
 
     def _margin(self, states: States, material: type[Material]) -> Array:
         return box_margins(material, states.films, self.low, self.high)

@@ -10,14 +10,18 @@ import pytest
 
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.sampling.proposals.mixture import fit_mixture
+from bayesmembrane.calibration.sampling.weights import worth
+from bayesmembrane.comparison.evidence import closer
 from bayesmembrane.comparison.evidence.bridge import bridge
+from bayesmembrane.comparison.evidence.closer import GOOD, Closer
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED, Disagreement, together
 from bayesmembrane.comparison.evidence.nested import nested
 from bayesmembrane.comparison.evidence.population import lead
+from bayesmembrane.comparison.evidence.search import search
 from bayesmembrane.comparison.evidence.target import EvidenceEstimate, Problem
 from bayesmembrane.comparison.parts import drop_pieces, kept
 from bayesmembrane.ground.errors import SettingsError
-from tests.statistics.evidence_targets import Banana, Box, Cut, Linear, Modes, NormalGamma
+from tests.statistics.evidence_targets import Banana, Box, Cut, Linear, Modes, NormalGamma, Shells
 
 LOOSE = 0.25  # of nested sampling, where a test is about something else
 
@@ -236,6 +240,18 @@ def test_a_mixture_integrates_to_one_and_draws_what_it_says():
     assert np.mean(drawn[:, 0] > 0) == pytest.approx(0.4, abs=0.03)
     grid = np.exp(g.log_density(y))
     assert np.mean(drawn[:, 1] > 1) == pytest.approx(np.sum(grid[y[:, 1] > 1]) / np.sum(grid), abs=0.02)
+
+
+def test_a_density_whose_draws_are_worth_little_is_filled(monkeypatch):
+    worths, modes = [], search(Problem(Shells(3)), np.random.default_rng(110))
+    for good in (0.0, GOOD):
+        monkeypatch.setattr(closer, "GOOD", good)
+        near = Closer(Problem(Shells(3)), [np.concatenate(modes.clouds)], modes, np.random.default_rng(111))
+        x = near.q.draw(np.random.default_rng(112), 4000)
+        worths.append(worth(near.problem.log_posterior(x) - near.q.log_density(x)))
+    assert worths[0].efficiency < GOOD
+    assert worths[1].efficiency > 2 * worths[0].efficiency
+    assert abs(worths[1].log_mean - Shells(3).exact) < 4 * worths[1].log_mean_sd
 
 
 def test_a_population_is_led_to_the_wanted_distribution():

@@ -145,12 +145,14 @@ def run_ensembles(
     fresh = chains is None
     chains = started(posterior, settings, seed) if chains is None else chains
     walk = _Walk(posterior, beside, chains)
+    judged: tuple[object, Convergence] | None = None
     target, status = chains.look or max(settings.chunk, chains.steps), "interrupted"
     with deferred(beside.stop) as asked, suppress(KeyboardInterrupt):
         if fresh:  # from here on whoever sees that something is kept may stop the walk
             beside.keep(chains)
         while walk.on_to(target, asked):
             found = convergence(walk.chains)
+            judged = (walk.chains.steps, walk.chains.lessons), found
             if progress is not None:
                 progress(_progress(walk.chains, found, settings))
             if found.enough(settings.ess) and _good(walk.chains):
@@ -168,7 +170,8 @@ def run_ensembles(
         if asked.signalled:  # a signal that came at the very end still ends what follows
             status = "interrupted"
     walk.save()
-    return Sampled(walk.chains, convergence(walk.chains), status)
+    same = judged is not None and judged[0] == (walk.chains.steps, walk.chains.lessons)
+    return Sampled(walk.chains, judged[1] if judged and same else convergence(walk.chains), status)
 
 
 def _good(chains: Chains) -> bool:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 from scipy.special import stdtrit
 
+from bayesmembrane.calibration.sampling.proposals.filling import filled
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
+from bayesmembrane.calibration.sampling.weights import worth
 from bayesmembrane.comparison.evidence.search import Modes, joined
 from bayesmembrane.comparison.evidence.target import Problem
 from bayesmembrane.ground.parameters import Array
@@ -15,6 +18,7 @@ from bayesmembrane.ground.parameters import Array
 MOST = 4000  # points that a mixture is fitted to
 WIDER, DEGREES = 1.25, 4.0  # how much broader than the posterior the density is, and with which tails
 BESIDES = 0.2  # of the weight of what comes before, for each further group of points
+LOOKED_AT, GOOD = 256, 0.6  # draws by which the density is judged, and effective ones for each with which it is left
 
 
 class Closer(Problem):
@@ -22,8 +26,9 @@ class Closer(Problem):
 
     q holds a mixture of t-distributions for each group (n, k) of ``points``: of the posterior, as well as that is
     known, of places that must not be overlooked, and of the ``modes`` that a search has found, with half of the weight,
-    if there are any. Any q gives the same Z: what it looks like has a part only in how long a run takes, and one that
-    leaves out a mode makes it unlikely to be found.
+    if there are any. Where its draws are not worth enough it is `filled`, for where L p0 / q is large live points climb
+    long. Any q gives the same Z: what it looks like has a part only in how long a run takes, and one that leaves out a
+    mode makes it unlikely to be found.
     """
 
     def __init__(self, problem: Problem, points: Sequence[Array], modes: Modes, rng: np.random.Generator) -> None:
@@ -33,6 +38,10 @@ class Closer(Problem):
         share = np.concatenate([given / np.sum(given), modes.weights])
         g = joined(fitted, share)
         self.q = Mixture(g.log_weights, g.means, WIDER * g.roots, DEGREES)
+        x = self.q.draw(rng, LOOKED_AT)
+        if worth(problem.log_posterior(x) - self.q.log_density(x)).efficiency < GOOD:
+            with suppress(np.linalg.LinAlgError):  # it is large where nothing has a volume
+                self.q = filled(self.q, problem.log_posterior, rng).mixture
 
     def from_cube(self, u: Array) -> tuple[Array, Array]:
         x = from_cube(self.q, u)

@@ -82,7 +82,7 @@ def nested(
     problem, own = Problem(target), np.random.default_rng([seed, 8])
     rngs = np.random.default_rng([seed, 5]).spawn(MOST_RUNS)
     modes = search(problem, np.random.default_rng([seed, 9]))
-    searched, took = problem.evaluations, problem.seconds
+    besides, took = problem.evaluations, problem.seconds
     climbs = _Climbs(problem, rngs, keep)
     found: list[ARun] = []
     if around is None:
@@ -91,7 +91,9 @@ def nested(
         around = [np.concatenate([r.drawn(own) for r in pilots])]
         # What has missed a mode on its way up says nothing of Z, and its part in q does no harm.
         found = [r for r in pilots if not modes.beyond(r.log_evidence, r.sd)]
+    before, began = problem.evaluations, problem.seconds
     near = Closer(problem, around, modes, own)
+    besides, took = besides + problem.evaluations - before, took + problem.seconds - began
     live = max(LEAST_LIVE, PER_DIMENSION * problem.size)
     for number in range(PILOTS, MOST_RUNS):
         if number > PILOTS:  # the first tells what it takes
@@ -105,7 +107,7 @@ def nested(
     # Weighed draws of the modes are an estimate of their own that is never too high: a gross difference is an error.
     sd = max(sd, 0.5 * modes.beyond(value, sd))
     parts = tuple(r.log_evidence for r in found)
-    evaluations = searched + sum(r.evaluations for r in climbs.made)
+    evaluations = besides + sum(r.evaluations for r in climbs.made)
     seconds = took + sum(r.seconds for r in climbs.made)
     return EvidenceEstimate(value, sd, evaluations, seconds, parts, modes.coverage)
 

@@ -20,7 +20,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.form_error import ENERGY, LAW, LOCAL, traces
-from bayesmembrane.physics.forward import Forward, Solve
+from bayesmembrane.physics.forward import AT_ONCE, Forward, Solve
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.noise.base import force_scale
 
@@ -160,12 +160,14 @@ def leave_range_out(posterior: Posterior, draws: Array, whole: Measurement, solv
     log_p = np.full((len(draws), held.size), -np.inf)
     mean, variance = np.full((len(draws), held.size), np.nan), np.full((len(draws), held.size), np.nan)
     good = np.flatnonzero(np.all(np.isfinite(force), axis=1))
-    for b in good:
-        own = model.at(force[b : b + 1], None if shown is None else shown[b : b + 1])
-        residual, covariance = whole.force - force[b], own.covariance(noise[b])
-        shift, conditional = _conditional(covariance, residual, fitted)
-        mean[b], variance[b] = force[b, held] + shift, np.diag(conditional)
-        log_p[b] = _sequential(conditional, residual[held] - shift)
+    rows = max(1, AT_ONCE // len(whole) ** 2)
+    for some in (good[i : i + rows] for i in range(0, good.size, rows)):
+        own = [model.at(force[[b]], None if shown is None else shown[[b]]).covariance(noise[b]) for b in some]
+        residual = whole.force - force[some]
+        shift, conditional = _conditional(np.stack(own), residual, fitted)
+        mean[some] = force[np.ix_(some, held)] + shift
+        variance[some] = np.diagonal(conditional, axis1=1, axis2=2)
+        log_p[some] = _sequential(conditional, residual[:, held] - shift)
     return _summary(whole, held, good, log_p, mean, variance)
 
 
@@ -196,18 +198,18 @@ def _summary(
 
 
 def _conditional(covariance: Array, residual: Array, fitted: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """(S_hf S_ff^-1 r_f, S_hh - S_hf S_ff^-1 S_fh)."""
-    ff, hf = covariance[np.ix_(fitted, fitted)], covariance[np.ix_(~fitted, fitted)]
-    gain = np.linalg.solve(ff, hf.T).T
-    rest = covariance[np.ix_(~fitted, ~fitted)] - gain @ hf.T
-    return gain @ residual[fitted], 0.5 * (rest + rest.T)
+    """(S_hf S_ff^-1 r_f, S_hh - S_hf S_ff^-1 S_fh) of S (B, N, N) and r (B, N)."""
+    ff, fh = covariance[:, fitted][:, :, fitted], covariance[:, fitted][:, :, ~fitted]
+    gain = np.swapaxes(np.linalg.solve(ff, fh), 1, 2)
+    rest = covariance[:, ~fitted][:, :, ~fitted] - gain @ fh
+    return (gain @ residual[:, fitted, None])[..., 0], 0.5 * (rest + np.swapaxes(rest, 1, 2))
 
 
 def _sequential(covariance: Array, residual: Array) -> Array:
-    """(M,) ln N of each residual given those before it: -z^2/2 - ln L_jj - ln(2 pi)/2, S = L L^T and z = L^-1 r."""
+    """(B, M) ln N of each residual given those before it: -z^2/2 - ln L_jj - ln(2 pi)/2, S = L L^T and z = L^-1 r."""
     root = np.linalg.cholesky(covariance)
-    z = np.linalg.solve(root, residual)
-    return np.asarray(-0.5 * z * z - np.log(np.diag(root)) - 0.5 * np.log(2 * np.pi))
+    z = np.linalg.solve(root, residual[..., None])[..., 0]
+    return np.asarray(-0.5 * z * z - np.log(np.diagonal(root, axis1=1, axis2=2)) - 0.5 * np.log(2 * np.pi))
 
 
 def _carried(posterior: Posterior, draws: Array, whole: Measurement) -> Array:

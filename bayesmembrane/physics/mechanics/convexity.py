@@ -79,12 +79,15 @@ def box_ellipticity(material: Material, low: float, high: float) -> EllipticityA
     return EllipticityAnswer(margin > ROUND_OFF, margin, worst)
 
 
-def box_margins(material: type[Material], parameters: ArrayLike, low: float, high: float) -> Array:
+def box_margins(
+    material: type[Material], parameters: ArrayLike, low: float, high: float, *, sign_only: bool = False
+) -> Array:
     """Convexity margins (B,) on [low, high]^2 of B films with ``parameters`` (B, n_fields), compiled.
 
     The sign is that of `box_convexity`. The value is too for a film that is nearly not convex; for the others it is
     that of a coarse grid, an upper bound that is only refined while a refinement could change the sign. It is nan for
-    a film that does not exist anywhere on the box, or whose energy overflows all over it.
+    a film that does not exist anywhere on the box, or whose energy overflows all over it. With ``sign_only`` any
+    negative value of a film does that is found.
 
     Raises `SettingsError` unless 0 < low < high, or if the shape of ``parameters`` is wrong.
     """
@@ -96,7 +99,7 @@ def box_margins(material: type[Material], parameters: ArrayLike, low: float, hig
         )
     limit = np.ascontiguousarray(np.broadcast_to(np.asarray(material.extensibility(p.T), dtype=float), p.shape[:1]))
     margins = np.empty(len(p))
-    bind(KERNELS, material).margins_of(p, limit, float(low), float(high), margins)
+    bind(KERNELS, material).margins_of(p, limit, float(low), float(high), sign_only, margins)
     return np.asarray(margins / _modulus(material, p.T))
 
 

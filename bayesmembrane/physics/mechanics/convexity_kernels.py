@@ -108,8 +108,11 @@ def zoomed(p: Any, l1: Any, l2: Any, step: Any, low: Any, high: Any) -> Any:
     return best
 
 
-def margin_of(p: Any, low: Any, high: Any, stretch: Any, grid: Any) -> Any:
-    """Least eigenvalue (N/m) of one film on [low, high]^2, see `convexity.box_margins`."""
+def margin_of(p: Any, low: Any, high: Any, sign_only: Any, stretch: Any, grid: Any) -> Any:
+    """Least eigenvalue (N/m) of one film on [low, high]^2, see `convexity.box_margins`.
+
+    The grid is gone through from the largest stretches, where most energies fail that do.
+    """
     n = grid.shape[0]
     ratio = np.exp(np.log(high / low) / (n - 1))
     stretch[0] = low
@@ -117,11 +120,13 @@ def margin_of(p: Any, low: Any, high: Any, stretch: Any, grid: Any) -> Any:
         stretch[i] = ratio * stretch[i - 1]
     stretch[n - 1] = high
     best = np.inf
-    for i in range(n):
+    for i in range(n - 1, -1, -1):
         for j in range(i + 1):
             grid[i, j] = least_at(p, stretch[i], stretch[j])
         for j in range(i + 1):
             best = min(best, grid[i, j])
+        if sign_only and best < 0.0:
+            return best
     for i in range(n):
         for j in range(i + 1):
             if best < 0.0:
@@ -131,14 +136,14 @@ def margin_of(p: Any, low: Any, high: Any, stretch: Any, grid: Any) -> Any:
     return best if best < np.inf else np.nan
 
 
-def margins_of(p: Any, limit: Any, low: Any, high: Any, margins: Any) -> Any:
+def margins_of(p: Any, limit: Any, low: Any, high: Any, sign_only: Any, margins: Any) -> Any:
     """`margin_of` for every row of p (B, n_fields)."""
     stretch, grid = np.empty(NODES), np.empty((NODES, NODES))
     for k in range(p.shape[0]):
         a, b = low, high
         if limit[k] < np.inf:
             a, b = part_within(limit[k], low, high)
-        margins[k] = margin_of(p[k], a, b, stretch, grid) if a < b else np.nan
+        margins[k] = margin_of(p[k], a, b, sign_only, stretch, grid) if a < b else np.nan
 
 
 KERNELS = (k_least, part_within, least_at, might_dip, zoomed, margin_of, margins_of)

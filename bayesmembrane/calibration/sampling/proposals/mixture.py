@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from scipy.special import gammaln
 
+from bayesmembrane.calibration.sampling.proposals.maximising import maximised
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.symmetric import eigh
 
 COUNTS = (1, 2, 4, 7, 11, 16, 24)
-DEGREES = (4.0, 10.0, 50.0)
+DEGREES = (4, 10, 50)
 ROUNDS, ENOUGH = 60, 1e-4  # of expectation maximisation: a round that gains less ln density a draw is the last
 ROUGH = 1e-3  # the same of a fit that is only to be judged, by gains ten times as large
-RIDGE, PULL = 1e-6, 1e-3  # of the draws' variance; the latter for a component that holds one draw only
 SAME = 1e-14  # of a coordinate: what differs by less is the same but for round-off
 PER_COMPONENT = 6  # draws for each free number
 GAIN = 0.01  # of held-out ln density a draw, for which twice the components are worth it
@@ -66,13 +66,13 @@ class Mixture:
 def fit_mixture(x: Array, rng: np.random.Generator) -> Mixture:
     """The mixture for draws x (n, k), with as many components and degrees of freedom as held-out draws ask for.
 
-    Expectation maximisation in whitened coordinates (D. Peel, G. J. McLachlan, Stat. Comput. 10 (2000) 339); a third of
-    the draws judges, then all of them are used.
+    Expectation maximisation in whitened coordinates (`maximised`); a third of the draws judges, then all of them are
+    used.
     """
     centre, root = _whitening(x)
     z = np.asarray(np.linalg.solve(root, (x - centre).T).T, dtype=float)
     test = np.arange(len(z)) % 3 == 2
-    best: tuple[float, int, float] = (-np.inf, 1, DEGREES[1])
+    best = (-np.inf, 1, DEGREES[1])
     free = z.shape[1] * (z.shape[1] + 3) // 2
     for count in COUNTS:
         if count > 1 and count * free * PER_COMPONENT > len(z):
@@ -136,37 +136,15 @@ def _whitening(x: Array) -> tuple[Array, Array]:
     return np.mean(x, axis=0), root
 
 
-def _score(z: Array, test: NDArray[np.bool_], count: int, degrees: float, rng: np.random.Generator) -> float:
+def _score(z: Array, test: NDArray[np.bool_], count: int, degrees: int, rng: np.random.Generator) -> float:
     """Mean held-out ln density of a fit to the others."""
     return float(np.mean(_maximise(z[~test], count, degrees, rng, ROUGH).log_density(z[test])))
 
 
-def _maximise(z: Array, count: int, degrees: float, rng: np.random.Generator, enough: float = ENOUGH) -> Mixture:
+def _maximise(z: Array, count: int, degrees: int, rng: np.random.Generator, enough: float = ENOUGH) -> Mixture:
     """Expectation maximisation from k-means."""
-    k = z.shape[1]
     _, label = kmeans2(z, count, minit="++", rng=rng) if count > 1 else (z, np.zeros(len(z), dtype=int))
     share = np.full((count, len(z)), 0.1 / count)
     share[label, np.arange(len(z))] += 0.9
-    g, before = _step(z, share, np.ones_like(share), degrees), -np.inf
-    for _ in range(ROUNDS):
-        distance = g.distance(z)
-        share, total = _summed(g._log_t(distance) + g.log_weights[:, None])
-        now = float(np.mean(total))
-        if now < before + enough:
-            break
-        before = now
-        g = _step(z, share, (degrees + k) / (degrees + distance), degrees)
-    return g
-
-
-def _step(z: Array, share: Array, tail: Array, degrees: float) -> Mixture:
-    """Weights, means and scatter for responsibilities ``share`` and tail weights ``tail``, (K, n) each."""
-    k = z.shape[1]
-    size = np.maximum(np.sum(share, axis=1), 1e-12)
-    w = share * tail
-    total = np.maximum(np.sum(w, axis=1), 1e-12)
-    means = (w @ z) / total[:, None]
-    d = z.T - means[:, :, None]
-    scatter = (d * w[:, None, :]) @ d.transpose(0, 2, 1) / size[:, None, None]
-    roots = np.linalg.cholesky(scatter + (RIDGE + PULL * k / size)[:, None, None] * np.eye(k))
-    return Mixture(np.log(size / len(z)), means, roots, degrees)
+    weights, means, roots = maximised(np.ascontiguousarray(z.T), share, degrees, ROUNDS, enough)
+    return Mixture(np.log(weights), means, roots, float(degrees))
