@@ -10,8 +10,10 @@ PYTEST_WORKERS ?= 2
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
+# Else every process that a test starts compiles the text of the package anew, half a second each.
+unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install demo test lint bench study study-cycles study-loop study-reliability study-second study-third study-sequential study-fuzz study-import study-scale study-kill study-overnight study-damage study-foretold study-seeds study-sbc study-modes study-beside study-growth study-long clean
+.PHONY: help install demo test pytest lint bench study study-cycles study-loop study-reliability study-second study-third study-sequential study-fuzz study-import study-scale study-kill study-overnight study-damage study-foretold study-seeds study-sbc study-modes study-beside study-growth study-long clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -37,6 +39,7 @@ help:
 	@echo "make study-beside  other samplers and FElupe beside this package, in an environment of their own, an hour or so; goes on where it was; BESIDE='--materials gent' asks for less"
 	@echo "make study-long  an export of 200 000 rows through every verb: seconds of a processor, and memory; some minutes"
 	@echo "make study-growth  CPU seconds against readings, walkers, parameters, specimens, a quarter of an hour or so; goes on where it was; GROWTH='--only readings' asks for less"
+	@echo "make pytest   tests alone"
 	@echo "make install  the set-up alone, into $(VENV)"
 	@echo "make lint     style, types and floors alone"
 	@echo "make clean    remove caches and build products; keeps $(VENV), chains and reports"
@@ -58,7 +61,11 @@ $(STAMP): pyproject.toml constraints.txt
 demo: $(STAMP)
 	$(VENV)/bin/bayesmembrane demo
 
-test: lint
+# Style and types are one process: a core that would wait for them runs tests instead. Either failure is one.
+test: $(STAMP)
+	@$(MAKE) --no-print-directory -j 2 lint pytest
+
+pytest: $(STAMP)
 	$(PY) -m pytest -n $(PYTEST_WORKERS) --dist loadfile --no-loadscope-reorder
 
 lint: $(STAMP)

@@ -94,6 +94,14 @@ def film() -> Film:
 
 
 @pytest.fixture
+def blank_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests of what is read on a page."""
+    from tests.report.blank import blank  # what draws takes long to import
+
+    blank(monkeypatch.setattr)
+
+
+@pytest.fixture
 def short_walks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Sampling ends at a limit of 40 steps, and says so: for what becomes of draws, and not for what they are."""
     shorten(monkeypatch.setattr)

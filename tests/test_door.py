@@ -92,11 +92,15 @@ def test_everything_behind_the_door_is_imported_without_a_word(tmp_path: Path) -
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
-# Walks short enough for a test; what draws are worth is tested where they are made.
+# Walks short enough for a test, one effect at most, and no picture: what they are worth is tested where they are made.
 SHORTLY = """\
 from bayesmembrane.comparison import compare
+from bayesmembrane.diagnosis.explanation.case import Question
+from tests.report.blank import blank
 from tests.short_walks import shorten
 shorten()
+blank()
+Question.__init__.__defaults__ = (True, True)
 compare.cores = lambda: 1
 """
 

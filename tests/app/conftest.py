@@ -9,6 +9,11 @@ import pytest
 from bayesmembrane.app.cli import main
 
 
+@pytest.fixture(autouse=True)
+def _unrendered(blank_pictures: None) -> None:
+    """Pages of the command line are read here; those that other processes make have their pictures."""
+
+
 @pytest.fixture
 def run(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path

@@ -15,7 +15,6 @@ from bayesmembrane.app.folders import lying
 from bayesmembrane.ground.jobs import workers
 from bayesmembrane.ground.registry import material, ordinary_materials
 from bayesmembrane.report.page import TWIN
-from tests.report.blank import blank
 
 
 def test_the_verbs_can_be_sent_to_other_processes() -> None:
@@ -34,7 +33,6 @@ def test_the_verbs_can_be_sent_to_other_processes() -> None:
 def test_a_short_demonstration_and_its_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One material on both ranges, fitted, sampled, followed and compared; the page alone from the folder."""
     one = "neo_hookean"
-    blank(monkeypatch.setattr)
     monkeypatch.setattr(demo, "ordinary_materials", lambda: {one: material(one)})
     first = {f"{one}, {where}": partial(demo.calibrate, one, where) for where in demo.RANGES}
     monkeypatch.setattr(demo, "workers", partial(workers, count=1))  # a fresh process takes longer than its work here

@@ -6,8 +6,7 @@ import os
 import resource
 import subprocess
 import sys
-from collections.abc import Iterable
-from math import inf
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from bayesmembrane.ground.text import file_name, showable
 from tests.comparison.test_interrupted import strip
 
 ROOT = Path(__file__).resolve().parents[2]
+Run = Callable[..., tuple[int, str, str]]
 NOWHERE = "/proc/none"  # not even root can write there
 UNWRITABLE = {name: NOWHERE for name in ("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "NUMBA_CACHE_DIR")}
 
@@ -29,17 +29,21 @@ TABLE: dict[str, tuple[str, str, int, str]] = {
     "all closed": ("--json", ">&- 2>&-", 1, ""),
     "no letters": ("", "> out.txt", 0, ""),
     "no home": ("", "> out.txt", 0, ""),
-    "no folder": ("--out /dev/null/x", "> out.txt", 1, "/dev/null/x"),
-    "seed": ("--seed -1", "> out.txt", 2, "--seed"),
 }
 
 # The same for the verb sample, whose files are 1 kB to 1 MB; 40 and 600 kB are left for compiled code, too.
 SAMPLED: dict[str, tuple[str, float, int, str]] = {
-    "endless": ("--ess inf", inf, 1, "a positive, finite ESS"),
-    "no number": ("--ess nan", inf, 1, "a positive, finite ESS"),
     "no room": ("--out out", 0, 1, "cannot be written"),
     "40 kB": ("--out out", 40e3, 1, "cannot be written"),
     "600 kB": ("--out out", 600e3, 0, ""),
+}
+
+# What is refused before any surroundings matter needs no process of its own: (verb and settings, exit status, stderr).
+REFUSED: dict[str, tuple[str, int, str]] = {
+    "no folder": ("fit --out /dev/null/x", 1, "/dev/null/x"),
+    "seed": ("fit --seed -1", 2, "--seed"),
+    "endless": ("sample --ess inf", 1, "a positive, finite ESS"),
+    "no number": ("sample --ess nan", 1, "a positive, finite ESS"),
 }
 
 # Each of these goes the way of another one.
@@ -78,7 +82,7 @@ def test_surroundings_of_a_run(name: str, tmp_path: Path) -> None:
         [sys.executable, "-m", "tests.comparison.short_compare", *words],
         cwd=tmp_path,
         env={**os.environ, **{k: str(v) for k, v in places.items()}, "PYTHONPATH": str(ROOT), "COLUMNS": "200"},
-        preexec_fn=None if room == inf else lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (int(room),) * 2),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (int(room),) * 2),
         capture_output=True,
         text=True,
         timeout=300,
@@ -89,7 +93,19 @@ def test_surroundings_of_a_run(name: str, tmp_path: Path) -> None:
     assert says in done.stderr
 
 
-def test_brackets_and_bytes_in_names_are_shown_as_they_are(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("short_walks")
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_wrong_setting_is_refused(name: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    words, status, says = REFUSED[name]
+    verb, *more = words.split()
+    monkeypatch.setenv("COLUMNS", "200")
+    found, _, err = run(verb, *strip(tmp_path), "--material", "neo_hookean", *more)
+    assert found == status, err
+    assert "Traceback" not in err
+    assert says in err
+
+
+def test_brackets_and_bytes_in_names_are_shown_as_they_are(run: Run, tmp_path: Path) -> None:
     """No markup, and no text: in the folder, in the specimen's name and in the curve's."""
     folder = tmp_path / "a[bold]b[/red]"
     folder.mkdir(parents=True)
@@ -104,9 +120,8 @@ def test_brackets_and_bytes_in_names_are_shown_as_they_are(tmp_path: Path) -> No
     done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr.decode(errors="replace")
     assert "\ufffd[b].csv" in done.stdout.decode()
-    report = [sys.executable, "-m", "bayesmembrane", "report", str(folder / "out"), "--out", str(folder / "page")]
-    done = subprocess.run(report, cwd=ROOT, env=environment, capture_output=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stderr.decode(errors="replace")
+    status, _, err = run("report", folder / "out", "--out", folder / "page")
+    assert status == 0, err
     assert (folder / "page" / "index.html").exists()
     assert len(list((folder / "out").glob("film-bold-a-red*"))) == 1
 

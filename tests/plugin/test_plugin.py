@@ -76,6 +76,11 @@ def run(place: Path, *words: str) -> dict[str, Any]:
     return printed(place, "-m", "bayesmembrane", *words, "--json")
 
 
+def all_of(place: Path, *commands: list[str]) -> list[dict[str, Any]]:
+    """The JSON answers of several verbs, one after the other in one process, where walks are short."""
+    return printed(place, "-m", "tests.plugin.verbs", json.dumps(commands))
+
+
 STRIP_FILES = ("strip.csv", "--specimen", "strip.toml")
 MATERIAL = ("--material", "isihara")
 BESIDE = ("--effects", "light_disc", "--noise", "proportional")
@@ -114,12 +119,16 @@ def test_an_export_becomes_a_fitted_film(place: Path) -> None:
     assert set(force["status"]) == {"ok"}
     lines = (f"{1000 * d:g} {1000 * f:.12g}" for d, f in zip(force["deflection_mm"], force["force_N"], strict=True))
     (place / "export.txt").write_text("MICROTESTER 2\n" + "\n".join(lines) + "\n")
-    imported = run(place, "import", "export.txt", "--out", "ring.csv")
+    (place / "annulus.toml").write_text(ANNULUS)
+    imported, fitted, convexity = all_of(
+        place,
+        ["import", "export.txt", "--out", "ring.csv"],
+        ["fit", "ring.csv", "--specimen", "annulus.toml", *MATERIAL],
+        ["convexity", *MATERIAL, "--parameters", "6,1,0.1", "--box", "1,4"],
+    )
     assert imported["importer"] == "micrometres"
-    (place / "ring.toml").write_text(ANNULUS)
-    fitted = run(place, "fit", "ring.csv", "--specimen", "ring.toml", *MATERIAL)
     assert [fitted["parameters"][c]["value"] for c in ("c1", "c2", "c3")] == pytest.approx([6, 1, 0.1], rel=1e-3)
-    assert run(place, "convexity", *MATERIAL, "--parameters", "6,1,0.1", "--box", "1,4")["margin"] is not None
+    assert convexity["margin"] is not None
 
 
 def test_every_verb_takes_it_and_the_page_shows_it(place: Path) -> None:
@@ -132,9 +141,7 @@ def test_every_verb_takes_it_and_the_page_shows_it(place: Path) -> None:
         ["loop", *STRIP_FILES, *MATERIAL, *BESIDE, "--out", "more", "--report", "looped"],
         ["report", "answers", "more", "--out", "page"],
     ]
-    fitted, sampled, compared, valleys, diagnosed, looped, _ = printed(
-        place, "-m", "tests.plugin.verbs", json.dumps(commands)
-    )
+    fitted, sampled, compared, valleys, diagnosed, looped, _ = all_of(place, *commands)
     assert fitted["rmse_N"] < 0.02 * 2.0 * C1
     assert {"c1", "c2", "c3", "light_disc.weight"} <= set(fitted["parameters"])
     assert {"c1", "c2", "c3", "light_disc.weight", "noise.sd"} <= set(sampled["posterior"])

@@ -14,18 +14,11 @@ from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.mechanics.api import force_curve
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.report.runs import HowSampled, Shown, ShownFilm
-from tests.report.blank import blank
 
 TRUTH = (8.8, -0.6, 0.05)
 SD = 0.004
 BREAKS = (BreakPoint("1", 50e-6, 0.050, 4.0), BreakPoint("2", 100e-6, 0.045, 6.0))
 WILD = '<b>&"film'
-
-
-@pytest.fixture
-def blank_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For tests of what is read on a page."""
-    blank(monkeypatch.setattr)
 
 
 def measured(end: float = 0.035, name: str = WILD, points: int = 8) -> Measurement:

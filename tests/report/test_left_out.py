@@ -22,6 +22,8 @@ from bayesmembrane.physics.mechanics import api
 from bayesmembrane.report.page import PAGE, TWIN, write_report
 from tests.report.conftest import measured
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 
 @pytest.fixture(scope="module")
 def fitted() -> Fit:

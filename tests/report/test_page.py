@@ -139,6 +139,7 @@ def test_the_answer_comes_first_and_the_warning_before_it(page: Page) -> None:
     assert "neo-Hookean (rms residual" in text[answer:contents]
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_converged_run_has_no_warning(tmp_path: Path, yeoh: Shown) -> None:
     page = Page(write_report([yeoh], tmp_path).read_text(encoding="utf-8"))
     assert "Not to be relied on" not in page.text
@@ -146,6 +147,7 @@ def test_a_converged_run_has_no_warning(tmp_path: Path, yeoh: Shown) -> None:
     assert "Sampling converged" in page.text
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_numerical_failures_and_solvers_that_disagree_are_in_the_box(tmp_path: Path, yeoh: Shown) -> None:
     poor = replace(yeoh, outcomes={"ok": 900, "unresolved": 100}, crosscheck={**yeoh.crosscheck, "largest": 2e-4})
     text = Page(write_report([poor], tmp_path).read_text(encoding="utf-8")).text
@@ -154,6 +156,7 @@ def test_numerical_failures_and_solvers_that_disagree_are_in_the_box(tmp_path: P
     assert "disagree by up to 2.0e-04" in box
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_run_without_prior_draws_or_states_is_still_shown(tmp_path: Path, yeoh: Shown) -> None:
     d = yeoh.digest
     lost = replace(
@@ -250,6 +253,7 @@ def test_folders_with_nothing_to_show_are_named(tmp_path: Path, stored: Run) -> 
     assert not (tmp_path / "report").exists()
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_run_that_is_not_stored_has_a_page_all_the_same(tmp_path: Path, stored: Run) -> None:
     free = replace(stored, path=None)
     assert free.name in repr(free)
@@ -267,6 +271,7 @@ def test_a_damaged_run_is_named_and_not_passed_over(tmp_path: Path, stored: Run)
         write_report([tmp_path / "chains"], tmp_path / "report")
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_folder_of_runs_shows_each_once(tmp_path: Path, stored: Run) -> None:
     assert stored.path is not None
     for name in ("a", "b"):
@@ -290,6 +295,7 @@ def test_the_general_table_comes_first_and_has_a_row_for_every_answer(whole: Pat
     )
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_reconstruction_stands_alone(tmp_path: Path) -> None:
     page = Page(write_report([reconstruction()], tmp_path).read_text(encoding="utf-8"))
     assert page.text.count("The curve is not raw data") == 2  # at the top, and in its section
@@ -305,12 +311,14 @@ def test_a_foreign_file_is_never_overwritten(tmp_path: Path, stored: Run, name: 
     assert (tmp_path / name).read_text() == "<html>mine</html>"
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path, yeoh: Shown) -> None:
     (tmp_path / "file").write_text("x")
     with pytest.raises(StorageError, match="cannot be written"):
         write_report([yeoh], tmp_path / "file" / "report")
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_stored_reconstruction_gives_the_same_page(tmp_path: Path) -> None:
     store(tmp_path / "answer", "reconstruction", reconstruction(), {})
     stored, held = (

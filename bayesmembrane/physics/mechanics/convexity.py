@@ -92,12 +92,13 @@ def box_margins(
     Raises `SettingsError` unless 0 < low < high, or if the shape of ``parameters`` is wrong.
     """
     _check_box(low, high)
-    p = np.ascontiguousarray(parameters, dtype=float)
+    # What may only be read is another type to numba, for which all of it would be compiled again.
+    p = np.require(parameters, float, ("C", "W"))
     if p.ndim != 2 or p.shape[1] != len(material.field_names()):
         raise SettingsError(
             f"the parameters of {material.name} need the shape (films, {len(material.field_names())}), not {p.shape}"
         )
-    limit = np.ascontiguousarray(np.broadcast_to(np.asarray(material.extensibility(p.T), dtype=float), p.shape[:1]))
+    limit = np.require(np.broadcast_to(material.extensibility(p.T), p.shape[:1]), float, ("C", "W"))
     margins = np.empty(len(p))
     bind(KERNELS, material).margins_of(p, limit, float(low), float(high), sign_only, margins)
     return np.asarray(margins / _modulus(material, p.T))

@@ -104,6 +104,8 @@ def locking_deflection(extensibility: ArrayLike, prestretch: ArrayLike, ratio: f
     jm, l0 = jm.ravel(), l0.ravel()
     if jm.size and np.all(l0 == l0[0]) and (l0[0] == 1.0 or jm.size >= TABULATED):
         return np.asarray(_interpolate(jm, float(l0[0]), float(ratio))).reshape(shape)
+    # What may only be read is another type to numba, for which it would be compiled again.
+    jm, l0 = (np.require(v, requirements="W") for v in (jm, l0))
     return np.asarray(_lock_all(jm, l0, np.log(ratio)), dtype=float).reshape(shape)
 
 

@@ -122,6 +122,7 @@ def test_a_run_that_was_stopped_ends_with_the_same_draws(tmp_path: Path, sampler
     np.testing.assert_array_equal(found.log_posterior, whole.log_posterior)
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_stored_run_is_read_back_and_shown_with_the_band_of_every_test(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

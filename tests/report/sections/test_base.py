@@ -69,6 +69,7 @@ def plugged(monkeypatch: pytest.MonkeyPatch) -> None:
     registry._discover.cache_clear()
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_plugged_section_stands_where_its_order_says(plugged: None, tmp_path: Path, yeoh: Shown) -> None:
     assert "smell" in [s.name for s in sections()]
     text = write_report([yeoh, Smell(3.0)], tmp_path).read_text()
@@ -80,6 +81,7 @@ def test_a_plugged_section_stands_where_its_order_says(plugged: None, tmp_path: 
     assert twin["warnings"] == ["Open a window."]
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_plugged_section_reads_its_folder(plugged: None, tmp_path: Path) -> None:
     (tmp_path / "answers" / "one").mkdir(parents=True)
     (tmp_path / "answers" / "one" / "smell.json").write_text('{"strength": 2.0}')

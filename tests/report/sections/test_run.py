@@ -22,6 +22,7 @@ from bayesmembrane.report.sections.run import RunSection
 STRETCH = np.linspace(1.05, 2.0, 16)
 
 
+@pytest.mark.usefixtures("blank_pictures")
 @pytest.mark.parametrize("rig", [Uniaxial(0.040, 0.005), Equibiaxial()])
 def test_a_strip_is_reported_without_a_lifted_film(rig, tmp_path: Path) -> None:
     d = rig.length * (STRETCH - 1)

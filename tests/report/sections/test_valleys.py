@@ -69,6 +69,7 @@ def test_next_measurements_are_a_short_list_ordered_by_what_they_are_worth(two: 
     assert worth == sorted(worth, reverse=True)
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_page_shows_the_valleys(one: Valleys, yeoh: Shown, tmp_path: Path) -> None:
     page = write_report([yeoh, one], tmp_path).read_text()
     assert 'id="valleys"' in page
@@ -77,6 +78,7 @@ def test_page_shows_the_valleys(one: Valleys, yeoh: Shown, tmp_path: Path) -> No
     assert 'id="valleys"' not in write_report([yeoh], tmp_path).read_text()
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_valleys_stand_alone(one: Valleys, two: Valleys, tmp_path: Path) -> None:
     page = write_report([one, two], tmp_path).read_text()
     twin = json.loads((tmp_path / "report.json").read_text())
@@ -94,6 +96,7 @@ def test_answer_and_picture_are_written_and_read_back(one: Valleys, tmp_path: Pa
         write_valleys(one, tmp_path / "file")
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_stored_valleys_give_the_same_page(two: Valleys, tmp_path: Path) -> None:
     store(tmp_path / "answer", "valleys", two, {})
     stored, held = (write_report([found], tmp_path / "page").read_text() for found in (tmp_path / "answer", two))
