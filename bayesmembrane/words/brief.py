@@ -19,7 +19,16 @@ from bayesmembrane.diagnosis.loop import Loop, Stage
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.words import language
-from bayesmembrane.words.diagnosis import certain, laws_off, percent, set_title, smallest_sizes, too_far, why_not
+from bayesmembrane.words.diagnosis import (
+    certain,
+    laws_off,
+    other_energy,
+    percent,
+    set_title,
+    smallest_sizes,
+    too_far,
+    why_not,
+)
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.moved import MATTERS, modulus_of, settled
@@ -251,7 +260,8 @@ def _ambiguous(course: Course) -> str:
     size = (
         ", yet at a size that is hardly met" if d.members and hardly_met(d.members[0].candidate, d.measurement) else ""
     )
-    return f"{which}; {first} explains {_explained(d)}{size}{_beside(d)}"
+    energy = f"{other}; " if (other := other_energy(d)) else ""
+    return f"{energy}{which}; {first} explains {_explained(d)}{size}{_beside(d)}"
 
 
 def _in_all(d: Diagnosis) -> str:

@@ -21,7 +21,7 @@ from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.ground.registry import components
-from bayesmembrane.words.hypothesis import effect_title, spoken
+from bayesmembrane.words.hypothesis import effect_title, material_title, spoken
 from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.shape import shape_in_words
@@ -142,7 +142,18 @@ def probability_sentence(found: Diagnosis) -> str:
     foreign = p.anything_foreign
     if foreign >= WORDS.probable:
         told.append(f"something foreign {percent(foreign)}")
-    return f"Probability: {', '.join(told)}."
+    other = other_energy(found)
+    return f"Probability: {', '.join(told)}.{f' Whatever is at work, {other}.' if other else ''}"
+
+
+def other_energy(found: Diagnosis) -> str:
+    """``the energy is Gent (99.5 %), not neo-Hookean``: where effects stay open, and the declared energy is wrong."""
+    declared, energies = found.null.hypothesis.material, found.probabilities.energies
+    name = max(energies, key=lambda n: energies[n])
+    sure = found.declared and name != declared.name and energies[name] >= VERDICT.sure
+    if not sure or found.verdict != "ambiguous":
+        return ""
+    return f"the energy is {material_title(name)} ({percent(energies[name])}), not {declared.title}"
 
 
 def set_title(name: str) -> str:

@@ -20,6 +20,7 @@ from bayesmembrane.report.blocks import Figure, Heading, Lead, Points, Table, Te
 from bayesmembrane.report.page import Content, compose, sections, write_report
 from bayesmembrane.report.runs import read
 from bayesmembrane.report.sections.diagnosis.lead import handles, steps_of
+from bayesmembrane.words import diagnosis as words
 from bayesmembrane.words.candidates import sizes
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.seen import seen
@@ -176,6 +177,16 @@ def test_an_estimate_at_its_bound_and_an_implausible_size_are_flagged_where_they
     assert "bound" not in lead_of(d).brief.answer
     assert "at a size that is hardly met" not in lead_of(replace(d, verdict="ambiguous")).brief.answer
     assert "at a size that is hardly met" in lead_of(replace(flagged, verdict="ambiguous")).brief.answer
+
+
+def test_an_energy_that_is_sure_is_told_where_effects_stay_open(named: Loop) -> None:
+    d = replace(only(named, "named"), verdict="ambiguous")
+    assert words.other_energy(d) == ""
+    sure = replace(d, probabilities=replace(d.probabilities, energies={"gent": 0.995, "yeoh": 0.005}))
+    assert d.null.hypothesis.material.name != "gent"
+    for told in (lead_of(sure).brief.answer, words.sentence(sure)):
+        assert f"the energy is Gent (99.5 %), not {d.null.hypothesis.material.title}" in told
+    assert words.other_energy(replace(sure, declared=False)) == ""
 
 
 def test_a_strip_is_told_in_stretch_and_stress(strip: Diagnosis, tmp_path: Path) -> None:
