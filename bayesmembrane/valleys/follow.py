@@ -145,6 +145,8 @@ def _valley(surface: Surface, rise: float, seed: int, draws: Array | None) -> Va
         next_tests=piece("tests", lambda: rank(surface, normal, spread, lambda z: metric.scale(chart, z))),
         limit=piece("limit", lambda: _limit(surface, lines[along], seed)),
         unreached=float(np.mean([np.mean(~np.isfinite(p.loss)) for p in maps])) if maps else 0.0,
+        rig=m.rig,
+        thickness=m.specimen.thickness,
     )
     return replace(valley, published=tuple(_placed(surface, valley, label, p) for label, p in published))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.convexity import MODES, RESTRICTING
@@ -104,6 +106,7 @@ class Valley:
     next_tests : what would shorten it, the best first
     limit : name of the simpler material whose loss is that of an open end; "" without any
     unreached : part of the cells of all maps that hold no film that reaches the data
+    rig, thickness : what held the film, m: as people see its curve
     """
 
     hypothesis: Hypothesis
@@ -131,6 +134,8 @@ class Valley:
     next_tests: tuple[NextTest, ...]
     limit: str
     unreached: float
+    rig: Fixture | None = None
+    thickness: float = math.nan
 
     @property
     def open_end(self) -> bool:

@@ -15,6 +15,7 @@ from bayesmembrane.words.language import digits, newtons, three_digits
 
 if TYPE_CHECKING:
     from bayesmembrane.calibration.fit import Fit
+    from bayesmembrane.valleys.result import Valley
 
 MEASURED = "measured"
 FORCE = "force"
@@ -127,6 +128,11 @@ def seen_on(rig: Fixture, thickness: float, origin: str = "") -> Seen:
 def seen_by_fit(found: Fit) -> Seen:
     """How the curve of a fit is seen; one whose rig is not known as that of a lifted disc."""
     return DISC if found.rig is None else seen_on(found.rig, found.thickness, found.origin)
+
+
+def seen_by_valley(found: Valley) -> Seen:
+    """How the curve of a valley is seen; one whose rig is not known as that of a lifted disc."""
+    return DISC if found.rig is None else seen_on(found.rig, found.thickness)
 
 
 def seen(measurement: Measurement) -> Seen:

@@ -16,6 +16,7 @@ from bayesmembrane.valleys.result import Between, Valley, Valleys
 from bayesmembrane.words.hypothesis import spoken, title
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.next_test import ASSUMPTION, spoken_test
+from bayesmembrane.words.seen import seen_by_valley
 
 FEW = 2  # open ends that have a sentence each
 CLOSE = 2.0  # posterior standard deviations within which two valleys count as compatible
@@ -93,8 +94,18 @@ def _names(v: Valley) -> list[str]:
     return [n.partition(".")[2] for n in v.chart.names]
 
 
+def up_to(v: Valley) -> str:
+    """How a range is called: ``up to 35.1 mm``, ``up to a stretch of 2.5``."""
+    return f"up to {seen_by_valley(v).place(v.end)}"
+
+
 def _range(v: Valley) -> str:
-    return f"Up to {1e3 * v.end:.4g} mm"
+    return up_to(v).capitalize()
+
+
+def loss_of(v: Valley, value: float, count: int = 4) -> str:
+    """A loss in N, in the unit of the curve's forces."""
+    return seen_by_valley(v).loss(value, count)
 
 
 def point(v: Valley, p: Array | Sequence[float]) -> str:
@@ -112,7 +123,7 @@ def _where(v: Valley) -> str:
     return (
         f"{_range(v)} every {spoken(v.hypothesis)} film between ({point(v, v.floor[0])}) and "
         f"({point(v, v.floor[-1])}) on the valley's floor fits within {share:.3g} % of the least loss, "
-        f"{v.best_loss:.4g} N{long}{ratio}."
+        f"{loss_of(v, v.best_loss)}{long}{ratio}."
     )
 
 
@@ -143,7 +154,7 @@ def _open_in_many(v: Valley) -> str:
     only = f"; what the data do say is that {', '.join(closed)}" if closed else ""
     return (
         f"{_range(v)} the valley is open in {', '.join(opened)}: as far as each of these is followed, with the others "
-        f"adjusted, the loss stays between {min(losses):.4g} and {max(losses):.4g} N{only}."
+        f"adjusted, the loss stays between {loss_of(v, min(losses))} and {loss_of(v, max(losses))}{only}."
     )
 
 
@@ -165,13 +176,13 @@ def _open_end(v: Valley, i: int, end: End, far: str) -> str:
         edge = "least" if far == "low" else "largest"
         return (
             f"{_range(v)} the valley is open: at {name} = {shown}, the {edge} value that is allowed, the loss is "
-            f"{end.loss:.4g} N."
+            f"{loss_of(v, end.loss)}."
         )
     goal = "zero" if abs(end.value) < abs(float(v.best[i])) or (v.chart.log[i] and far == "low") else "infinity"
     if v.chart.log[i] and v.chart.sign[i] < 0 and far == "high":
         goal = "minus infinity" if goal == "infinity" else goal
     limit = f", that of a {limit_title(v)} film" if v.limit and i == v.along else ""
-    edge = f"the loss {'tends to' if end.tends else 'is still'} {end.loss:.4g} N{limit}"
+    edge = f"the loss {'tends to' if end.tends else 'is still'} {loss_of(v, end.loss)}{limit}"
     low, high = v.profiles[i].ends
     other = low if far == "high" else high
     bound = f"; the data only say that {name} is {'above' if far == 'high' else 'below'} {other.value:.3g}"
@@ -185,7 +196,7 @@ def _open_end(v: Valley, i: int, end: End, far: str) -> str:
 def _basins(v: Valley) -> list[str]:
     """Other minima along the floor: an optimiser may stop there."""
     return [
-        f"{_range(v)} the loss has another basin near ({point(v, natural)}) with {loss:.3g} N, "
+        f"{_range(v)} the loss has another basin near ({point(v, natural)}) with {loss_of(v, loss, 3)}, "
         f"{100 * (loss / v.best_loss - 1):.2g} % above the least, in which an optimiser may stop; it is no part of the "
         "length."
         for natural, loss in v.basins
@@ -213,7 +224,7 @@ def _published(v: Valley) -> list[str]:
     if not v.published:
         return []
     on = [p.label for p in v.published if p.within]
-    off = [f"{p.label} ({'no film' if p.loss is None else f'{p.loss:.3g} N'})" for p in v.published if not p.within]
+    off = [f"{p.label} ({'no film' if p.loss is None else loss_of(v, p.loss, 3)})" for p in v.published if not p.within]
     parts = [f"{', '.join(on)} lie inside" if on else "", f"{', '.join(off)} lie outside" if off else ""]
     return [f"{_range(v)}, of the published parameter sets " + " and ".join(p for p in parts if p) + " the valley."]
 
@@ -238,7 +249,7 @@ def limit_title(v: Valley) -> str:
 
 def sentence_between(a: Valley, b: Valley, found: Between) -> str:
     """How two valleys lie to each other."""
-    distance, both = found.approach.distance, f"The valleys up to {1e3 * a.end:.4g} and {1e3 * b.end:.4g} mm"
+    distance, both = found.approach.distance, f"The valleys {up_to(a)} and {up_to(b)}"
     if found.crossing is not None:
         return f"{both} cross at ({point(a, found.crossing)})."
     if not np.isfinite(distance):
@@ -257,10 +268,11 @@ def sentence_beside(a: Valley, b: Valley, found: Between) -> str:
     change = 100 * (b.best_loss / a.best_loss - 1)
     n = a.best.size
     loss = (
-        f"{abs(change):.2g} % {'lower' if change < 0 else 'higher'}, {b.best_loss:.3g} N instead of {a.best_loss:.3g}"
+        f"{abs(change):.2g} % {'lower' if change < 0 else 'higher'}, {loss_of(b, b.best_loss, 3)} instead of "
+        f"{loss_of(a, a.best_loss, 3)}"
     )
     start = (
-        f"Up to {1e3 * a.end:.4g} mm, with {names} the least loss is {loss}, and the optimum of "
+        f"{_range(a)}, with {names} the least loss is {loss}, and the optimum of "
         f"{a.hypothesis.material.title} moves from ({point(a, a.best)}) to ({point(a, b.best[:n])})"
     )
     distance = found.approach.distance

@@ -72,7 +72,7 @@ def show(found: Valleys | BesideValleys, title: str) -> None:
     from bayesmembrane.report.sections.valleys.tables import valley_table
     from bayesmembrane.valleys.beside import Beside as BesideValleys
     from bayesmembrane.words.next_test import spoken_test
-    from bayesmembrane.words.valleys import sentences
+    from bayesmembrane.words.valleys import sentences, up_to
 
     parts = [found.without, found.added] if isinstance(found, BesideValleys) else [found]
     whole = valley_table(parts)
@@ -82,4 +82,4 @@ def show(found: Valleys | BesideValleys, title: str) -> None:
         say(sentence)
     for valley in parts[-1].ranges:
         rows = [[spoken_test(t.test), f"{100 * t.reduction:.0f} %"] for t in valley.next_tests[:TESTS]]
-        table(f"What to measure next, from data up to {1e3 * valley.end:.4g} mm", ["test", "shorter by"], rows)
+        table(f"What to measure next, from data {up_to(valley)}", ["test", "shorter by"], rows)

@@ -14,13 +14,13 @@ from bayesmembrane.report.blocks import Block, Figure, Heading, Picture, Points
 from bayesmembrane.report.sections.base import Glance, Section, Subject
 from bayesmembrane.report.sections.valleys.beside import beside_picture
 from bayesmembrane.report.sections.valleys.figures import valley_picture
-from bayesmembrane.report.sections.valleys.pairs import label
 from bayesmembrane.report.sections.valleys.tables import next_table, valley_table
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed
-from bayesmembrane.words.valleys import document, sentences
+from bayesmembrane.words.seen import alike, seen_by_valley
+from bayesmembrane.words.valleys import document, loss_of, sentences, up_to
 
 
 class ValleysSection(Section):
@@ -48,8 +48,8 @@ class ValleysSection(Section):
         return [
             Glance(
                 "valley",
-                f"{spoken(v.hypothesis)}, {label(v)}",
-                f"least loss {v.best_loss:.3g} N, {'open' if v.open_end else 'closed'}",
+                f"{spoken(v.hypothesis)}, {up_to(v)}",
+                f"least loss {loss_of(v, v.best_loss, 3)}, {'open' if v.open_end else 'closed'}",
             )
             for found in _valleys(results)
             for v in found.ranges
@@ -73,17 +73,18 @@ def _blocks(found: Valleys | Beside) -> list[Block]:
     out: list[Block] = [Heading(spoken(added.hypothesis))]
     if isinstance(found, Beside):
         caption = (
-            "Valleys without and with the effects over the membrane parameters: floors, least losses (stars, N) and "
+            "Valleys without and with the effects over the membrane parameters: floors, least losses (stars) and "
             "posterior draws (dots)."
         )
         alt = f"Valleys of {spoken(found.without.hypothesis)} alone and of {spoken(added.hypothesis)}, side by side"
         out.append(Figure(beside_picture(found), alt, caption))
-    ends = ", ".join(f"{1e3 * v.end:.4g}" for v in added.ranges)
+    how = alike(map(seen_by_valley, added.ranges))
+    ends = ", ".join(how.place(v.end) for v in added.ranges)
     figure = Figure(
         valley_picture(added),
-        alt=f"Valleys of the loss of {spoken(added.hypothesis)} over its parameters for the ranges {ends} mm",
+        alt=f"Valleys of the loss of {spoken(added.hypothesis)} over its parameters, fitted up to {ends}",
         caption="Films that fit nearly as well as the best one, over the membrane parameters; the loss is the "
-        "Euclidean norm of the residual (N), without convexity prior.",
+        f"Euclidean norm of the residual ({how.load_scale[1]}), without convexity prior.",
     )
     return [*out, figure, Points(sentences(found)), *(next_table(v) for v in added.ranges if v.next_tests)]
 

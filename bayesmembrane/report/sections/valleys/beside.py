@@ -10,12 +10,12 @@ from matplotlib.axes import Axes
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.report.blocks import Picture
 from bayesmembrane.report.canvas import encoded, new_figure, style
-from bayesmembrane.report.sections.valleys.pairs import label
 from bayesmembrane.report.style import FAINT, INK, RANGE_COLOURS, with_unit
 from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Between, Valley
 from bayesmembrane.words.hypothesis import title
 from bayesmembrane.words.language import listed
+from bayesmembrane.words.valleys import loss_of, up_to
 
 DOTS = 600
 
@@ -30,9 +30,9 @@ def beside_picture(found: Beside, kind: str = "png") -> Picture:
         shown = _shown(found.without.ranges[0])
         for ax, pair, a, b in zip(axes, found.pairs, found.without.ranges, found.added.ranges, strict=True):
             for v, c, words in ((a, RANGE_COLOURS[0], "without"), (b, RANGE_COLOURS[1], f"with {names}")):
-                _valley(ax, shown, a, v, c, f"{words}: least loss {v.best_loss:.3g} N")
+                _valley(ax, shown, a, v, c, f"{words}: least loss {loss_of(v, v.best_loss, 3)}")
             _approach(ax, shown, a, pair)
-            ax.set_title(label(a))
+            ax.set_title(up_to(a))
             ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16))
         text = f"{title(found.added.hypothesis.material)}: valleys without and with {names} (dots: posterior draws)"
         figure.suptitle(text, fontweight="bold")

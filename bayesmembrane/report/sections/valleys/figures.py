@@ -15,12 +15,12 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.convexity import REACHED, ConvexityMode
 from bayesmembrane.report.blocks import Picture
 from bayesmembrane.report.canvas import encoded, new_figure, style
-from bayesmembrane.report.sections.valleys.pairs import label, pairs, percent
+from bayesmembrane.report.sections.valleys.pairs import pairs, percent
 from bayesmembrane.report.style import FAINT, INK, MUTED, RANGE_COLOURS, with_unit
 from bayesmembrane.valleys.posterior import Grid
 from bayesmembrane.valleys.result import Valley, Valleys
 from bayesmembrane.words.hypothesis import spoken
-from bayesmembrane.words.valleys import limit_title
+from bayesmembrane.words.valleys import limit_title, loss_of, up_to
 
 HELD = 0.9
 DECADES = 1000.0  # how far an open end on a logarithmic axis is drawn past the closed one
@@ -48,7 +48,12 @@ def _one(found: Valleys, kind: str) -> Picture:
         ax = figure.subplots()
         drawn = [(v, v.profiles[0], v.chart.natural(v.profiles[0].points)[:, 0]) for v in found.ranges]
         for (v, p, x), c in zip(drawn, RANGE_COLOURS, strict=False):
-            ax.plot(x, 100 * (p.loss / v.best_loss - 1), color=c, label=f"{label(v)}: least loss {v.best_loss:.3g} N")
+            ax.plot(
+                x,
+                100 * (p.loss / v.best_loss - 1),
+                color=c,
+                label=f"{up_to(v)}: least loss {loss_of(v, v.best_loss, 3)}",
+            )
             ax.plot(v.best[0], 0, "*", color=c, markersize=13, markeredgecolor="white")
         share = 100 * found.ranges[0].rise / found.ranges[0].best_loss
         ax.axhline(share, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
@@ -96,7 +101,7 @@ def _overview(ax: Axes, found: Valleys, order: tuple[int, int]) -> None:
     for v, c in zip(found.ranges, RANGE_COLOURS, strict=False):
         middle = v.floor[len(v.floor) // 2] if not v.open_end else v.floor[len(v.floor) // 6]
         ax.annotate(
-            f"{label(v)}: least loss {v.best_loss:.3g} N",
+            f"{up_to(v)}: least loss {loss_of(v, v.best_loss, 3)}",
             (middle[x], middle[y]),
             xytext=(12, 14) if _across(ax, middle[[x, y]]) < 0.6 else (40, 52),
             textcoords="offset points",
@@ -158,7 +163,7 @@ def _zoom(ax: Axes, v: Valley, order: tuple[int, int], c: str) -> None:
     size = int(np.floor(np.log10(number))) if 0 < number < np.inf else 99
     shown = f"{number:,.0f}" if size < 4 else rf"${number / 10.0**size:.1f}\times10^{{{size}}}$"
     ratio = f", condition number {shown}" if size < 9 else ""
-    ax.set_title(f"{label(v)}{ratio}", color=c)
+    ax.set_title(f"{up_to(v)}{ratio}", color=c)
     _axis_labels(ax, v, order)
 
 

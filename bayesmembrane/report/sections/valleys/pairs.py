@@ -18,11 +18,7 @@ from bayesmembrane.report.style import INK, MUTED, RANGE_COLOURS, with_unit
 from bayesmembrane.valleys.profile import PairMap
 from bayesmembrane.valleys.result import Valley, Valleys
 from bayesmembrane.words.hypothesis import spoken
-
-
-def label(v: Valley) -> str:
-    """How a range is called: ``up to 35.1 mm``."""
-    return f"up to {1e3 * v.end:.4g} mm"
+from bayesmembrane.words.valleys import loss_of, up_to
 
 
 def percent(v: Valley) -> str:
@@ -131,7 +127,7 @@ def _pair_handles(found: Valleys) -> list[Any]:
     rise = found.ranges[0].rise / found.ranges[0].best_loss
     handles: list[Any] = [
         Line2D([], [], color=c, linewidth=2.4, marker="*", markersize=11, markeredgecolor="white",
-               label=f"{label(v)}: least loss {v.best_loss:.3g} N (star), floor")
+               label=f"{up_to(v)}: least loss {loss_of(v, v.best_loss, 3)} (star), floor")
         for v, c in zip(found.ranges, RANGE_COLOURS, strict=False)
     ]  # fmt: skip
     handles.append(Patch(facecolor=to_rgba(MUTED, 0.55), label=f"loss within {100 * rise:.3g} %"))

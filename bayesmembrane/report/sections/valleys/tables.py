@@ -9,14 +9,12 @@ from bayesmembrane.report.blocks import Column, Table, Value
 from bayesmembrane.valleys.result import Valley, Valleys
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.next_test import ASSUMPTION, spoken_test
-from bayesmembrane.words.valleys import limit_title
+from bayesmembrane.words.seen import Seen, alike, seen_by_valley
+from bayesmembrane.words.valleys import limit_title, up_to
 
 TESTS = 5
 
 _COLUMNS = (
-    Column("material", "material"),
-    Column("end_mm", "fitted up to (mm)"),
-    Column("loss_N", "least loss (N)"),
     Column("valley", "valley from ... to ..."),
     Column("length", "length", ".3g"),
     Column("unit", "in"),
@@ -30,16 +28,25 @@ _COLUMNS = (
 
 def valley_table(found: Sequence[Valleys]) -> Table:
     """One row per material and range."""
-    rows = tuple(_row(v) for f in found for v in f.ranges)
+    how = alike(seen_by_valley(v) for f in found for v in f.ranges)
+    columns = (
+        Column("material", "material"),
+        Column(
+            "end_mm", f"fitted up to ({how.travel_scale[1]})" if not how.bare else f"fitted up to a {how.travel} of"
+        ),
+        Column("loss_N", f"least loss ({how.load_scale[1]})"),
+        *_COLUMNS,
+    )
+    rows = tuple(_row(v, how) for f in found for v in f.ranges)
     share = 100 * found[0].ranges[0].rise / found[0].ranges[0].best_loss
     caption = (
         f"Valleys of the loss: films on the floor that fit within {share:.3g} % of the least loss; the condition "
         "number is the squared ratio of the valley's longest to its shortest axis at the optimum."
     )
-    return Table("valleys", caption, _COLUMNS, rows)
+    return Table("valleys", caption, columns, rows)
 
 
-def _row(v: Valley) -> tuple[Value, ...]:
+def _row(v: Valley, how: Seen) -> tuple[Value, ...]:
     ends = [", ".join(f"{x:.3g}" for x in p) for p in (v.floor[0], v.floor[-1])]
     names = ", ".join(n.partition(".")[2] for n in v.chart.names)
     inside = ", ".join(p.label for p in v.published if p.within) or ("none" if v.published else "-")
@@ -49,8 +56,8 @@ def _row(v: Valley) -> tuple[Value, ...]:
     first = v.next_tests[0] if v.next_tests else None
     return (
         spoken(v.hypothesis),
-        1e3 * v.end,
-        v.best_loss,
+        how.rest + how.travel_scale[0] * v.end,
+        how.load_scale[0] * v.best_loss,
         f"({names}) = ({ends[0]}) ... ({ends[1]})",
         v.length(v.metric),
         v.metric.unit if v.metric.unit != "-" else "ln",
@@ -71,6 +78,6 @@ def next_table(v: Valley) -> Table:
         Column("after", "axis then (sd)", ".2g"),
     )
     rows = tuple((spoken_test(t.test), t.reduction, t.axis_before, t.axis_after) for t in v.next_tests[:TESTS])
-    name = f"next measurements {v.hypothesis.material.name} {1e3 * v.end:.4g} mm"
-    caption = f"{spoken(v.hypothesis)}, fitted up to {1e3 * v.end:.4g} mm: what to measure next. {ASSUMPTION}"
+    name = f"next measurements {v.hypothesis.material.name} {seen_by_valley(v).place(v.end)}"
+    caption = f"{spoken(v.hypothesis)}, fitted {up_to(v)}: what to measure next. {ASSUMPTION}"
     return Table(name, caption, columns, rows)
