@@ -15,7 +15,7 @@ from bayesmembrane.data.exports.film import Film, film_of
 from bayesmembrane.data.exports.hints import Guess, Hints
 from bayesmembrane.data.exports.parts import facts_beside, part
 from bayesmembrane.data.exports.redundant import compare_rest
-from bayesmembrane.data.exports.relations import gaps, jumps, speed_against
+from bayesmembrane.data.exports.relations import far_ends, gaps, jumps, speed_against
 from bayesmembrane.data.exports.sheets import Sheet
 from bayesmembrane.data.exports.signs import carried, signed, zero_told, zeroed, zeroed_force
 from bayesmembrane.data.exports.strip import nominal_of, stretch_of
@@ -67,7 +67,8 @@ def curve_of(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: Sequence
     _checked_order(export, columns)
     for what in ("force", "nominal_stress", "deflection", "stretch"):
         if what in columns:
-            export.contradict(jumps(what.replace("_", " "), columns[what], export.lines))
+            for sentence in (jumps, far_ends):
+                export.contradict(sentence(what.replace("_", " "), columns[what], export.lines))
     if TIME in columns:
         export.contradict(gaps(columns[TIME], export.lines))
     _outside(export, blocks)

@@ -243,6 +243,16 @@ def test_a_reading_that_jumps_is_reported() -> None:
     assert "the force leaves its neighbours and comes back at once in line 12" in contradictions(text)
 
 
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [(2, "first reading (line 2): a steep start, or damaged"), (26, "last reading (line 26): a break, or damaged")],
+)
+def test_an_end_reading_does_not_come_back(line: int, said: str) -> None:
+    found = contradictions(damaged(PLAIN, line, 2, "0.25"))
+    assert f"the force goes far in one step at the {said}" in found
+    assert "comes back" not in found
+
+
 # ---- every guess -----------------------------------------------------------------------------------------------------
 
 
