@@ -20,7 +20,7 @@ from bayesmembrane.data.exports.hints import Guess, Hints
 from bayesmembrane.data.exports.sheets import Sheet, is_workbook, text_sheet, workbook_sheets
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.reading import read_measurement
-from bayesmembrane.data.settings import TomlSection, load_toml
+from bayesmembrane.data.settings import TomlSection, load_specimen
 from bayesmembrane.data.tables import read_bytes
 from bayesmembrane.data.writing import csv_text, write_new
 from bayesmembrane.ground.errors import DataError, SettingsError
@@ -286,7 +286,7 @@ def _refuse_layout(file: str) -> Any:
 
 
 def _template(specimen: str | Path | None) -> TomlSection | None:
-    return None if specimen is None else load_toml(Path(specimen))
+    return None if specimen is None else load_specimen(Path(specimen))
 
 
 def _completed(hints: Hints, template: TomlSection | None) -> Hints:
