@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesmembrane.data.exports.blocks import ExportColumn, NumberBlock
-from bayesmembrane.data.exports.cells import NOT_MEASURED, Cell, clock
+from bayesmembrane.data.exports.cells import NOT_MEASURED, Cell, clock, like_number
 from bayesmembrane.data.exports.hints import Guess, Hints, pairs_of
 from bayesmembrane.data.exports.words import (
     CYCLE,
@@ -305,6 +305,8 @@ def _numbers(block: NumberBlock, column: ExportColumn, rows: Sequence[int]) -> t
     is_clock = clock(first) is not None
     for k, row in enumerate(rows):
         cell = _at(sheet.cells(row), column.at)
+        if sheet.doubt is not None and isinstance(cell, str) and like_number(cell) and not is_clock:
+            raise sheet.doubt
         value = clock(cell) if is_clock else marks.number(cell)
         if value is None:
             raise _no_number(cell, f"{sheet.place(row)}, column {column.header or column.at + 1}", marks.decimal)

@@ -47,10 +47,10 @@ class Curve:
     notes: Sequence[str]
 
 
-def curve_of(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: Sequence[Guess] = ()) -> Curve:
+def curve_of(sheets: Sequence[Sheet], file: str, hints: Hints) -> Curve:
     """The curve in the sheets of a file; raises `DataError` or `SettingsError` where that is not sure."""
     block, found, blocks = part(sheets, file, hints)
-    export = Export(file, hints, block, found, guesses=list(guesses))
+    export = Export(file, hints, block, found, guesses=list(block.sheet.guesses))
     if len(sheets) > 1:
         export.guess("sheet", block.sheet.name, "it has the readings", "--sheet")
     facts, remarks, name = facts_beside(sheets, blocks, block)

@@ -127,8 +127,7 @@ class TableImporter(Importer):
 
     @classmethod
     def read_with(cls, data: bytes, file: str, hints: Hints) -> Imported:
-        sheets, guesses = cls.sheets(data, file, hints)
-        curve = curve_of(sheets, file, hints, guesses)
+        curve = curve_of(cls.sheets(data, file, hints), file, hints)
         return Imported(
             curve.columns,
             f"imported from {file}",
@@ -140,12 +139,9 @@ class TableImporter(Importer):
         )
 
     @classmethod
-    def sheets(cls, data: bytes, file: str, hints: Hints) -> tuple[Sequence[Sheet], list[Guess]]:
-        """The rows of a file, and what was guessed to get them."""
-        if is_workbook(data):
-            return workbook_sheets(data, file), []
-        sheet, guesses = text_sheet(data, file, hints)
-        return [sheet], guesses
+    def sheets(cls, data: bytes, file: str, hints: Hints) -> Sequence[Sheet]:
+        """The rows of a file."""
+        return workbook_sheets(data, file, hints) if is_workbook(data) else [text_sheet(data, file, hints)]
 
 
 def head(data: bytes, length: int = 20_000) -> str:

@@ -162,6 +162,11 @@ def test_a_stress_that_grows_with_the_stretch_is_true() -> None:
     assert any(g.what == "stress" and "is true" in g.value for g in found.guesses)
 
 
+def test_a_date_has_no_decimal_sign() -> None:
+    text = lines("Time (s);Extension (mm);Load (N);Datum", TIME, 1e3 * TRAVEL, FORCE, sep=";")
+    same_force(imported(text.replace("\n", ";20.02.2008\n").replace("Datum;20.02.2008", "Datum").encode()))
+
+
 def test_thousands_in_quotes() -> None:
     force = [f'"{v:,.5f}"' for v in 5e4 * FORCE]
     rows = "".join(f'"{t:.3f}","{1e3 * x:.5f}",{f}\n' for t, x, f in zip(TIME, TRAVEL, force, strict=True))
