@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from bayesmembrane.data.exports.cells import POINT, Cell, Marks, evidence, like_number
 from bayesmembrane.data.exports.hints import Guess, Hints
-from bayesmembrane.data.exports.words import fact_of, named, reading_of
+from bayesmembrane.data.exports.words import fact_of, named, reading_of, unit_of
 from bayesmembrane.ground.errors import DataError, SettingsError
 
 BOMS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
@@ -177,6 +177,17 @@ def decoded(data: bytes, file: str, hints: Hints) -> tuple[str, Guess]:
         return _decode(data, name, file), Guess("encoding", name, why, "--encoding")
 
 
+def guessed_encoding(data: bytes, hints: Hints) -> str:
+    """The encoding of one or two bytes a letter in which a file is read by its words alone; "" if more tells it."""
+    if hints.encoding or is_workbook(data) or b"\0" in data or data.startswith(tuple(BOMS)):
+        return ""
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return _eight_bits(data)[0]
+    return ""
+
+
 def _decode(data: bytes, encoding: str, file: str) -> str:
     try:
         return data.decode(encoding)
@@ -203,16 +214,17 @@ def _eight_bits(data: bytes) -> tuple[str, str]:
     """The encoding of one or two bytes a letter in which most words of the file are words, and why."""
     lines = [line for line in re.split(rb"[\r\n]+", data)[:HEAD] if not line.isascii()]
     lines = lines or [line for line in re.split(rb"[\r\n]+", data) if not line.isascii()][:HEAD]
-    scores = {}
+    texts = {}
     for name in ENCODINGS:
         try:
-            scores[name] = sum(_sense(line.decode(name)) for line in lines)
+            texts[name] = [line.decode(name) for line in lines]
         except UnicodeError:
             continue
-    if not scores:
+    if not texts:
         return "latin-1", "nothing else fits its bytes"
-    best = max(scores.values())
-    equal = [name for name, score in scores.items() if score == best]
+    scores = {name: sum(_sense(line) for line in text) for name, text in texts.items()}
+    best = [name for name, score in scores.items() if score == max(scores.values())]
+    equal = [name for k, name in enumerate(best) if texts[name] not in [texts[other] for other in best[:k]]]
     if len(equal) > 1:
         chosen = _normalizers_choice(data, equal)
         return chosen, f"it is not UTF-8, and its words read as well in {' and '.join(equal)}"
@@ -227,14 +239,28 @@ def _normalizers_choice(data: bytes, equal: list[str]) -> str:
     return next((e for e in equal if e.replace("_", "-") == name), equal[0])
 
 
+_LONE = re.compile("(?<![\u2e80-\uffff])[\u2e80-\uffff](?![\u2e80-\uffff])")
+"""A letter of the East between letters of the West, as two bytes of the West make it: ``µm`` and ``°C``."""
+
+
+def _is_common(letter: str) -> bool:
+    """Whether a letter of the East is one that also stands alone: 力, and not 祄."""
+    try:
+        return bool(letter.encode("gb2312"))
+    except UnicodeEncodeError:
+        return False
+
+
 def _sense(line: str) -> int:
-    """How many cells of a line are words of a machine, less what is no word of any language."""
+    """How many cells of a line are words of a machine or known units, less what is no word of any language."""
     score = 0
     for cell in re.split(r'[\t;,"|]+', line):
         if cell.isascii():
             continue
         name = named(cell)
         score += 4 * bool(reading_of(name.name).role or fact_of(cell) or fact_of(name.name))
+        score += 2 * any(unit_of(text) for text in (name.unit, cell) if not text.isascii())
+        score -= sum(not _is_common(letter) for letter in _LONE.findall(cell))
         score -= sum(1 for a, b in zip(cell, cell[1:] + " ", strict=True) if _odd(a, b))
     return score
 
@@ -248,7 +274,8 @@ def _odd(a: str, b: str) -> bool:
         return True
     # Signs inside words, and letters of no European language between Latin ones.
     strange = [ord(c) > 127 and not c.isalpha() and c not in "°²³µ€–—·" for c in (a, b)]
-    inside = (a in "²³°" and b.isalpha()) or (strange[0] and b.isalpha()) or (a.isalpha() and strange[1])
+    raised = a in "²³°" and b.isalpha() and a + b not in ("°C", "°F")
+    inside = raised or (strange[0] and b.isalpha()) or (a.isalpha() and strange[1])
     return inside or 0x80 <= ord(a) < 0xA0
 
 

@@ -61,6 +61,16 @@ def test_a_file_that_leaves_something_open_is_refused(text: str | bytes, said: l
     assert [s for s in said if s not in message] == []
 
 
+@pytest.mark.parametrize("encoding", ["cp1252", "gb18030"])
+def test_a_refusal_names_an_encoding_that_was_guessed(encoding: str) -> None:
+    name = {"cp1252": "Verlängerung", "gb18030": "位移"}[encoding]
+    data = lines(f"{name},Load (N)", MM, FORCE).encode(encoding)
+    guessed = f"say --units travel=mm, or what it is; the text was read as {encoding}, and --encoding says another."
+    assert refusal(data).endswith(guessed)
+    assert "--encoding" not in refusal(data, encoding=encoding)
+    assert "--encoding" not in refusal(data.decode(encoding))
+
+
 def test_without_times_a_curve_must_be_in_order() -> None:
     noisy = MM + 0.5 * np.sin(40 * np.arange(MM.size))
     text = lines("Extension (mm),Load (N)", noisy, FORCE)
