@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesmembrane.data.exports.blocks import ExportColumn, NumberBlock
-from bayesmembrane.data.exports.cells import NOT_MEASURED, Cell, clock, like_number
+from bayesmembrane.data.exports.cells import NOT_MEASURED, Cell, Marks, clock, like_number
 from bayesmembrane.data.exports.hints import Guess, Hints, pairs_of
 from bayesmembrane.data.exports.words import (
     CYCLE,
@@ -329,5 +329,8 @@ def _no_number(cell: Cell, where: str, decimal: str) -> DataError:
         return DataError("the cell is empty", where, "fill it or remove the line")
     if shown.lower() in NOT_MEASURED:
         return DataError(f'"{shown}" is not a measured value', where, "remove the line")
-    wanted = "1.5" if decimal == "." else "1,5"
+    wanted, other = ("1.5", "comma") if decimal == "." else ("1,5", "point")
+    if Marks("." if other == "point" else ",").number(cell) is not None:
+        remedy = f"say --decimal {other} if all are written so, or correct the line"
+        return DataError(f'"{shown}" is not a number like {wanted}', where, remedy)
     return DataError(f'"{shown}" is not a number', where, f"numbers here are like {wanted}: correct or remove the line")

@@ -100,6 +100,14 @@ def test_wrong_options_say_what_there_is(said: dict[str, object], message: str) 
     assert message in refusal(PLAIN, **said)
 
 
+@pytest.mark.parametrize(("decimal", "other", "sep"), [("point", "comma", ";"), ("comma", "point", ",")])
+def test_numbers_with_another_decimal_sign_than_was_said_are_not_to_be_removed(
+    decimal: str, other: str, sep: str
+) -> None:
+    text = lines(f"Weg (mm){sep}Kraft (N)", MM, FORCE, sep=sep, decimal={"comma": ",", "point": "."}[other])
+    assert f"; say --decimal {other} if all are written so" in refusal(text, decimal=decimal)
+
+
 def test_several_specimens_are_listed_and_chosen() -> None:
     second = lines(("Sample B", "Time (s),Extension (mm),Load (N)"), TIME, MM, 2 * FORCE)
     text = "Sample A\n" + PLAIN + second
