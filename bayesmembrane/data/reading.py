@@ -14,13 +14,13 @@ import numpy as np
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen, check_covariance
 from bayesmembrane.data.motion import Motion, contradicted
-from bayesmembrane.data.settings import TomlSection, load_toml
+from bayesmembrane.data.settings import TomlSection, load_specimen
 from bayesmembrane.data.tables import TextTable, parse_table, read_matrix, read_text
 from bayesmembrane.data.thinning import READ, of_few
 from bayesmembrane.ground.errors import DataError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
-from bayesmembrane.ground.units import FORCE, LENGTH, RATIO, STRESS, TIME
+from bayesmembrane.ground.units import FORCE, LENGTH, RATIO, STRESS, TIME, split_header
 
 # What lies beyond these is a wrong unit, not a film.
 THINNEST = 1e-8  # m
@@ -41,8 +41,9 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     """
     curve_csv, specimen_toml = Path(curve_csv), Path(specimen_toml)
     table = parse_table(read_text(curve_csv), str(curve_csv))
-    root = load_toml(specimen_toml)
+    root = load_specimen(specimen_toml)
     rig = _rig(root.section("rig"))
+    _check_kind(rig, table, root.section("rig").where)
     specimen = _specimen(root.section("specimen"), rig, curve_csv.stem)
     options = root.section("measurement", required=False)
     columns, notes = curve_columns(table, rig.columns, rig.noise, PHASES if rig.has_path else {})
@@ -94,6 +95,18 @@ def _rig(section: TomlSection) -> Fixture:
     if not RIG_SIZES[0] <= rig.size() <= RIG_SIZES[1]:
         raise DataError(f"a rig of {rig.size():g} m looks like a wrong unit", section.where, "check the units")
     return rig
+
+
+def _check_kind(rig: Fixture, table: TextTable, where: str) -> None:
+    """Raise `DataError` if the curve has the columns of other kinds of rig, and not those of this one."""
+    names = {split_header(h)[0].lower() for h in table.header}
+    if names >= set(rig.columns):
+        return
+    others = {kind: cls.columns for kind, cls in components("rigs").items() if names >= set(cls.columns)}
+    if others:
+        theirs = ", ".join(next(iter(others.values())))
+        fault = f'a rig of the kind "{rig.name}" reads {", ".join(rig.columns)}, and the curve has {theirs}'
+        raise DataError(fault, where, f"write a kind that reads these: {', '.join(others)}")
 
 
 def _specimen(section: TomlSection, rig: Fixture, default_name: str) -> Specimen:

@@ -24,6 +24,15 @@ def load_toml(path: Path) -> TomlSection:
         raise DataError(fault, str(path), remedy) from None
 
 
+def load_specimen(path: Path) -> TomlSection:
+    """The root section of the TOML file of a specimen; raises `DataError` if it cannot be read or has no section."""
+    root = load_toml(path)
+    if not root.table:
+        remedy = 'write [specimen] with thickness_um, and [rig] with its lengths and kind = "annulus", or another kind'
+        raise DataError("the file says nothing of film and rig", str(path), remedy)
+    return root
+
+
 def not_toml(text: str, error: ValueError | RecursionError) -> tuple[str, str]:
     """(fault, remedy) of a text that ``tomllib`` refused with ``error``."""
     if isinstance(error, RecursionError):

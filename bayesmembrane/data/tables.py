@@ -57,10 +57,7 @@ def decode(data: bytes, file: str) -> str:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise DataError("the text is not UTF-8", f"{file}, line {line}", "save the file as UTF-8") from None
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
-    if not text.strip():
-        raise DataError("the file is empty", file, "export the measurement again")
-    return text
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 @dataclass(frozen=True)
@@ -144,7 +141,8 @@ def parse_table(text: str, file: str, delimiter: str = ",", decimal: str = ".") 
         (k, line) for k, line in enumerate(text.split("\n"), 1) if line.strip() and not line.lstrip().startswith("#")
     ]
     if not lines:
-        raise DataError("the file holds nothing but comments", file, "export the measurement again")
+        fault = "the file holds nothing but comments" if text.strip() else "the file is empty"
+        raise DataError(fault, file, "export the measurement again")
     header_line, first = lines[0]
     _refuse_delimiter(first, delimiter, f"{file}, line {header_line}")
     rows = [(k, _cells(line, delimiter, f"{file}, line {k}")) for k, line in lines]

@@ -270,6 +270,35 @@ def test_fault_of_the_specimen_file(files: Files, old: str, new: str, said: str)
     assert "\n" not in message
 
 
+@pytest.mark.parametrize("specimen", ["", " \r\n", "# film 1\n"])
+def test_a_specimen_file_that_says_nothing_is_told_what_it_must_say(files: Files, specimen: str) -> None:
+    message = files.fault(specimen=specimen)
+    assert message.startswith("film.toml: the file says nothing of film and rig; write [specimen] with thickness_um")
+    assert "[rig]" in message
+
+
+@pytest.mark.parametrize(
+    ("curve", "kind", "theirs", "right"),
+    [
+        (
+            "stretch_1,stretch_2,nominal_stress_1_MPa,nominal_stress_2_kPa\n1.1,1.1,0.1,0.1\n",
+            "uniaxial",
+            "stretch_1, stretch_2, nominal_stress_1, nominal_stress_2",
+            "biaxial",
+        ),
+        ("stretch,nominal_stress_MPa\n1.1,0.1\n", "biaxial", "stretch, nominal_stress", "uniaxial"),
+        (CURVE, "uniaxial", "deflection, force", "annulus"),
+    ],
+)
+def test_columns_of_another_rig_are_a_fault_of_its_kind(
+    files: Files, curve: str, kind: str, theirs: str, right: str
+) -> None:
+    message = files.fault(curve, f'[specimen]\nthickness_um = 50.0\n[rig]\nkind = "{kind}"\n')
+    assert message.startswith(f'film.toml, [rig]: a rig of the kind "{kind}" reads ')
+    assert f"and the curve has {theirs}; write a kind that reads these: " in message
+    assert right in message.split(": ")[-1]
+
+
 def test_syntax_error_names_the_line(files: Files) -> None:
     assert "film.toml: this is not valid TOML" in files.fault(specimen="[specimen]\nname = film\n")
     assert "line 2" in files.fault(specimen="[specimen]\nname = film\n")

@@ -18,7 +18,7 @@ _LIKE_NUMBER = re.compile(
 )
 _MINUS = str.maketrans({"\u2212": "-", "\u2013": "-", "\uff0c": ",", "\uff0e": "."})
 _CLOCK = re.compile(r"(?:(\d{1,3}):)?([0-5]?\d):([0-5]?\d)(?:[.,](\d+))?", re.ASCII)
-_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}([., '])\d{3}", re.ASCII)
+_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?:([., '])\d{3}(?:\1\d{3})*)", re.ASCII)
 NOT_MEASURED = {"nan", "na", "n/a", "#n/a", "inf", "+inf", "-inf", "infinity", "null", "none", "---", "--", "-"}
 
 
@@ -74,7 +74,7 @@ def clock(cell: Cell) -> float | None:
 def evidence(cells: Iterable[str]) -> tuple[dict[str, str], bool]:
     """(first cell that needs a decimal sign, by sign; whether some cell is open between decimals and thousands).
 
-    ``0,5`` can only have a decimal comma and ``1.234,5`` too; ``1,234`` may have thousands.
+    ``0,5`` can only have a decimal comma and ``1.234,5`` too; ``1,234`` may have thousands; a date says nothing.
     """
     found: dict[str, str] = {}
     unclear = False
@@ -85,10 +85,10 @@ def evidence(cells: Iterable[str]) -> tuple[dict[str, str], bool]:
         sign, other = text[last], "," if text[last] == "." else "."
         if other in text[:last]:
             found.setdefault(sign, text)
-        elif text.count(sign) > 1:  # 1.234.567
+        elif _GROUPED.fullmatch(text) and text.count(sign) > 1:  # 1.234.567
             found.setdefault(other, text)
         elif _GROUPED.fullmatch(text):
             unclear = True
-        else:
+        elif text.count(sign) == 1:
             found.setdefault(sign, text)
     return found, unclear

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesmembrane.data.exports.blocks import ExportColumn, NumberBlock
-from bayesmembrane.data.exports.cells import NOT_MEASURED, Cell, clock
+from bayesmembrane.data.exports.cells import NOT_MEASURED, Cell, Marks, clock, like_number
 from bayesmembrane.data.exports.hints import Guess, Hints, pairs_of
 from bayesmembrane.data.exports.words import (
     CYCLE,
@@ -305,6 +305,8 @@ def _numbers(block: NumberBlock, column: ExportColumn, rows: Sequence[int]) -> t
     is_clock = clock(first) is not None
     for k, row in enumerate(rows):
         cell = _at(sheet.cells(row), column.at)
+        if sheet.doubt is not None and isinstance(cell, str) and like_number(cell) and not is_clock:
+            raise sheet.doubt
         value = clock(cell) if is_clock else marks.number(cell)
         if value is None:
             raise _no_number(cell, f"{sheet.place(row)}, column {column.header or column.at + 1}", marks.decimal)
@@ -327,5 +329,8 @@ def _no_number(cell: Cell, where: str, decimal: str) -> DataError:
         return DataError("the cell is empty", where, "fill it or remove the line")
     if shown.lower() in NOT_MEASURED:
         return DataError(f'"{shown}" is not a measured value', where, "remove the line")
-    wanted = "1.5" if decimal == "." else "1,5"
+    wanted, other = ("1.5", "comma") if decimal == "." else ("1,5", "point")
+    if Marks("." if other == "point" else ",").number(cell) is not None:
+        remedy = f"say --decimal {other} if all are written so, or correct the line"
+        return DataError(f'"{shown}" is not a number like {wanted}', where, remedy)
     return DataError(f'"{shown}" is not a number', where, f"numbers here are like {wanted}: correct or remove the line")

@@ -15,7 +15,7 @@ from bayesmembrane.data.exports.film import Film, film_of
 from bayesmembrane.data.exports.hints import Guess, Hints
 from bayesmembrane.data.exports.parts import facts_beside, part
 from bayesmembrane.data.exports.redundant import compare_rest
-from bayesmembrane.data.exports.relations import gaps, jumps, speed_against
+from bayesmembrane.data.exports.relations import far_ends, gaps, jumps, speed_against
 from bayesmembrane.data.exports.sheets import Sheet
 from bayesmembrane.data.exports.signs import carried, signed, zero_told, zeroed, zeroed_force
 from bayesmembrane.data.exports.strip import nominal_of, stretch_of
@@ -47,10 +47,10 @@ class Curve:
     notes: Sequence[str]
 
 
-def curve_of(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: Sequence[Guess] = ()) -> Curve:
+def curve_of(sheets: Sequence[Sheet], file: str, hints: Hints) -> Curve:
     """The curve in the sheets of a file; raises `DataError` or `SettingsError` where that is not sure."""
     block, found, blocks = part(sheets, file, hints)
-    export = Export(file, hints, block, found, guesses=list(guesses))
+    export = Export(file, hints, block, found, guesses=list(block.sheet.guesses))
     if len(sheets) > 1:
         export.guess("sheet", block.sheet.name, "it has the readings", "--sheet")
     facts, remarks, name = facts_beside(sheets, blocks, block)
@@ -67,7 +67,8 @@ def curve_of(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: Sequence
     _checked_order(export, columns)
     for what in ("force", "nominal_stress", "deflection", "stretch"):
         if what in columns:
-            export.contradict(jumps(what.replace("_", " "), columns[what], export.lines))
+            for sentence in (jumps, far_ends):
+                export.contradict(sentence(what.replace("_", " "), columns[what], export.lines))
     if TIME in columns:
         export.contradict(gaps(columns[TIME], export.lines))
     _outside(export, blocks)

@@ -13,8 +13,9 @@ from bayesmembrane.ground.units import UNITS
 APART = 0.02
 """Two columns contradict each other where they differ by more than this part of the larger one's range."""
 SPEED_APART = 0.10
-JUMP, STEPS = 0.02, 5.0
-"""A reading that leaves its neighbours by this part of the range, and so many times the usual step, and comes back."""
+JUMP, STEPS, FEWEST = 0.02, 5.0, 20
+"""A reading that leaves its neighbours by this part of the range, and so many times the usual step, and comes back;
+of fewer readings no step is usual."""
 REGULAR, SKIPS = 0.01, 5
 """Times whose steps differ by no more than this part are regular, and so few steps of twice the size are gaps."""
 
@@ -84,21 +85,36 @@ def speed_against(travel: Array, time: Array, speed: float, lines: Sequence[int]
 
 def jumps(what: str, values: Array, lines: Sequence[int]) -> str:
     """A sentence on readings that leave their neighbours and come back at once; "" if there are none."""
-    if values.size < 20:
-        return ""
-    step = np.abs(np.diff(values))
-    reach = float(np.ptp(np.sort(values)[1:-1]))
-    least = max(STEPS * float(np.quantile(step, 0.9)), JUMP * reach)
-    inner = (np.minimum(step[:-1], step[1:]) > least) & (
-        np.abs(values[2:] - values[:-2]) < 0.5 * np.minimum(step[:-1], step[1:])
-    )
-    bad = np.flatnonzero(np.concatenate([[step[0] > least], inner, [step[-1] > least]]))
+    step, least = _steps(values)
+    near = np.minimum(step[:-1], step[1:])
+    bad = 1 + np.flatnonzero((near > least) & (np.abs(values[2:] - values[:-2]) < 0.5 * near))
     if bad.size == 0:
         return ""
     named = ", ".join(f"{lines[k]}" for k in bad[:5]) + (" and more" if bad.size > 5 else "")
     return (
         f"the {what} leaves its neighbours and comes back at once in line {named}: damaged, or an event of the machine"
     )
+
+
+def far_ends(what: str, values: Array, lines: Sequence[int]) -> str:
+    """A sentence on a first or last reading that is as far from the one beside it as a jump; "" if neither is."""
+    step, least = _steps(values)
+    ends = {"first": (0, "a steep start"), "last": (-1, "a break")}
+    far = {name: (lines[k], event) for name, (k, event) in ends.items() if step.size and step[k] > least}
+    if not far:
+        return ""
+    named = " and ".join(f"the {name} reading (line {line})" for name, (line, _) in far.items())
+    events = ", ".join(event for _, event in far.values())
+    return f"the {what} goes far in one step at {named}: {events}, or damaged"
+
+
+def _steps(values: Array) -> tuple[Array, float]:
+    """(sizes of the steps between readings, the size beyond which one is unusual)."""
+    step = np.abs(np.diff(values))
+    if values.size < FEWEST:
+        return step, np.inf
+    reach = float(np.ptp(np.sort(values)[1:-1]))
+    return step, max(STEPS * float(np.quantile(step, 0.9)), JUMP * reach)
 
 
 def gaps(time: Array, lines: Sequence[int]) -> str:

@@ -8,11 +8,11 @@ import io
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bayesmembrane.data.exports.cells import POINT, Cell, Marks, evidence, like_number
 from bayesmembrane.data.exports.hints import Guess, Hints
-from bayesmembrane.data.exports.words import fact_of, named, reading_of
+from bayesmembrane.data.exports.words import fact_of, named, reading_of, unit_of
 from bayesmembrane.ground.errors import DataError, SettingsError
 
 BOMS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
@@ -23,6 +23,7 @@ WORKBOOK = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 MOST_BYTES = 500_000_000
 QUOTED = 12
 """Lines that a quoted name may take, at most, with its neighbours."""
+NO_SIGN = "no number has a sign"
 HEAD, SAMPLE = 400, 400
 """Lines from the beginning, and lines evenly from the rest, on which delimiter and decimal sign are decided."""
 
@@ -36,7 +37,9 @@ class Sheet:
     file, name : what errors call the file; the sheet's name, "" in a text file
     lines : line (or row) numbers of the rows that are not blank
     raw : what stands there: text to be split, or the cells
-    delimiter, marks : how cells are separated and how numbers are written
+    delimiter, marks : how cells are separated and how numbers are written as text
+    guesses : what was guessed of these
+    doubt : what to raise where a reading is taken from text, for the decimal sign is open
     """
 
     file: str
@@ -45,6 +48,8 @@ class Sheet:
     raw: Sequence[str | Sequence[Cell]]
     delimiter: str = ","
     marks: Marks = POINT
+    guesses: tuple[Guess, ...] = ()
+    doubt: DataError | None = None
 
     def __len__(self) -> int:
         """The number of rows."""
@@ -84,8 +89,8 @@ def _wide(data: bytes) -> str:
     return ""
 
 
-def text_sheet(data: bytes, file: str, hints: Hints) -> tuple[Sheet, list[Guess]]:
-    """The one sheet of a text file, and what was guessed; raises `DataError` where it cannot be told."""
+def text_sheet(data: bytes, file: str, hints: Hints) -> Sheet:
+    """The one sheet of a text file; raises `DataError` where it cannot be told."""
     text, encoding = decoded(data, file, hints)
     numbered = [(k, line) for k, line in _all_lines(text) if line.strip(' \t,;"')]
     if not numbered:
@@ -95,15 +100,15 @@ def text_sheet(data: bytes, file: str, hints: Hints) -> tuple[Sheet, list[Guess]
     sheet = Sheet(file, "", lines, raw, delimiter)
     marks, reason = _marks(sheet, hints)
     shown = next((k for k, v in DELIMITERS.items() if v == delimiter), delimiter)
-    guesses = [
-        encoding,
-        Guess("delimiter", shown, why, "--delimiter"),
-        Guess("decimal sign", "comma" if marks.decimal == "," else "point", reason, "--decimal"),
-    ]
-    return Sheet(file, "", lines, raw, delimiter, marks), guesses
+    guesses = (encoding, Guess("delimiter", shown, why, "--delimiter"), _decimal(marks, reason))
+    return replace(sheet, marks=marks, guesses=guesses)
 
 
-def workbook_sheets(data: bytes, file: str) -> list[Sheet]:
+def _decimal(marks: Marks, why: str) -> Guess:
+    return Guess("decimal sign", "comma" if marks.decimal == "," else "point", why, "--decimal")
+
+
+def workbook_sheets(data: bytes, file: str, hints: Hints) -> list[Sheet]:
     """The sheets of a workbook; raises `DataError` if it is damaged."""
     from python_calamine import CalamineError, CalamineWorkbook
 
@@ -113,12 +118,18 @@ def workbook_sheets(data: bytes, file: str) -> list[Sheet]:
     except (CalamineError, ValueError, OSError, KeyError, MemoryError) as error:
         reason = " ".join(str(error).split())[:120]
         raise DataError(f"the workbook cannot be opened ({reason})", file, "save it again as xlsx or as text") from None
-    return [_sheet_of(file, name, rows) for name, rows in found]
+    return [_sheet_of(file, name, rows, hints) for name, rows in found]
 
 
-def _sheet_of(file: str, name: str, rows: Sequence[Sequence[object]]) -> Sheet:
+def _sheet_of(file: str, name: str, rows: Sequence[Sequence[object]], hints: Hints) -> Sheet:
+    """A sheet with the decimal sign of the numbers that it holds as text; nothing is told where there are none."""
     kept = [(k, [_cell(c) for c in row]) for k, row in enumerate(rows, 1) if any(c != "" for c in row)]
-    return Sheet(file, name, [k for k, _ in kept], [r for _, r in kept])
+    sheet = Sheet(file, name, [k for k, _ in kept], [r for _, r in kept])
+    try:
+        marks, why = _marks(sheet, hints)
+    except DataError as error:
+        return replace(sheet, doubt=error)
+    return sheet if why == NO_SIGN else replace(sheet, marks=marks, guesses=(_decimal(marks, why),))
 
 
 def _cell(value: object) -> Cell:
@@ -166,6 +177,17 @@ def decoded(data: bytes, file: str, hints: Hints) -> tuple[str, Guess]:
         return _decode(data, name, file), Guess("encoding", name, why, "--encoding")
 
 
+def guessed_encoding(data: bytes, hints: Hints) -> str:
+    """The encoding of one or two bytes a letter in which a file is read by its words alone; "" if more tells it."""
+    if hints.encoding or is_workbook(data) or b"\0" in data or data.startswith(tuple(BOMS)):
+        return ""
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return _eight_bits(data)[0]
+    return ""
+
+
 def _decode(data: bytes, encoding: str, file: str) -> str:
     try:
         return data.decode(encoding)
@@ -192,16 +214,17 @@ def _eight_bits(data: bytes) -> tuple[str, str]:
     """The encoding of one or two bytes a letter in which most words of the file are words, and why."""
     lines = [line for line in re.split(rb"[\r\n]+", data)[:HEAD] if not line.isascii()]
     lines = lines or [line for line in re.split(rb"[\r\n]+", data) if not line.isascii()][:HEAD]
-    scores = {}
+    texts = {}
     for name in ENCODINGS:
         try:
-            scores[name] = sum(_sense(line.decode(name)) for line in lines)
+            texts[name] = [line.decode(name) for line in lines]
         except UnicodeError:
             continue
-    if not scores:
+    if not texts:
         return "latin-1", "nothing else fits its bytes"
-    best = max(scores.values())
-    equal = [name for name, score in scores.items() if score == best]
+    scores = {name: sum(_sense(line) for line in text) for name, text in texts.items()}
+    best = [name for name, score in scores.items() if score == max(scores.values())]
+    equal = [name for k, name in enumerate(best) if texts[name] not in [texts[other] for other in best[:k]]]
     if len(equal) > 1:
         chosen = _normalizers_choice(data, equal)
         return chosen, f"it is not UTF-8, and its words read as well in {' and '.join(equal)}"
@@ -216,14 +239,28 @@ def _normalizers_choice(data: bytes, equal: list[str]) -> str:
     return next((e for e in equal if e.replace("_", "-") == name), equal[0])
 
 
+_LONE = re.compile("(?<![\u2e80-\uffff])[\u2e80-\uffff](?![\u2e80-\uffff])")
+"""A letter of the East between letters of the West, as two bytes of the West make it: ``µm`` and ``°C``."""
+
+
+def _is_common(letter: str) -> bool:
+    """Whether a letter of the East is one that also stands alone: 力, and not 祄."""
+    try:
+        return bool(letter.encode("gb2312"))
+    except UnicodeEncodeError:
+        return False
+
+
 def _sense(line: str) -> int:
-    """How many cells of a line are words of a machine, less what is no word of any language."""
+    """How many cells of a line are words of a machine or known units, less what is no word of any language."""
     score = 0
     for cell in re.split(r'[\t;,"|]+', line):
         if cell.isascii():
             continue
         name = named(cell)
         score += 4 * bool(reading_of(name.name).role or fact_of(cell) or fact_of(name.name))
+        score += 2 * any(unit_of(text) for text in (name.unit, cell) if not text.isascii())
+        score -= sum(not _is_common(letter) for letter in _LONE.findall(cell))
         score -= sum(1 for a, b in zip(cell, cell[1:] + " ", strict=True) if _odd(a, b))
     return score
 
@@ -237,7 +274,8 @@ def _odd(a: str, b: str) -> bool:
         return True
     # Signs inside words, and letters of no European language between Latin ones.
     strange = [ord(c) > 127 and not c.isalpha() and c not in "°²³µ€–—·" for c in (a, b)]
-    inside = (a in "²³°" and b.isalpha()) or (strange[0] and b.isalpha()) or (a.isalpha() and strange[1])
+    raised = a in "²³°" and b.isalpha() and a + b not in ("°C", "°F")
+    inside = raised or (strange[0] and b.isalpha()) or (a.isalpha() and strange[1])
     return inside or 0x80 <= ord(a) < 0xA0
 
 
@@ -297,17 +335,18 @@ def _numeric_width(cells: Sequence[str]) -> int:
 def _marks(sheet: Sheet, hints: Hints) -> tuple[Marks, str]:
     if hints.decimal:
         return Marks(DECIMALS[hints.decimal]), "it was said"
-    found: dict[str, tuple[str, int]] = {}
+    found: dict[str, tuple[str, str]] = {}
     counts: Counter[str] = Counter()
     unclear = ""
     step = max((len(sheet) - HEAD) // SAMPLE, 1)
     for row in [*range(min(HEAD, len(sheet))), *range(HEAD, len(sheet), step)]:
-        cells = [c for c in sheet.cells(row) if isinstance(c, str) and like_number(c)]
-        if len(cells) < 2:
+        numbers = [c for c in sheet.cells(row) if like_number(c)]
+        if len(numbers) < 2:
             continue
+        cells = [c for c in numbers if isinstance(c, str)]
         signs, doubtful = evidence(cells)
         for sign, cell in signs.items():
-            found.setdefault(sign, (cell, sheet.lines[row]))
+            found.setdefault(sign, (cell, sheet.line(row)))
             counts[sign] += 1
         if doubtful and not unclear:
             unclear = next(c for c in cells if evidence([c])[1])
@@ -315,16 +354,16 @@ def _marks(sheet: Sheet, hints: Hints) -> tuple[Marks, str]:
         (sign, n), (other, m) = counts.most_common(2)
         if m > 0.02 * n or n < 20:
             (a, k), (b, j) = found[sign], found[other]
-            fault = f'"{b}" has another decimal sign than the numbers before it ("{a}" in line {k})'
-            raise DataError(fault, f"{sheet.file}, line {j}", "write all numbers with one sign, or say --decimal")
-        return Marks(sign), f'"{found[sign][0]}" in line {found[sign][1]} can be read in no other way'
+            fault = f'"{b}" has another decimal sign than the numbers before it ("{a}" in {k})'
+            raise DataError(fault, f"{sheet.file}, {j}", "write all numbers with one sign, or say --decimal")
+        return Marks(sign), f'"{found[sign][0]}" in {found[sign][1]} can be read in no other way'
     if found:
         ((sign, (cell, line)),) = found.items()
-        return Marks(sign), f'"{cell}" in line {line} can be read in no other way'
+        return Marks(sign), f'"{cell}" in {line} can be read in no other way'
     if unclear:
         raise DataError(
             f'"{unclear}" may have decimals or thousands, and no number of the file says which',
             sheet.file,
             "say --decimal point or --decimal comma",
         )
-    return Marks(), "no number has a sign"
+    return Marks(), NO_SIGN

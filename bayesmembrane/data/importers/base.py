@@ -17,10 +17,10 @@ import tomli_w
 from bayesmembrane.data.exports.curve import curve_of
 from bayesmembrane.data.exports.film import UNKNOWN, Film
 from bayesmembrane.data.exports.hints import Guess, Hints
-from bayesmembrane.data.exports.sheets import Sheet, is_workbook, text_sheet, workbook_sheets
+from bayesmembrane.data.exports.sheets import Sheet, guessed_encoding, is_workbook, text_sheet, workbook_sheets
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.reading import read_measurement
-from bayesmembrane.data.settings import TomlSection, load_toml
+from bayesmembrane.data.settings import TomlSection, load_specimen
 from bayesmembrane.data.tables import read_bytes
 from bayesmembrane.data.writing import csv_text, write_new
 from bayesmembrane.ground.errors import DataError, SettingsError
@@ -127,8 +127,10 @@ class TableImporter(Importer):
 
     @classmethod
     def read_with(cls, data: bytes, file: str, hints: Hints) -> Imported:
-        sheets, guesses = cls.sheets(data, file, hints)
-        curve = curve_of(sheets, file, hints, guesses)
+        try:
+            curve = curve_of(cls.sheets(data, file, hints), file, hints)
+        except (DataError, SettingsError) as error:
+            raise _naming_encoding(error, guessed_encoding(data, hints)) from None
         return Imported(
             curve.columns,
             f"imported from {file}",
@@ -140,12 +142,18 @@ class TableImporter(Importer):
         )
 
     @classmethod
-    def sheets(cls, data: bytes, file: str, hints: Hints) -> tuple[Sequence[Sheet], list[Guess]]:
-        """The rows of a file, and what was guessed to get them."""
-        if is_workbook(data):
-            return workbook_sheets(data, file), []
-        sheet, guesses = text_sheet(data, file, hints)
-        return [sheet], guesses
+    def sheets(cls, data: bytes, file: str, hints: Hints) -> Sequence[Sheet]:
+        """The rows of a file."""
+        return workbook_sheets(data, file, hints) if is_workbook(data) else [text_sheet(data, file, hints)]
+
+
+def _naming_encoding(error: DataError | SettingsError, encoding: str) -> DataError | SettingsError:
+    """The error; its remedy names the encoding of the file if that was guessed, for it may be what is wrong."""
+    remedy = error.remedy or ""
+    if not encoding or "--encoding" in remedy:
+        return error
+    guess = f"the text was read as {encoding}, and --encoding says another"
+    return type(error)(error.what, error.where, f"{remedy.rstrip('. ')}; {guess}" if remedy else guess)
 
 
 def head(data: bytes, length: int = 20_000) -> str:
@@ -286,7 +294,7 @@ def _refuse_layout(file: str) -> Any:
 
 
 def _template(specimen: str | Path | None) -> TomlSection | None:
-    return None if specimen is None else load_toml(Path(specimen))
+    return None if specimen is None else load_specimen(Path(specimen))
 
 
 def _completed(hints: Hints, template: TomlSection | None) -> Hints:

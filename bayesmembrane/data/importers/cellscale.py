@@ -46,11 +46,10 @@ class CellScale(TableImporter):
                 f'the file has two axes, and the rig "{hints.rig}" has one',
                 remedy='leave --rig out, or name one axis, --columns "travel=XDisplacement_um,force=XForce_mN"',
             )
-        sheets, guesses = cls.sheets(data, file, hints)
-        return _two_axes(sheets, file, hints, guesses)
+        return _two_axes(cls.sheets(data, file, hints), file, hints)
 
 
-def _two_axes(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: list[Guess]) -> Imported:
+def _two_axes(sheets: Sequence[Sheet], file: str, hints: Hints) -> Imported:
     if not hints.thickness:
         raise DataError("the forces cannot become stresses: the thickness is not known", file, "say --thickness-um")
     block = max((b for s in sheets for b in blocks_of(s)), key=lambda b: len(b.rows), default=None)
@@ -67,9 +66,9 @@ def _two_axes(sheets: Sequence[Sheet], file: str, hints: Hints, guesses: list[Gu
         raise DataError("a stretch below zero cannot be", block.place, "check the sizes and displacements")
     shown = f"{1e3 * size['x']:.5g} x {1e3 * size['y']:.5g} mm"
     why = "these are the sizes in the first reading; each force is carried over the size across it"
-    guesses.append(Guess("size at rest", shown, why, "--columns"))
+    guesses = (*block.sheet.guesses, Guess("size at rest", shown, why, "--columns"))
     film = Film(hints.name, hints.thickness, size["y"], size["x"])
-    return Imported(columns, f"imported from {file}", (), tuple(guesses), (), film, "biaxial")
+    return Imported(columns, f"imported from {file}", (), guesses, (), film, "biaxial")
 
 
 def _column(block: NumberBlock, name: str, hints: Hints) -> Array:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from bayesmembrane.data.exports.hints import Guess, Hints
+from bayesmembrane.data.exports.hints import Hints
 from bayesmembrane.data.exports.sheets import Sheet
 from bayesmembrane.data.importers.base import TableImporter, head
 
@@ -31,10 +31,14 @@ class Mts(TableImporter):
         return bool(_WORDS.search(head(data)))
 
     @classmethod
-    def sheets(cls, data: bytes, file: str, hints: Hints) -> tuple[Sequence[Sheet], list[Guess]]:
+    def sheets(cls, data: bytes, file: str, hints: Hints) -> Sequence[Sheet]:
         said = _FIRST.match(head(data, 200))
         if said is None or hints.decimal:
             return super().sheets(data, file, hints)
         decimal = "comma" if said["decimal"] == "," else "point"
-        sheets, guesses = super().sheets(data, file, replace(hints, decimal=decimal))
-        return sheets, [g._replace(why="the first line says so") if g.what == "decimal sign" else g for g in guesses]
+        return [_by_first_line(s) for s in super().sheets(data, file, replace(hints, decimal=decimal))]
+
+
+def _by_first_line(sheet: Sheet) -> Sheet:
+    why = "the first line says so"
+    return replace(sheet, guesses=tuple(g._replace(why=why) if g.what == "decimal sign" else g for g in sheet.guesses))

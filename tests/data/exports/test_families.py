@@ -52,6 +52,36 @@ def test_each_specimen_of_a_workbook_has_its_own_sizes() -> None:
         assert np.array_equal(imported(data, sheet=f"Values film {k}").columns["stretch"], found.columns["stretch"])
 
 
+def texts(form: str, *columns: np.ndarray) -> bytes:
+    """Readings whose columns are text with decimal commas, behind one of numbers."""
+    book = openpyxl.Workbook()
+    sheet = book.active
+    assert sheet is not None
+    for row in [["Datum", "20.02.2008", 1.0], ["Zeit", "Weg", "Kraft"], ["s", "mm", "mN"]]:
+        sheet.append(row)
+    for row in zip(TIME, *columns, strict=True):
+        sheet.append([float(row[0]), *((form % v).replace(".", ",") for v in row[1:])])
+    out = io.BytesIO()
+    book.save(out)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize("said", [{"decimal": "comma"}, {}])
+def test_numbers_that_a_workbook_holds_as_text_have_their_decimal_sign(said: dict[str, str]) -> None:
+    found = imported(texts("%.5f", MM, 1e3 * FORCE), **said)
+    assert found.columns["deflection"] == pytest.approx(TRAVEL, abs=1e-8)
+    assert found.columns["force"] == pytest.approx(FORCE, abs=1e-8)
+    assert [g.value for g in found.guesses if g.what == "decimal sign"] == ["comma"]
+    assert not [g for g in imported(workbook(), part="1").guesses if g.what == "decimal sign"]
+
+
+def test_text_of_a_workbook_that_may_have_thousands_is_refused_until_it_is_said() -> None:
+    data = texts("%.3f", MM + 1, 1e3 * FORCE + 1)
+    with pytest.raises(DataError, match=r"may have decimals or thousands.*say --decimal point or --decimal comma"):
+        imported(data)
+    assert imported(data, decimal="comma", zero="none").columns["force"] == pytest.approx(FORCE + 1e-3, abs=1e-6)
+
+
 def named_sheets() -> bytes:
     """Two specimens whose sheets bear the names of the results, and other names above their readings."""
     book = openpyxl.Workbook()

@@ -95,6 +95,34 @@ def test_languages(encoding: str, header: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("encoding", "header"),
+    [
+        ("cp1252", "Time (s)\tExtension (µm)\tLoad (N)"),
+        ("cp1252", "Zeit [s]\tWeg [µm]\tKraft [N]"),
+        ("cp1252", "Time\tExtension\tLoad\ns\tµm\tN"),
+        ("cp1252", "Time_s\tExtension_µm\tLoad_N"),
+        ("cp1252", "23 °C\nTime (s)\tExtension (µm)\tLoad (N)"),
+        ("cp1250", "Czas [s]\tPrzemieszczenie [µm]\tSiła [N]"),
+        ("gbk", "时间(s)\t位移(μm)\t力(N)"),
+        ("gbk", "时间\t位移\t力\ns\tμm\tN"),
+    ],
+)
+def test_signs_of_units_tell_the_encoding(encoding: str, header: str) -> None:
+    same_force(imported(lines(header, TIME, 1e6 * TRAVEL, FORCE, sep="\t").encode(encoding)))
+
+
+@pytest.mark.parametrize(
+    ("encoding", "column"),
+    [("cp1252", "Temp (°C)"), ("cp1252", "Temp [°F]"), ("cp1252", "Winkel [°]"), ("gbk", "温度(℃)"), ("gbk", "力 2")],
+)
+def test_a_column_beside_tells_the_encoding(encoding: str, column: str) -> None:
+    header = f"Time (s)\tExtension (mm)\tLoad (N)\t{column}"
+    found = imported(lines(header, TIME, 1e3 * TRAVEL, FORCE, TIME, sep="\t").encode(encoding), units="力 2=%")
+    same_force(found)
+    assert f"ignored columns: {column}" in found.notes
+
+
+@pytest.mark.parametrize(
     ("unit", "per_newton"),
     [
         ("N", 1.0),
@@ -160,6 +188,11 @@ def test_a_stress_that_grows_with_the_stretch_is_true() -> None:
     found = imported(lines("Strain (%),Force (N),Stress (MPa)", *columns, form="%.9g").encode())
     same_stretch(found)
     assert any(g.what == "stress" and "is true" in g.value for g in found.guesses)
+
+
+def test_a_date_has_no_decimal_sign() -> None:
+    text = lines("Time (s);Extension (mm);Load (N);Datum", TIME, 1e3 * TRAVEL, FORCE, sep=";")
+    same_force(imported(text.replace("\n", ";20.02.2008\n").replace("Datum;20.02.2008", "Datum").encode()))
 
 
 def test_thousands_in_quotes() -> None:

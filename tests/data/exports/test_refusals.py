@@ -61,6 +61,16 @@ def test_a_file_that_leaves_something_open_is_refused(text: str | bytes, said: l
     assert [s for s in said if s not in message] == []
 
 
+@pytest.mark.parametrize("encoding", ["cp1252", "gb18030"])
+def test_a_refusal_names_an_encoding_that_was_guessed(encoding: str) -> None:
+    name = {"cp1252": "Verlängerung", "gb18030": "位移"}[encoding]
+    data = lines(f"{name},Load (N)", MM, FORCE).encode(encoding)
+    guessed = f"say --units travel=mm, or what it is; the text was read as {encoding}, and --encoding says another."
+    assert refusal(data).endswith(guessed)
+    assert "--encoding" not in refusal(data, encoding=encoding)
+    assert "--encoding" not in refusal(data.decode(encoding))
+
+
 def test_without_times_a_curve_must_be_in_order() -> None:
     noisy = MM + 0.5 * np.sin(40 * np.arange(MM.size))
     text = lines("Extension (mm),Load (N)", noisy, FORCE)
@@ -88,6 +98,14 @@ def test_without_times_a_curve_must_be_in_order() -> None:
 )
 def test_wrong_options_say_what_there_is(said: dict[str, object], message: str) -> None:
     assert message in refusal(PLAIN, **said)
+
+
+@pytest.mark.parametrize(("decimal", "other", "sep"), [("point", "comma", ";"), ("comma", "point", ",")])
+def test_numbers_with_another_decimal_sign_than_was_said_are_not_to_be_removed(
+    decimal: str, other: str, sep: str
+) -> None:
+    text = lines(f"Weg (mm){sep}Kraft (N)", MM, FORCE, sep=sep, decimal={"comma": ",", "point": "."}[other])
+    assert f"; say --decimal {other} if all are written so" in refusal(text, decimal=decimal)
 
 
 def test_several_specimens_are_listed_and_chosen() -> None:
@@ -241,6 +259,16 @@ def test_two_thicknesses_count_as_none() -> None:
 def test_a_reading_that_jumps_is_reported() -> None:
     text = damaged(PLAIN, 12, 2, "40.0")
     assert "the force leaves its neighbours and comes back at once in line 12" in contradictions(text)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [(2, "first reading (line 2): a steep start, or damaged"), (26, "last reading (line 26): a break, or damaged")],
+)
+def test_an_end_reading_does_not_come_back(line: int, said: str) -> None:
+    found = contradictions(damaged(PLAIN, line, 2, "0.25"))
+    assert f"the force goes far in one step at the {said}" in found
+    assert "comes back" not in found
 
 
 # ---- every guess -----------------------------------------------------------------------------------------------------
