@@ -66,15 +66,10 @@ class Mullins(Carried):
         return [{"damage": 0.05}, {"damage": 0.95}]
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
-        at, reached = (np.atleast_2d(np.asarray(v, dtype=float)) for v in (state.deflection, state.reached))
-        lost = np.empty(np.broadcast_shapes(force.shape, at.shape, (len(p), 1)))
-        _lost(
-            np.ascontiguousarray(p),
-            np.ascontiguousarray(at),
-            np.ascontiguousarray(reached),
-            state.path.full_range,
-            lost,
-        )
+        # What may only be read is another type to numba, for which it would be compiled again.
+        given = [np.require(np.atleast_2d(v), float, ("C", "W")) for v in (p, state.deflection, state.reached)]
+        lost = np.empty((len(p), given[1].shape[1]))
+        _lost(*given, state.path.full_range, lost)
         return np.asarray(force * np.maximum(1.0 - p[:, :1] * lost, 0.0))
 
 

@@ -1,0 +1,39 @@
+"""What is compiled ahead: the solvers of every ordinary material, every effect, every noise model."""
+
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from bayesmembrane.app import ahead
+from bayesmembrane.ground.compiling import compilation
+from bayesmembrane.ground.jobs import silent, workers
+from bayesmembrane.ground.registry import ordinary_materials
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
+
+
+def test_every_ordinary_material_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+
+    @contextmanager
+    def here() -> Any:
+        with workers(count=1) as submit:
+            yield submit
+
+    monkeypatch.setattr(ahead, "workers", here)
+    monkeypatch.setattr(ahead, "_material", lambda name, tell: asked.append(name))
+    for part in ("_effects", "_noises"):
+        monkeypatch.setattr(ahead, part, lambda tell, part=part: asked.append(part))
+    ahead.main()
+    assert asked == [*ordinary_materials(), "_effects", "_noises"]
+
+
+def test_nothing_is_left_to_be_compiled_for_films_with_effects() -> None:
+    ahead._effects(silent)
+    m = ahead._read("synthetic_cyclic")
+    claim = hypothesis("neo_hookean", ["mullins", "viscoelastic", "tearing", "machine_compliance"])
+    x = [[float(p.prior.quantile(0.6)) for p in claim.parameters]]
+    with compilation() as found:
+        assert Forward(claim, m, m.deflection)(x, sensitivities=True, reached=False).force.shape == (1, len(m))
+    assert found.seconds == 0.0
