@@ -67,7 +67,7 @@ class HeldOut:
 
     cycle : number of the cycle that was set aside, the last of ``cycles``; every fourth block of points if ``cycles``
         is 1
-    before, after : errors there of the plain and of the chosen model alone, both fitted to the other points
+    before, after : errors there of the plain and of the chosen model, both fitted to the other points
     chosen : label of the most probable of the rivals when these points are left out
     covered_before, covered_after : part of these points inside the 90 % bands of the two predictions, noise included
     """
@@ -115,13 +115,11 @@ def _on_the_others(search: Search, mask: NDArray[np.bool_]) -> Search:
 def _predicted(part: Search, fit: Candidate, search: Search, mask: NDArray[np.bool_]) -> tuple[Misfit, float]:
     """(error, part inside the 90 % band) of a model fitted to the others, at the points of ``mask``.
 
-    The error is that of the model alone, as in sample. About the band its form error goes on as far as it is smooth; it
-    has what is not known of that, of the coordinates, and noise.
+    Its form error goes on as far as it is smooth; the band has what is not known of it, of the coordinates, and noise.
     """
     whole, sd = search.measurement, search.noise.each[mask] * float(np.exp(fit.theta[0]))
     forward = Forward(fit.hypothesis, whole, whole.deflection, search.quick)
     new = continued(part, fit, forward, search.factors)
-    residual, here = (whole.force - new.force)[mask], new.columns[mask]
+    residual, here = (whole.force - new.force - new.moved)[mask], new.columns[mask]
     band = HELD_OUT.band * np.sqrt(np.einsum("ni,ij,nj->n", here, new.covariance, here) + sd**2)
-    inside = np.abs(residual - new.moved[mask]) <= band
-    return misfit_of(residual, search.noise.each[mask]), float(np.mean(inside))
+    return misfit_of(residual, search.noise.each[mask]), float(np.mean(np.abs(residual) <= band))
