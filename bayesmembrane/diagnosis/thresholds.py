@@ -261,6 +261,12 @@ class GrowthThresholds:
     """Sets of each size that are searched for from all of their parts."""
     again_reach: float = 12.0
     """ln of the Bayes factor, as far as factors count, behind the best of all, beyond which they are not."""
+    crossed: float = 0.005
+    """Share in the sum from which on a hypothesis is searched for from the materials of others of its energy."""
+    most_crossed: int = 16
+    """Hypotheses of which that is done, at most."""
+    crossed_with: int = 3
+    """Others whose materials are taken for each, at most."""
     share_reach: float = 40.0
     """ln of the odds against the most probable hypothesis, beyond which one has no share in the sum."""
     worth: float = 1e-3

@@ -21,6 +21,12 @@ if TYPE_CHECKING:
 place = 9
 
 CANDIDATES = 8
+WHEN = {
+    "before": "before",
+    "after": "after",
+    "heldout_before": "before, held out, form error going on",
+    "heldout_after": "after, held out, form error going on",
+}
 
 
 def verb(
@@ -111,7 +117,7 @@ def show(document: dict[str, Any], measurement: Measurement) -> None:
     ]
     table("Candidates", ["effect or energy", "probability", "ln Bayes factor", "unexplained", "parameters"], rows)
     errors = [
-        [when, f"{factor * e['rmse_N']:.3g}", f"{factor * e['max_N']:.3g}", f"{e['reduced_chi2']:.2f}"]
+        [WHEN[when], f"{factor * e['rmse_N']:.3g}", f"{factor * e['max_N']:.3g}", f"{e['reduced_chi2']:.2f}"]
         for when, e in document["error"].items()
         if isinstance(e, dict)
     ]

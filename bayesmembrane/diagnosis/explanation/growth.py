@@ -122,6 +122,7 @@ def grown(case: DiagnosisCase) -> Grown:
         _with_pairs(out)
         _with_twins(out)
     _with_parts(out)
+    _with_crossed(out)
     _checked(out)
     return out
 
@@ -199,6 +200,27 @@ def _with_parts(out: Grown) -> None:
     steps = [(c, name) for c in near for name in _own(out, c)]
     new = [(c, n) for c, n in steps if (c.hypothesis.material.name, frozenset(c.names) - {n}) not in out.found]
     _search_on(out, [without_effect(c, name) for c, name in new])
+
+
+def _with_crossed(out: Grown) -> None:
+    """What has a share in the sum once more, from the materials of others of its energy that have one.
+
+    The valley of an energy with many parameters is bent and has several ends: to which of them a search comes hangs on
+    round-off, and what was found beside other effects may lead to a better one.
+    """
+    shares = _shares(out, out.seen())
+    order = sorted((k for k, share in shares.items() if share > np.log(GROWTH.crossed)), key=lambda k: -shares[k])
+    sought = []
+    for key in order[: GROWTH.most_crossed]:
+        c = out.found[key]
+        size = c.hypothesis.material_size
+        others = [out.found[k].x[:size] for k in order if k[0] == key[0] and k != key][: GROWTH.crossed_with]
+        if size > 1 and others:
+            sought.append(Sought(c.hypothesis, [np.concatenate([m, c.x[size:]]) for m in others], c))
+    found = [c for c in out.search.fits(sought) if c is not None]
+    near = [c for c in found if c.log_evidence > out.found[key_of(c)].log_evidence - GROWTH.less_gain]
+    for c in out.search.all_polished(near):
+        out.add(c)
 
 
 def _own(out: Grown, c: Candidate) -> list[str]:

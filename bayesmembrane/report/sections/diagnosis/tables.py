@@ -38,7 +38,7 @@ def errors_caption(where: str) -> str:
     """What a table of errors says; ``where`` : which points were held out."""
     return (
         "Errors of the best fits, each as it was fitted last (a reduced chi-square of 1 is noise alone). Held "
-        f"out: {where}; predicted by the model fitted to the other points."
+        f"out: {where}; predicted by the model fitted to the other points, its form error going on from there."
     )
 
 
