@@ -1,5 +1,6 @@
 """Sets of effects grow one by one, and are looked back at: what led the search need not stay."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -14,6 +15,7 @@ from bayesmembrane.diagnosis.explanation.growth import (
     Grown,
     _last_steps,
     _promising_pairs,
+    _with_crossed,
     _with_exchanged,
     _with_less,
     _with_parts,
@@ -87,6 +89,33 @@ def test_what_decides_is_fitted_without_each_of_its_effects(monkeypatch: pytest.
     assert grown.found["gent", FRICTION].log_evidence == -9.5
     _with_parts(grown)
     assert shelf.asked == [FRICTION]
+
+
+def test_what_decides_is_searched_for_from_the_materials_of_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each from those of its energy that have a share, with its own effects; a better end is polished and kept."""
+    monkeypatch.setattr(growth, "all_seen", lambda _, found, *__: dict.fromkeys(found, 0.0))
+    odds = [SimpleNamespace(odds=1.0) for _ in range(4)]
+    plain = candidate(claim(), -90.0)
+    one, two = (candidate(claim(n), z) for n, z in (("friction", -10.0), ("mullins", -10.5)))
+    one = replace(one, x=one.x + 100.0)
+    asked: list[Any] = []
+
+    def fits(sought: list[Any]) -> list[Candidate | None]:
+        asked.extend(sought)
+        return [candidate(s.hypothesis, -30.0 if s.hypothesis is one.hypothesis else -9.0) for s in sought]
+
+    search = SimpleNamespace(fits=fits, all_polished=lambda every: every)
+    case = SimpleNamespace(null=plain, plain={"gent": plain}, visible=odds, question=SimpleNamespace(energy=None))
+    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
+    for c in (plain, one, two):
+        grown.add(c)
+    _with_crossed(grown)
+    assert [s.hypothesis for s in asked] == [one.hypothesis, two.hypothesis]
+    for s, own, other in zip(asked, (one, two), (two, one), strict=True):
+        ((start,),) = (s.starts,)
+        size = own.hypothesis.material_size
+        np.testing.assert_array_equal(start, [*other.x[:size], *own.x[size:]])
+    assert {n: c.log_evidence for (_, n), c in grown.found.items() if n} == {FRICTION: -10.0, MULLINS: -9.0}
 
 
 def test_what_was_found_before_is_not_lost() -> None:
@@ -200,7 +229,7 @@ def test_nothing_grows_where_a_limit_leaves_noise_alone(monkeypatch: pytest.Monk
 
     for step in ("_with_less", "_with_exchanged", "_with_pairs", "_with_twins"):
         monkeypatch.setattr(growth, step, lambda *_, step=step: grew.append(step))
-    for step in ("_with_parts", "_checked", "_with_other_energies"):
+    for step in ("_with_parts", "_with_crossed", "_checked", "_with_other_energies"):
         monkeypatch.setattr(growth, step, lambda *_: None)
     monkeypatch.setattr(growth, "_add_effects", add)
     monkeypatch.setattr(growth, "_worth_more", lambda *_: False)
