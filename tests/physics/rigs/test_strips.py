@@ -123,6 +123,9 @@ def test_files_come_back(kind: str, tmp_path: Path) -> None:
 def test_another_column_is_asked_for(tmp_path: Path) -> None:
     (tmp_path / "c.csv").write_text("deflection_mm,force_N\n1,1\n2,2\n")
     (tmp_path / "c.toml").write_text('[specimen]\nthickness_um = 500\n[rig]\nkind = "uniaxial"\n')
+    with pytest.raises(DataError, match="reads stretch, nominal_stress, and the curve has deflection, force"):
+        read_measurement(tmp_path / "c.csv", tmp_path / "c.toml")
+    (tmp_path / "c.csv").write_text("time_s,nominal_stress_MPa\n1,1\n2,2\n")
     with pytest.raises(DataError, match="the column stretch is missing"):
         read_measurement(tmp_path / "c.csv", tmp_path / "c.toml")
 
