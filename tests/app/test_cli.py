@@ -185,7 +185,8 @@ def test_errors_of_a_strip_are_told_in_stress(run: Run, tmp_path: Path) -> None:
     code, out, err = run("diagnose", tmp_path / "c.csv", "--specimen", tmp_path / "c.toml", "--material", "neo_hookean")
     assert code == 0, err
     assert "root mean square, MPa" in out
-    (line,) = (x for x in out.splitlines() if "before" in x and "heldout" not in x)
+    assert "the form error going on from there" in out
+    (line,) = (x for x in out.splitlines() if "before" in x and "held out" not in x)
     shown = [float(x) for x in line.replace("│", " ").split()[1:3]]
     assert shown[0] == pytest.approx(6e-3, rel=0.05)
     assert 6e-3 <= shown[1] < 9e-3

@@ -24,8 +24,8 @@ CANDIDATES = 8
 WHEN = {
     "before": "before",
     "after": "after",
-    "heldout_before": "before, held out, form error going on",
-    "heldout_after": "after, held out, form error going on",
+    "heldout_before": "held out, before",
+    "heldout_after": "held out, after",
 }
 
 
@@ -122,6 +122,8 @@ def show(document: dict[str, Any], measurement: Measurement) -> None:
         if isinstance(e, dict)
     ]
     table("Errors", ["", f"root mean square, {unit}", f"largest, {unit}", "reduced chi-square"], errors)
+    if document["error"]["heldout_before"] is not None:
+        say("Held-out points are predicted from the others, the form error going on from there.")
     for sentence in document["absorbed"]:
         say(sentence)
     for step in document["next_measurements"]:
