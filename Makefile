@@ -56,7 +56,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(PY) -m pip install --quiet --disable-pip-version-check --constraint constraints.txt hatchling editables
 	$(PY) -m pip install --quiet --disable-pip-version-check --constraint constraints.txt \
 	  --no-build-isolation --editable '.[test]'
-	$(PY) -m bayesmembrane.app.ahead
+	$(PY) -m bayesmembrane.app.precompile
 	@touch $(STAMP)
 
 demo: $(STAMP)

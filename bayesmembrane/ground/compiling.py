@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
@@ -41,6 +42,14 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         return made
 
     return wrap
+
+
+def for_kernel(values: Any) -> Any:
+    """Floats as a kernel takes them: in C's order, and writable.
+
+    What may only be read is another type to numba, for which all of a kernel would be compiled again.
+    """
+    return np.require(values, float, ("C", "W"))
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.ground.compiling import compiled
+from bayesmembrane.ground.compiling import compiled, for_kernel
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 
@@ -66,8 +66,7 @@ class Mullins(Carried):
         return [{"damage": 0.05}, {"damage": 0.95}]
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
-        # What may only be read is another type to numba, for which it would be compiled again.
-        given = [np.require(np.atleast_2d(v), float, ("C", "W")) for v in (p, state.deflection, state.reached)]
+        given = [for_kernel(np.atleast_2d(v)) for v in (p, state.deflection, state.reached)]
         lost = np.empty((len(p), given[1].shape[1]))
         _lost(*given, state.path.full_range, lost)
         return np.asarray(force * np.maximum(1.0 - p[:, :1] * lost, 0.0))

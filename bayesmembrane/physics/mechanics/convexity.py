@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bayesmembrane.ground.compiling import for_kernel
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.base import Material
@@ -92,13 +93,12 @@ def box_margins(
     Raises `SettingsError` unless 0 < low < high, or if the shape of ``parameters`` is wrong.
     """
     _check_box(low, high)
-    # What may only be read is another type to numba, for which all of it would be compiled again.
-    p = np.require(parameters, float, ("C", "W"))
+    p = for_kernel(parameters)
     if p.ndim != 2 or p.shape[1] != len(material.field_names()):
         raise SettingsError(
             f"the parameters of {material.name} need the shape (films, {len(material.field_names())}), not {p.shape}"
         )
-    limit = np.require(np.broadcast_to(material.extensibility(p.T), p.shape[:1]), float, ("C", "W"))
+    limit = for_kernel(np.broadcast_to(material.extensibility(p.T), p.shape[:1]))
     margins = np.empty(len(p))
     bind(KERNELS, material).margins_of(p, limit, float(low), float(high), sign_only, margins)
     return np.asarray(margins / _modulus(material, p.T))

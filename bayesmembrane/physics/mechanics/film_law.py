@@ -159,8 +159,8 @@ def film_law(asked: Request, end: Array, solver: Solve = solve) -> tuple[FilmLaw
     gap = Gap(asked.inner_radius, asked.outer_radius)
     rows = np.arange(len(asked.parameters))
     found = shown = None
-    every_count = KNOTS if np.max(end) <= FAR * gap.length else KNOTS[1:]
-    for count in every_count:
+    counts = KNOTS if np.max(end) <= FAR * gap.length else KNOTS[1:]
+    for count in counts:
         some = asked.of(rows)
         at, l0 = knots(gap, end[rows], count), some.prestretch
         every = np.hstack([at, some.deflection]) if shown is None else at

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bayesmembrane.ground.compiling import compiled
+from bayesmembrane.ground.compiling import compiled, for_kernel
 from bayesmembrane.ground.parameters import Array
 
 STEPS = 60  # per factor 3.5 of R2/R1
@@ -104,9 +104,7 @@ def locking_deflection(extensibility: ArrayLike, prestretch: ArrayLike, ratio: f
     jm, l0 = jm.ravel(), l0.ravel()
     if jm.size and np.all(l0 == l0[0]) and (l0[0] == 1.0 or jm.size >= TABULATED):
         return np.asarray(_interpolate(jm, float(l0[0]), float(ratio))).reshape(shape)
-    # What may only be read is another type to numba, for which it would be compiled again.
-    jm, l0 = (np.require(v, requirements="W") for v in (jm, l0))
-    return np.asarray(_lock_all(jm, l0, np.log(ratio)), dtype=float).reshape(shape)
+    return np.asarray(_lock_all(for_kernel(jm), for_kernel(l0), np.log(ratio)), dtype=float).reshape(shape)
 
 
 @lru_cache(maxsize=64)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.ground.compiling import compiled
+from bayesmembrane.ground.compiling import compiled, for_kernel
 from bayesmembrane.ground.parameters import Array, Natural, Parameter
 from bayesmembrane.ground.symmetric import eigh
 from bayesmembrane.physics.form_error import (
@@ -146,8 +146,7 @@ class FormLikelihood(NoiseLikelihood):
             axes,
             self._turns,
         )
-        # What may only be read is another type to numba, for which all of it would be compiled again.
-        square, log_det = _squares(*(np.require(p, float, ("C", "W")) for p in parts))
+        square, log_det = _squares(*map(for_kernel, parts))
         return square, log_det
 
     def _staying(self, x: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Everything that is compiled, compiled ahead: ``python -m bayesmembrane.app.ahead``, at the end of an installation.
+"""All that is compiled, compiled ahead: ``python -m bayesmembrane.app.precompile``, at the end of an installation.
 
 A kernel is compiled when it is first asked, and its code stays on the disk beside the package. Here each is asked for
 something small, so that nobody waits a minute for a first answer, and no two processes compile the same at once.

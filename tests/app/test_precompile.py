@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from bayesmembrane.app import ahead
+from bayesmembrane.app import precompile
 from bayesmembrane.ground.compiling import compilation
 from bayesmembrane.ground.jobs import silent, workers
 from bayesmembrane.ground.registry import ordinary_materials
@@ -21,17 +21,17 @@ def test_every_ordinary_material_is_asked_for(monkeypatch: pytest.MonkeyPatch) -
         with workers(count=1) as submit:
             yield submit
 
-    monkeypatch.setattr(ahead, "workers", here)
-    monkeypatch.setattr(ahead, "_material", lambda name, tell: asked.append(name))
+    monkeypatch.setattr(precompile, "workers", here)
+    monkeypatch.setattr(precompile, "_material", lambda name, tell: asked.append(name))
     for part in ("_effects", "_noises"):
-        monkeypatch.setattr(ahead, part, lambda tell, part=part: asked.append(part))
-    ahead.main()
+        monkeypatch.setattr(precompile, part, lambda tell, part=part: asked.append(part))
+    precompile.main()
     assert asked == [*ordinary_materials(), "_effects", "_noises"]
 
 
 def test_nothing_is_left_to_be_compiled_for_films_with_effects() -> None:
-    ahead._effects(silent)
-    m = ahead._read("synthetic_cyclic")
+    precompile._effects(silent)
+    m = precompile._read("synthetic_cyclic")
     claim = hypothesis("neo_hookean", ["mullins", "viscoelastic", "tearing", "machine_compliance"])
     x = [[float(p.prior.quantile(0.6)) for p in claim.parameters]]
     with compilation() as found:
