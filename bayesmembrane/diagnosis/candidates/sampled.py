@@ -8,6 +8,9 @@ about the posterior of the linear model,
 with the sizes theta of noise and form error, and the traces, that the fit shows, and with the true priors p(u) within
 their bounds. The difference from the linear model's own ln Z(theta) is the error of being linear. T. Kloek, H. K. van
 Dijk, Econometrica 46 (1978) 1.
+
+Of n draws the n' = (sum w)^2 / sum w^2 that count lie where q is large, and tails of the posterior are found by none:
+where their part e = n' / n is small, estimates are low. `SAMPLED.unseen` says by how much.
 """
 
 from __future__ import annotations
@@ -31,22 +34,26 @@ class ByDraws:
     """What draws say of a linear evidence.
 
     difference : ln Z less that of the linear model
-    sd : standard error of it
-    efficiency : part of the draws that counts, (sum w)^2 / (n sum w^2)
+    sd : standard error of it by the draws alone
+    counting : draws that count, n' = (sum w)^2 / sum w^2
     """
 
     difference: float
     sd: float
-    efficiency: float
+    counting: float
 
     @property
     def good(self) -> bool:
-        """Whether it can be relied on: of a proposal that misses a part of a valley few draws count."""
-        return self.efficiency >= SAMPLED.least_efficiency
+        """Whether it says more than the linear model does."""
+        return self.counting >= SAMPLED.least
 
 
-def checked(search: Weighing, candidate: Candidate, rng: np.random.Generator) -> Candidate:
-    """The candidate with ln Z by importance sampling; as it is where too few draws count."""
+def checked(search: Weighing, candidate: Candidate) -> Candidate:
+    """The candidate with ln Z by importance sampling; as it is where too few draws count.
+
+    Its draws are its own: what was checked before, and which energy was asked about, changes nothing.
+    """
+    rng = np.random.default_rng([search.seed, *candidate.label.encode()])
     found = sampled(search, candidate, rng)
     return replace(candidate, log_evidence=candidate.log_evidence + found.difference) if found.good else candidate
 
@@ -60,13 +67,13 @@ def sampled(search: Weighing, candidate: Candidate, rng: np.random.Generator) ->
     target = _TruePosterior(search, candidate)
     proposals = [_Proposal.about(target.mean, target.covariance)]
     u, density = np.empty((0, candidate.x.size)), np.empty(0)
-    for _ in range(SAMPLED.rounds):
+    for number in range(1, SAMPLED.most_rounds + 1):
         new = proposals[-1].drawn(SAMPLED.draws, rng)
         u, density = np.concatenate([u, new]), np.concatenate([density, target.log_density(new)])
         q = np.logaddexp.reduce([p.log_density(u) for p in proposals], axis=0) - np.log(len(proposals))
         weights = density - q
         effective = _effective(weights)
-        if effective >= SAMPLED.enough:
+        if effective >= (SAMPLED.enough if number < SAMPLED.rounds else SAMPLED.some):
             break
         if effective:
             proposals.append(_fitted(u, weights, target.covariance))
@@ -75,8 +82,9 @@ def sampled(search: Weighing, candidate: Candidate, rng: np.random.Generator) ->
     if not effective:
         return ByDraws(-np.inf, np.inf, 0.0)
     log_z = float(np.logaddexp.reduce(weights) - np.log(weights.size))
+    unseen = SAMPLED.unseen * max(float(np.log(SAMPLED.all_seen * weights.size / effective)), 0.0)
     sd = float(np.sqrt(max(1 / effective - 1 / weights.size, 0.0)))
-    return ByDraws(log_z - target.linear, sd, effective / weights.size)
+    return ByDraws(log_z + unseen - target.linear, sd, effective)
 
 
 @dataclass(frozen=True, eq=False)

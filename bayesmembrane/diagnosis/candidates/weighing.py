@@ -47,6 +47,7 @@ class Weighing(ABC):
 
     noise : of the readings; every hypothesis may scale it a little
     force : (N,) N, the readings
+    seed : of draws from priors, and of those that check an evidence
     """
 
     noise: OwnNoise
@@ -54,6 +55,10 @@ class Weighing(ABC):
     @property
     @abstractmethod
     def force(self) -> Array: ...
+
+    @property
+    @abstractmethod
+    def seed(self) -> int: ...
 
     @abstractmethod
     def batch(self, hypothesis: Hypothesis, x: Array) -> tuple[Array, Array]:

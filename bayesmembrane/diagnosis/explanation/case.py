@@ -73,7 +73,7 @@ class DiagnosisCase(ABC):
     signatures : of these effects beside the null model, without the invisible ones
     elsewhere : names of those that are invisible there, and leave a trace beside another energy
     detection : tests of the null model
-    rng : draws of the tests, and of what checks the evidence
+    rng : draws of the tests
     tell : what is being done
     """
 
@@ -174,7 +174,7 @@ def opened(measurement: Measurement, question: Question, seed: int, solve: Solve
     best = max(plain.values(), key=lambda c: c.log_evidence)
     search = renewed(search, smooth, best)
     rng = np.random.default_rng([seed, 7])
-    plain = {name: checked(search, search.weighed_anew(c), rng) for name, c in plain.items()}
+    plain = {name: checked(search, search.weighed_anew(c)) for name, c in plain.items()}
     best = max(plain.values(), key=lambda c: c.log_evidence)
     null = plain[hypothesis.material.name] if question.declared else best
     tell("testing the residual")
@@ -211,14 +211,12 @@ def renewed(search: Search, smooth: Array, best: Candidate) -> Search:
 def _energies(search: Search, question: Question, tell: Tell) -> dict[str, Candidate]:
     """Every energy with the given effects; raises `SettingsError` if the declared one, or none, reaches the data."""
     asked = question.hypothesis.material
-    kinds: dict[str, type[Material]] = {asked.name: asked} | ordinary_materials()
     found = {}
-    for name, kind in kinds.items():
-        hypothesis = replace(question.hypothesis, material=kind)
+    for name, hypothesis in _every_energy(question).items():
         if len(search.measurement) < hypothesis.curve_size + SEARCH.spare_points:
             continue
         tell(f"fitting {hypothesis.label()}")
-        candidate = _reaching(search, hypothesis, needed=question.declared and kind is asked)
+        candidate = _reaching(search, hypothesis, needed=question.declared and hypothesis.material is asked)
         if candidate is not None:
             found[name] = candidate
     if not found:
@@ -226,6 +224,13 @@ def _energies(search: Search, question: Question, tell: Tell) -> dict[str, Candi
             raise SettingsError("all forces are zero", remedy="use a curve that was measured")
         raise SettingsError("no film of any energy reaches the data", remedy="use a shorter range")
     return found
+
+
+def _every_energy(question: Question) -> dict[str, Hypothesis]:
+    """Every energy with the given effects, in an order of its own: which of them was asked about must not matter."""
+    asked = question.hypothesis.material
+    kinds: dict[str, type[Material]] = ordinary_materials() | {asked.name: asked}
+    return {name: replace(question.hypothesis, material=kind) for name, kind in kinds.items()}
 
 
 def _reaching(search: Search, hypothesis: Hypothesis, needed: bool) -> Candidate | None:
@@ -245,10 +250,13 @@ def _reaching(search: Search, hypothesis: Hypothesis, needed: bool) -> Candidate
 
 
 def _check_size(measurement: Measurement, question: Question) -> None:
-    enough_points(question.hypothesis, measurement)
-    least = question.hypothesis.curve_size + SEARCH.spare_points
+    asked = question.hypothesis
+    if not question.declared:
+        asked = min(_every_energy(question).values(), key=lambda h: h.curve_size)
+    enough_points(asked, measurement)
+    least = asked.curve_size + SEARCH.spare_points
     if len(measurement) < least:
-        what = f"{question.hypothesis.label()} misses" if question.declared else "is missing"
+        what = f"{asked.label()} misses" if question.declared else "is missing"
         raise SettingsError(
             f"{len(measurement)} points leave too little to tell what {what}",
             remedy=f"use at least {least} points, or a material with fewer parameters",

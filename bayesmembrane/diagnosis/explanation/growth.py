@@ -141,7 +141,7 @@ def _checked(out: Grown) -> None:
         key = null if null in rest else max(rest, key=shares.__getitem__, default=null)
         if key not in rest or (key != null and shares[key] < np.log(SAMPLED.decides)):
             break
-        out.found[key] = checked(out.search, rest.pop(key), out.case.rng)
+        out.found[key] = checked(out.search, rest.pop(key))
 
 
 def _grow(out: Grown) -> bool:

@@ -104,7 +104,7 @@ def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Q
     effects = tuple(effects_in_tests([_possible(c, shown) for c in alone], labels, one_clock))
     smooth = np.asarray(block_diag(*(c.smooth for c in alone)))
     rng = np.random.default_rng([alone[0].search.seed, 8])
-    plain = {n: checked(search, c, rng) for n, c in _energies(search, alone, question, given, tell).items()}
+    plain = {n: checked(search, c) for n, c in _energies(search, alone, question, given, tell).items()}
     best = max(plain.values(), key=lambda c: c.log_evidence)
     declared = question.hypothesis.material.name
     if question.declared and declared not in plain:

@@ -93,6 +93,10 @@ class JointSearch(Weighing):
     def force(self) -> Array:
         return np.concatenate([p.force for p in self.parts])
 
+    @property
+    def seed(self) -> int:
+        return self.parts[0].seed
+
     @cached_property
     def rows(self) -> list[slice]:
         """Where the readings of each test stand."""
