@@ -209,7 +209,7 @@ class SampledThresholds:
     all_seen: float = 0.4
     """Part of the draws that count, with which no tail is missed."""
     unseen: float = 0.7
-    """Times ln(`all_seen` / e) is what draws miss of ln Z, if a part e of them counts. Against 13 500 draws of mixtures,
+    """Times ln(`all_seen` / e) is what draws miss of ln Z, if a part e of them counts. Against 13 500 of mixtures,
     for 25 hypotheses with e below 0.15 (seed 35 of the third generator, which this is from), and for 10 of the own
     generator, linear evidence is 1.6 and 1.2 too large; by draws the error is 0.2 +- 0.9 (with 0.6) and -0.3 +- 0.7."""
     decides: float = 0.003
