@@ -184,14 +184,14 @@ class SampledThresholds:
 
     draws: int = 128
     """Of a round."""
-    rounds: int = 3
-    """As many as are worth it for a better number."""
-    most_rounds: int = 8
-    """At most: what is not found by then is not found."""
-    some: float = 8.0
-    """Draws that count, with which it ends after those rounds."""
     enough: float = 60.0
     """Draws that count, with which it ends: ln Z to 0.13."""
+    rounds: int = 3
+    """After as many rounds fewer draws do, for what is missed by then costs more to find than it is worth."""
+    enough_later: float = 8.0
+    """Draws that count, with which it ends from then on."""
+    most_rounds: int = 8
+    """At most: what is not found by then is not found."""
     freedom: float = 6.0
     """Of the t-distribution: tails that no posterior of this kind has more of."""
     kept: float = 0.1
@@ -209,9 +209,7 @@ class SampledThresholds:
     all_seen: float = 0.4
     """Part of the draws that count, with which no tail is missed."""
     unseen: float = 0.7
-    """Times ln(`all_seen` / e) is what draws miss of ln Z, if a part e of them counts. Against 13 500 of mixtures,
-    for 25 hypotheses with e below 0.15 (seed 35 of the third generator, which this is from), and for 10 of the own
-    generator, linear evidence is 1.6 and 1.2 too large; by draws the error is 0.2 +- 0.9 (with 0.6) and -0.3 +- 0.7."""
+    """Times ln(`all_seen` / e) is what draws miss of ln Z, if a part e of them counts; docs/studies/few_draws.md."""
     decides: float = 0.003
     """Of the sum: from that share on a hypothesis is checked."""
     most: int = 60

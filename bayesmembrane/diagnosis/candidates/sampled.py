@@ -33,14 +33,27 @@ from bayesmembrane.ground.parameters import Array
 class ByDraws:
     """What draws say of a linear evidence.
 
-    difference : ln Z less that of the linear model
+    found : ln Z less that of the linear model, as the draws have it
     sd : standard error of it by the draws alone
     counting : draws that count, n' = (sum w)^2 / sum w^2
+    drawn : n
     """
 
-    difference: float
+    found: float
     sd: float
     counting: float
+    drawn: int
+
+    @property
+    def unseen(self) -> float:
+        """What such draws miss of ln Z."""
+        part = self.counting / self.drawn
+        return SAMPLED.unseen * max(float(np.log(SAMPLED.all_seen / part)), 0.0) if part > 0 else 0.0
+
+    @property
+    def difference(self) -> float:
+        """ln Z less that of the linear model."""
+        return self.found + self.unseen
 
     @property
     def good(self) -> bool:
@@ -73,18 +86,17 @@ def sampled(search: Weighing, candidate: Candidate, rng: np.random.Generator) ->
         q = np.logaddexp.reduce([p.log_density(u) for p in proposals], axis=0) - np.log(len(proposals))
         weights = density - q
         effective = _effective(weights)
-        if effective >= (SAMPLED.enough if number < SAMPLED.rounds else SAMPLED.some):
+        if effective >= (SAMPLED.enough if number < SAMPLED.rounds else SAMPLED.enough_later):
             break
         if effective:
             proposals.append(_fitted(u, weights, target.covariance))
         else:  # no film where the linear model sees one: closer to the fit
             proposals.append(_Proposal.about(target.fit, 0.1 ** len(proposals) * target.covariance))
     if not effective:
-        return ByDraws(-np.inf, np.inf, 0.0)
+        return ByDraws(-np.inf, np.inf, 0.0, weights.size)
     log_z = float(np.logaddexp.reduce(weights) - np.log(weights.size))
-    unseen = SAMPLED.unseen * max(float(np.log(SAMPLED.all_seen * weights.size / effective)), 0.0)
     sd = float(np.sqrt(max(1 / effective - 1 / weights.size, 0.0)))
-    return ByDraws(log_z + unseen - target.linear, sd, effective)
+    return ByDraws(log_z - target.linear, sd, effective, weights.size)
 
 
 @dataclass(frozen=True, eq=False)
