@@ -31,7 +31,7 @@ from bayesmembrane.physics.forward import Forward
 class OtherTest:
     """A test that no fit saw, and what is predicted of it.
 
-    before : (N,) N of the model as given
+    before : (N,) N of the model as given, without the form error that its fit to the first test was left with
     after : (N,) N, median over all hypotheses
     low, high : (N,) N, ends of the band that holds a reading with the probability `OTHER_TESTS.band`
     scatter : relative standard deviation by which forces of two specimens differ, as it was stated
@@ -81,7 +81,7 @@ def predicted(found: Diagnosis, other: Measurement, scatter: float = 0.0, seed: 
     draws += found.noise.sd * rng.standard_normal(draws.shape)
     edge = 0.5 * (1 - OTHER_TESTS.band)
     low, middle, high = np.quantile(draws, [edge, 0.5, 1 - edge], axis=0)
-    return OtherTest(other, null.force + null.moved, middle, low, high, scatter)
+    return OtherTest(other, null.force, middle, low, high, scatter)
 
 
 def check(measurement: Measurement, other: Measurement, scatter: float) -> None:
