@@ -192,9 +192,31 @@ class RangeOption(OptionGroup):
         float | None, typer.Option("--max-deflection-mm", help="Use the curve up to here only, mm.")
     ] = None
 
+    max_stretch: Annotated[
+        float | None, typer.Option("--max-stretch", help="Use the curve of a strip or a sheet up to this stretch only.")
+    ] = None
+
     def of(self, whole: Measurement) -> Measurement:
         """The part of a measurement that is used."""
-        return whole if self.max_deflection_mm is None else whole.up_to(self.max_deflection_mm * 1e-3)
+        end = self.end_on(whole)
+        return whole if end is None else whole.up_to(end)
+
+    def end_on(self, whole: Measurement) -> float | None:
+        """The largest deflection that is used, m; None if all are.
+
+        Raises `SettingsError` where it is given twice, and for a stretch of a rig that reads none.
+        """
+        from bayesmembrane.words.seen import seen
+
+        if self.max_stretch is None:
+            return None if self.max_deflection_mm is None else 1e-3 * self.max_deflection_mm
+        if self.max_deflection_mm is not None:
+            raise SettingsError("the range is given twice", "--max-deflection-mm, --max-stretch", "give one of them")
+        how = seen(whole)
+        if not how.bare:
+            what = f"the curve is read over {how.travel}, and not over stretch"
+            raise SettingsError(what, "--max-stretch", "give --max-deflection-mm")
+        return how.meant(self.max_stretch)
 
 
 @dataclass(frozen=True)

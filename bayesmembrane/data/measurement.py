@@ -173,9 +173,10 @@ class Measurement:
         """
         keep = self.deflection <= max_deflection * (1 + 1e-9)
         if np.count_nonzero(keep) < 2:
+            least, most = float(np.min(self.deflection)), float(np.max(self.deflection))
             raise SettingsError(
-                f"the largest deflection of {1e3 * max_deflection:g} mm leaves fewer than two points",
-                remedy=f"choose one between {1e3 * np.min(self.deflection):g} and {1e3 * np.max(self.deflection):g} mm",
+                f"the range up to {self.rig.place(max_deflection)} leaves fewer than two points",
+                remedy=f"choose an end between {self.rig.place(least)} and {self.rig.place(most)}",
             )
         return self if np.all(keep) else self.select(keep)
 

@@ -57,6 +57,10 @@ class Seen:
         """(N,) what is on the horizontal axis."""
         return self.rest + self.travel_scale[0] * deflection
 
+    def meant(self, shown: float) -> float:
+        """The deflection in m that is at this value on the horizontal axis."""
+        return (shown - self.rest) / self.travel_scale[0]
+
     def carried(self, force: Array) -> Array:
         """(N,) what is on the vertical axis."""
         return self.load_scale[0] * force

@@ -206,7 +206,7 @@ def test_a_biaxial_measurement_is_sampled_compared_and_diagnosed(run: Run, tmp_p
     )
     common = [tmp_path / "c.csv", "--specimen", tmp_path / "c.toml", "--ess", "100", "--json"]
     chains = ["--out", tmp_path / "chains"]
-    for part in ([], ["--max-deflection-mm", "30"]):
+    for part in ([], ["--max-stretch", "1.6"]):
         code, out, err = run("sample", *common, "--material", "neo_hookean", *chains, *part)
         assert code == 0, err
         assert err.count("ignored columns: remark") == 1
@@ -218,6 +218,29 @@ def test_a_biaxial_measurement_is_sampled_compared_and_diagnosed(run: Run, tmp_p
     code, out, err = run("compare", *common, "--materials", "neo_hookean", *chains)
     assert code == 0, err
     assert len(json.loads(out)["table"]) == 1
+
+
+def test_a_strip_is_cut_at_a_stretch_whatever_its_length(run: Run, tmp_path: Path) -> None:
+    """Its deflections are those of a length that nobody may have given."""
+    stretch = np.linspace(1.05, 2.0, 20)
+    stress = np.where(stretch <= 1.52, 0.3 * (stretch - stretch**-2.0), 5.0)
+    rows = "".join(f"{x},{s}\n" for x, s in zip(stretch, stress, strict=True))
+    (tmp_path / "c.csv").write_text("stretch,nominal_stress_MPa\n" + rows)
+    common = [tmp_path / "c.csv", "--specimen", tmp_path / "c.toml", "--material", "neo_hookean"]
+    for length in ("", "length_mm = 20\n"):
+        (tmp_path / "c.toml").write_text(f'[specimen]\nthickness_um = 500\n[rig]\nkind = "uniaxial"\n{length}')
+        code, out, err = run("fit", *common, "--max-stretch", "1.52", "--json")
+        assert code == 0, err
+        assert json.loads(out)["parameters"]["c1"]["value"] == pytest.approx(75, rel=1e-6)  # 0.3 MPa x 500 um / 2
+    code, _, err = run("fit", *common, "--max-stretch", "1.06")
+    assert code == 1
+    assert "up to a stretch of 1.06 leaves fewer than two points; choose an end between a stretch of 1.05 and" in err
+    code, _, err = run("fit", *common, "--max-stretch", "1.5", "--max-deflection-mm", "10")
+    assert (code, "given twice" in err) == (1, True)
+    code, _, err = run("fit", CURVE, "--specimen", SPECIMEN, "--material", "gent", "--max-stretch", "1.5")
+    assert code == 1
+    assert "read over deflection, and not over stretch" in err
+    assert "--max-deflection-mm" in err
 
 
 @pytest.mark.parametrize("option", ["--out", "--report"])

@@ -44,7 +44,7 @@ def test_truncation_keeps_the_noise_block_and_the_full_range() -> None:
     assert short.full_range == m.full_range == 0.0915
     assert short.up_to(0.02).full_range == 0.0915
     assert m.up_to(0.0915) is m
-    with pytest.raises(SettingsError, match=r"leaves fewer than two points; choose one between 10 and 91\.5 mm"):
+    with pytest.raises(SettingsError, match=r"up to 11 mm leaves fewer .*; choose an end between 10 mm and 91\.5 mm"):
         m.up_to(0.011)
 
 

@@ -53,12 +53,13 @@ def verb(
         answer(both.document, output.as_json, lambda: show(both.result))
         return
     claims = claimed(materials.materials, beside.effects, beside.noise, beside.convexity)
-    if used.ranges_mm and used.max_deflection_mm is not None:
-        raise SettingsError("the range is given twice", "--ranges-mm, --max-deflection-mm", "give one of them")
-    only = [] if used.max_deflection_mm is None else [1e-3 * used.max_deflection_mm]
     measurement = curve.read()
+    end = used.end_on(measurement)
+    if used.ranges_mm and end is not None:
+        twice = "--max-deflection-mm" if used.max_stretch is None else "--max-stretch"
+        raise SettingsError("the range is given twice", f"--ranges-mm, {twice}", "give one of them")
     say_few(len(measurement), "Energies are weighed")
-    ranges = ranges_of(measurement, used.ends or only)
+    ranges = ranges_of(measurement, used.ends or ([] if end is None else [end]))
     with resumable(output.folder), lines() as tell:
         work = analyses.Work(output.seed, output.folder, sampling.ess, tell)
         found = analyses.compare(ranges, claims, work)
