@@ -2,6 +2,7 @@
 
 `make study-second` asks the same of the second generator (`--generator second`), once; docs/studies/second.md.
 `make study-third` asks it of the third (`--generator third`), which has 120 cases for each `--seed`.
+`--generator fourth` asks it of the fourth, which has 60.
 Each case is one line of a JSON-lines file, written as soon as it is done; cases that stand there are skipped, so that
 the study can be interrupted and goes on where it was. `--first 0 --count 40 --half calibration --results FILE` runs a
 part and prints a line for each case; `--summary FILE` prints the tables of what is there.
@@ -33,6 +34,7 @@ from bayesmembrane.words.diagnosis import document
 from tests.generator.datasets import Dataset, generate
 from tests.generator.film import NoSolutionError
 from tests.generator.protocols import Protocol
+from tests.generator_four.datasets import BenchDataset
 from tests.generator_three.datasets import Dataset as ThirdDataset
 from tests.generator_three.elements import NoBalanceError
 from tests.generator_two.datasets import Dataset as SecondDataset
@@ -48,7 +50,7 @@ ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "reports" / "study-reliability"
 DECLARED, NONE = "declared", "none"
 ENERGIES = {"declared": (DECLARED,), "none": (NONE,), "both": (DECLARED, NONE)}
-AnyDataset = Dataset | SecondDataset | ThirdDataset
+AnyDataset = Dataset | SecondDataset | ThirdDataset | BenchDataset
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class Source:
     title: str
 
 
-OWN, SECOND, THIRD = "own", "second", reliability_plan.THIRD
+OWN, SECOND, THIRD, FOURTH = "own", "second", reliability_plan.THIRD, reliability_plan.FOURTH
 SOURCES = {
     OWN: Source("test", reliability_plan.SEED, reliability_plan.plan, reliability_plan.measured, "Reliability"),
     SECOND: Source(
@@ -78,6 +80,13 @@ SOURCES = {
         reliability_plan.third_plan,
         reliability_plan.third_measured,
         "Reliability on the third generator",
+    ),
+    FOURTH: Source(
+        FOURTH,
+        reliability_plan.FOURTH_SEED,
+        reliability_plan.fourth_plan,
+        reliability_plan.fourth_measured,
+        "Reliability on the fourth generator",
     ),
 }
 
@@ -165,7 +174,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
     parser.add_argument("--count", type=int, default=None, help="so many cases; all that follow by default")
     parser.add_argument(
-        "--seed", type=int, default=None, help="base of the seeds, an even number; of the third generator the seed"
+        "--seed", type=int, default=None, help="base of the seeds, an even number; of the third and fourth the seed"
     )
     parser.add_argument("--seconds", type=float, default=float("inf"), help="begin no case after this time")
     parser.add_argument("--jobs", type=int, default=1, help="processes")

@@ -5,7 +5,8 @@ half, odd seeds the test half: what has to be chosen in the diagnosis (widths of
 chosen on the first, and what is reported is measured on the second. The two halves share the kinds of their cases, and
 nothing that is drawn.
 
-At the end stands the plan of `make study-third`, whose cases are those of the third generator, 120 for each seed.
+At the end stand the plans of `make study-third`, whose cases are those of the third generator, 120 for each seed, and
+of the fourth generator, 60 for each seed.
 """
 
 from __future__ import annotations
@@ -22,6 +23,10 @@ from tests.generator.energies import DECLARED
 from tests.generator.energies import OUTSIDE as FOREIGN_ENERGIES
 from tests.generator.film import NoSolutionError
 from tests.generator.setups import setup
+from tests.generator_four.datasets import BenchDataset
+from tests.generator_four.datasets import generate as generate_fourth
+from tests.generator_four.recipes import BenchRecipe
+from tests.generator_four.recipes import recipes as fourth_recipes
 from tests.generator_three.datasets import Dataset as ThirdDataset
 from tests.generator_three.datasets import generate as generate_third
 from tests.generator_three.recipes import Recipe, recipes
@@ -142,7 +147,7 @@ def third_plan(half: str = THIRD, base: int = THIRD_SEED) -> Iterator[Case]:
     if half != THIRD:
         raise ValueError(f"the third generator has no half {half!r}: nothing is tuned on it")
     for recipe in recipes(base):
-        yield Case(recipe.number, _third_group(recipe), f"{recipe.group} {recipe.number}", OF_THE_FILM, (), base)
+        yield Case(recipe.number, _group_of(recipe), f"{recipe.group} {recipe.number}", OF_THE_FILM, (), base)
 
 
 def third_measured(case: Case) -> ThirdDataset:
@@ -150,7 +155,25 @@ def third_measured(case: Case) -> ThirdDataset:
     return generate_third(next(islice(recipes(case.seed), case.number, None)))
 
 
-def _third_group(recipe: Recipe) -> str:
+def _group_of(recipe: Recipe | BenchRecipe) -> str:
     """Name in `GROUPS`; pairs and triples are so called whatever their energy."""
     none, one = ("null", "single") if recipe.common_energy else ("energy", "mixed")
     return {"none": none, "one": one, "two": "pair", "three": "triple", "foreign": "foreign"}[recipe.group]
+
+
+# ---- the fourth generator --------------------------------------------------------------------------------------------
+
+FOURTH, FOURTH_SEED = "fourth", 1
+
+
+def fourth_plan(half: str = FOURTH, base: int = FOURTH_SEED) -> Iterator[Case]:
+    """The cases of the fourth generator, in order; ``base`` is the seed of all of them, and they differ by number."""
+    if half != FOURTH:
+        raise ValueError(f"the fourth generator has no half {half!r}: nothing is tuned on it")
+    for recipe in fourth_recipes(base):
+        yield Case(recipe.number, _group_of(recipe), f"{recipe.group} {recipe.number}", OF_THE_FILM, (), base)
+
+
+def fourth_measured(case: Case) -> BenchDataset:
+    """The measurement of a case. Raises `NoBalanceError` if no film can be found for it."""
+    return generate_fourth(next(islice(fourth_recipes(case.seed), case.number, None)))
