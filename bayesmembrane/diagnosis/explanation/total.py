@@ -146,7 +146,7 @@ def summed(grown: Grown) -> Total:
             of_set = q / joint[key] if q > 0 else 0.0
             judged.append(_judged(grown, c, of_set * both[key], grown.believed(c)))
     judged.sort(key=lambda j: -j.probability)
-    marginal = Probabilities(_summed_out(both, 0), _falling(BELIEFS.flattened(energies)), _summed_out(both, 1))
+    marginal = Probabilities(_summed_out(both, 0), _falling(BELIEFS.energies_flattened(energies)), _summed_out(both, 1))
     return Total(tuple(judged), marginal, both, tuple(found))
 
 

@@ -151,7 +151,7 @@ def _first_order(case: DiagnosisCase, found: Sequence[Foreign]) -> Probabilities
         if np.isfinite(weight):
             sets[e.name] = weight
     summed = {n: float(np.logaddexp.reduce(w)) for n, w in energies.items()}
-    return Probabilities(_shares(sets), _shares(summed), _foreign_first(case, found, plain))
+    return Probabilities(_shares(sets), BELIEFS.energies_flattened(_shares(summed)), _foreign_first(case, found, plain))
 
 
 def _with_energy(case: DiagnosisCase) -> dict[str, float]:

@@ -54,6 +54,12 @@ def test_where_nothing_stands_out_odds_are_raised_to_a_power() -> None:
     assert BELIEFS.flattened({}) == {}
 
 
+def test_an_energy_that_stands_out_is_told_flatter_too() -> None:
+    flat = BELIEFS.energies_flattened({"a": 0.98, "b": 0.02})
+    assert sum(flat.values()) == pytest.approx(1.0)
+    assert flat["a"] / flat["b"] == pytest.approx(49**BELIEFS.energies_flatter)
+
+
 @pytest.mark.parametrize("rivals", [1, 3, 30])
 def test_the_larger_a_probability_the_larger_it_is_flattened(rivals: int) -> None:
     firsts = np.linspace(0.5, 1.0, 101)
