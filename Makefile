@@ -13,7 +13,7 @@ export MPLBACKEND ?= Agg
 # Else every process that a test starts compiles the text of the package anew, half a second each.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install demo test pytest lint bench study study-cycles study-loop study-reliability study-second study-third study-sequential study-fuzz study-import study-scale study-kill study-overnight study-damage study-foretold study-seeds study-sbc study-modes study-beside study-growth study-long clean
+.PHONY: help install demo test pytest lint bench study study-cycles study-loop study-reliability study-second study-third study-fourth study-sequential study-fuzz study-import study-scale study-kill study-overnight study-damage study-foretold study-seeds study-sbc study-modes study-beside study-growth study-long clean
 
 help:
 	@echo "make demo     the main job on the data that ships; prints where the report lies"
@@ -25,6 +25,7 @@ help:
 	@echo "make study-reliability  are probabilities frequencies; hours; goes on where it was; RELIABILITY='--count 60' asks for less"
 	@echo "make study-second  the same on the second generator, once and at the end; SECOND='--count 60' asks for less"
 	@echo "make study-third  the same on the third generator, 120 cases a seed; hours; goes on where it was; THIRD='--seed 7 --count 60' asks for less"
+	@echo "make study-fourth  the same on the fourth generator, 60 cases a seed; an hour; goes on where it was; FOURTH='--seed 7 --count 20' asks for less"
 	@echo "make study-sequential  ambiguous answers, the tests that they propose made, and diagnosed again; hours; goes on where it was; SEQUENTIAL='--count 20' asks for less"
 	@echo "make study-fuzz  500 calls at random, each judged, an hour or so; goes on where it was; FUZZ='--only fit' asks for less"
 	@echo "make study-scale  ten thousand tiny runs in a campaign, some minutes: what it costs beside the work itself"
@@ -96,6 +97,9 @@ study-second: $(STAMP)
 
 study-third: $(STAMP)
 	$(PY) -m tests.studies.reliability --generator third --jobs $(PYTEST_WORKERS) --table docs/studies/third.md $(THIRD)
+
+study-fourth: $(STAMP)
+	$(PY) -m tests.studies.reliability --generator fourth --jobs $(PYTEST_WORKERS) --table docs/studies/fourth.md $(FOURTH)
 
 study-sequential: $(STAMP)
 	$(PY) -m tests.studies.sequential --table docs/studies/sequential.md $(SEQUENTIAL)
