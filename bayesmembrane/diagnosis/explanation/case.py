@@ -10,7 +10,7 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import enough_points
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.diagnosis.candidates.candidate import Candidate, available, unsought
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, available
 from bayesmembrane.diagnosis.candidates.sampled import checked
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.candidates.signatures import signatures
@@ -99,11 +99,6 @@ class DiagnosisCase(ABC):
         return [e for e in self.effects if e.name in names]
 
     @property
-    def unsought(self) -> tuple[Effect, ...]:
-        """Effects that are not looked for, since the test shows of them what another energy would."""
-        return ()
-
-    @property
     def best_plain(self) -> Candidate:
         """The most probable energy without any but the given effects."""
         return max(self.plain.values(), key=lambda c: c.log_evidence)
@@ -141,10 +136,6 @@ class OpenCase(DiagnosisCase):
     """The case of one measurement."""
 
     search: Search
-
-    @property
-    def unsought(self) -> tuple[Effect, ...]:
-        return tuple(unsought(self.measurement, self.question.hypothesis))
 
     @property
     def measurement(self) -> Measurement:

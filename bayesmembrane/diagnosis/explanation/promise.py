@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
-from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.visible import Ratio, absorbing, own_traces
+from bayesmembrane.diagnosis.explanation.visible import Ratio, own_traces
 from bayesmembrane.diagnosis.thresholds import GROWTH
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
@@ -40,8 +39,7 @@ def promised(search: Weighing, base: Candidate, effect: Effect, counts: float = 
     and absorbed nearby, of which only a fit says how large it is.
     """
     slopes, best = _slopes(search, base, [effect]), -np.inf
-    others = search.noise.white(base.slopes)[:, absorbing(base.hypothesis)]
-    lengths = np.linalg.norm(own_traces(slopes.white, others), axis=0)
+    lengths = np.linalg.norm(own_traces(slopes.white, search.noise.white(base.slopes)), axis=0)
     for f in _freed(search, base, slopes):
         for i in np.flatnonzero(f.left):
             along, square, length = float(f.along[i]), float(f.product[i, i]), float(lengths[i])
@@ -49,12 +47,6 @@ def promised(search: Weighing, base: Candidate, effect: Effect, counts: float = 
             ratio = Ratio(toward / square * length, length / sqrt(square), length, effect.size.one_sided)
             best = max(best, counts * (0.5 * along**2 / square - f.cost) + ratio.resolved.log_part(counts))
     return best
-
-
-def shows(search: Weighing, base: Candidate, effect: Effect) -> bool:
-    """True if the expected size of ``effect`` beside ``base`` would be seen, could nothing else take its trace."""
-    lengths = np.linalg.norm(_slopes(search, base, [effect]).white, axis=0)
-    return bool(np.any(lengths > BELIEFS.visible))
 
 
 def gains_of_pairs(search: Weighing, base: Candidate, effects: Sequence[Effect]) -> dict[Pair, float]:

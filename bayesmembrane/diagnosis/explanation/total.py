@@ -14,12 +14,11 @@ from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown, key_of
-from bayesmembrane.diagnosis.explanation.promise import promised, shows
+from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
 from bayesmembrane.diagnosis.explanation.unfitted import Key, unfitted
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.effects.base import Effect
 
 Named = TypeVar("Named")
 
@@ -180,34 +179,26 @@ def _like_a_tear(f: Foreign, every: Sequence[Candidate], weight: Callable[[Candi
 
 
 def _untried(grown: Grown, every: Sequence[Candidate], joint: Mapping[tuple[str, str], float]) -> dict[str, float]:
-    """{set: probability} of the first sets with one more effect, where that was never fitted.
+    """{set: probability} of the first sets with one more effect, where that was never fitted, for it promised little.
 
-    Weighed to first order where it promised little, and a part (`BELIEFS.untried`) of that: what was not looked at is
-    not excluded. Nor is, beside what is there, an effect of which the test shows what another energy would: of that the
-    data say nothing. Where nothing is missing, nothing of it is seen.
+    Weighed to first order, and a part (`BELIEFS.untried`) of that: what was not looked at is not excluded.
     """
     case, given, tried = grown.case, set(grown.case.null.names), {frozenset(c.names) for c in every}
     out = defaultdict[str, float](float)
     for base in _leaders(every)[: GROWTH.untried]:
         own, odds = set_name(base, case.null.names), [e.odds for e in base.hypothesis.effects if e.name not in given]
-        if len(odds) == BELIEFS.most:
-            continue
-        new = [e for e in case.visible if e.name not in base.names and frozenset((*base.names, e.name)) not in tried]
-        kept = [(e, BELIEFS.untried * _promise(grown, base, e)) for e in new]
-        kept += [(e, BELIEFS.unsought) for e in case.unsought if odds and shows(grown.search, base, e)]
-        for e, part in kept:
-            visible = [*(v.odds for v in case.visible if v is not e), e.odds]
+        for e in case.visible if len(odds) < BELIEFS.most else []:
+            names = frozenset((*base.names, e.name))
+            if e.name in base.names or names in tried:
+                continue
+            visible = [v.odds for v in case.visible]
             prior = BELIEFS.log_set([*odds, e.odds], visible) - BELIEFS.log_set(odds, visible)
-            q = part * joint[own, NOTHING] * float(np.exp(prior))
+            gain = min(promised(grown.search, base, e, grown.counts), BELIEFS.supported)
+            q = BELIEFS.untried * joint[own, NOTHING] * float(np.exp(prior + gain))
             if q > 0:
-                name = _joined(frozenset((*base.names, e.name)) - given)
+                name = _joined(names - given)
                 out[name] = max(out[name], q)
     return out
-
-
-def _promise(grown: Grown, base: Candidate, effect: Effect) -> float:
-    """The Bayes factor that its trace promises of a further effect, as far as that is believed."""
-    return float(np.exp(min(promised(grown.search, base, effect, grown.counts), BELIEFS.supported)))
 
 
 def _leaders(every: Sequence[Candidate]) -> list[Candidate]:

@@ -16,7 +16,6 @@ from bayesmembrane.diagnosis.explanation.unfitted import Key
 from bayesmembrane.diagnosis.reference.noise import orthonormal
 from bayesmembrane.diagnosis.thresholds import GROWTH, TINY
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.hypothesis import Hypothesis
 
 DEVIATES = np.linspace(-6.0, 6.0, 241)
 """At which a likelihood is integrated, in its standard deviations."""
@@ -32,9 +31,7 @@ LEAST = 1e-11
 
 @dataclass(frozen=True)
 class Ratio:
-    """The signal-to-noise ratio of an effect's own trace, free of what the material and the sizes of others can absorb.
-
-    What the free laws of others could imitate besides is no part of it: that is not told apart, and may be there.
+    """The signal-to-noise ratio of an effect's own trace, which is free of what the material and others can absorb.
 
     mean, sd : of its likelihood, taken as normal; the mean is negative where it speaks for a sign that is not allowed
     expected : that of the size which is expected before the data
@@ -161,7 +158,7 @@ def log_seen(
     whole, position = 0.0, candidate.hypothesis.material_size
     for effect in candidate.hypothesis.effects:
         if effect.name not in given:
-            others = white[:, absorbing(candidate.hypothesis, effect.name)]
+            others = np.delete(white, range(position, position + len(effect.coordinates)), axis=1)
             own, one_sided = [position + i for i in effect.sizes], effect.size.one_sided
             null = np.array([effect.coordinates[i].null or 0.0 for i in effect.sizes])
             sizes = candidate.x[own] - null
@@ -201,15 +198,6 @@ def own_ratio(own: Array, sizes: Array, covariance: Array, expected: Array, one_
     mean = 0.0 if not np.any(sizes) else -length if one_sided and along @ usual < 0 else length
     found = Ratio(mean, sd, float(np.linalg.norm(usual)), one_sided)
     return found.without_prior(float(np.linalg.norm(turn * local))).resolved
-
-
-def absorbing(hypothesis: Hypothesis, name: str = "") -> list[int]:
-    """Coordinates of the material and of the sizes of all effects but the one that is so called."""
-    found, position = list(range(hypothesis.material_size)), hypothesis.material_size
-    for effect in hypothesis.effects:
-        found += [position + i for i in effect.sizes if effect.name != name]
-        position += len(effect.coordinates)
-    return found
 
 
 def own_traces(white: Array, others: Array) -> Array:

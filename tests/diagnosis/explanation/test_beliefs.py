@@ -30,7 +30,7 @@ def test_energies_share_one(declared: str | None) -> None:
 
 
 def test_factors_count_whole_where_little_is_gained_and_less_the_more_there_is() -> None:
-    gains = np.array([-5.0, 0.0, 1.0, 10.0, 70.0, 140.0])
+    gains = np.array([-5.0, 0.0, 1.0, 10.0, 100.0, 200.0])
     counts = np.array([BELIEFS.counts(g) for g in gains])
     assert counts[0] == counts[1] == 1.0
     assert np.all(np.diff(counts[1:]) < 0)

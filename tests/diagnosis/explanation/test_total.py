@@ -46,14 +46,12 @@ def summed_up(
     promised: float = -np.inf,
     step: Mapping[str, Any] | None = None,
     flatter: float = 1.0,
-    unsought: Sequence[Any] = (),
 ) -> total.Total:
     """The sum where friction explains the curve, and Mullins beside it has a ``gain`` in ln Z.
 
     That changes by ``seen`` where what could not be seen counts as absent. Of four effects that can be seen some may be
     ``untried``, where traces of those that were not fitted have a ``promised`` ln of the Bayes factor. Beside the first
-    set there is a ``step``, if there is one. ``flatter`` : the power of `Beliefs.flattened`. ``unsought`` : effects of
-    which the test shows what an energy would.
+    set there is a ``step``, if there is one. ``flatter`` : the power of `Beliefs.flattened`.
     """
     monkeypatch.setattr(total, "BELIEFS", replace(BELIEFS, flatter=flatter))
     takes = {
@@ -76,7 +74,6 @@ def summed_up(
         return promised
 
     monkeypatch.setattr(total, "promised", foretold)
-    monkeypatch.setattr(total, "shows", lambda _, base, effect: effect.name != "permanent_set")
     monkeypatch.setattr(visible_module, "log_seen", visible)
     squares = {frozenset(): LEFT, frozenset({"friction"}): 20.0, frozenset({"friction", "mullins"}): 17.0}
     search = SimpleNamespace(
@@ -87,7 +84,6 @@ def summed_up(
         null=plain,
         plain={"gent": plain},
         visible=[*untried, *TRIED, *TRIED][:4],
-        unsought=unsought,
         question=SimpleNamespace(energy=None),
         twins=lambda: frozenset(),
         foreign=lambda _, bases, __: [] if step is None else [Foreign(SUDDEN, bases[0], 30.0, **step)],
@@ -142,17 +138,6 @@ def test_a_further_effect_that_nobody_fitted_is_not_excluded(monkeypatch: pytest
     assert [sum(p.values()) for p in found.values()] == pytest.approx([1.0, 1.0])
 
 
-def test_what_the_test_shows_as_an_energy_would_is_not_excluded_beside_what_is_there(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The data say nothing of it: it keeps a part of what was believed before. Alone it is nothing that is seen."""
-    unsought = [SimpleNamespace(odds=1.0, name=n) for n in ("viscoelastic", "permanent_set")]
-    p = effects(monkeypatch, seen=0.0, gain=-1.0, unsought=unsought)
-    prior = BELIEFS.log_set((1.0,) * 2, (1.0,) * 5) - BELIEFS.log_set((1.0,), (1.0,) * 5)
-    assert p["friction+viscoelastic"] / p["friction"] == pytest.approx(BELIEFS.unsought * np.exp(prior))
-    assert set(p) == {"none", "friction", "friction+mullins", "friction+viscoelastic", "friction+mullins+viscoelastic"}
-
-
 def test_a_fall_that_stays_is_at_most_twelve_times_less_probable_than_a_tear_that_leaves_its_trace() -> None:
     """Beside the same effects, with the same energy, and where it stands nearly as well."""
     base, torn = candidate("friction", log_evidence=-50.0), candidate("friction", "tearing", log_evidence=-20.0)
@@ -176,7 +161,6 @@ def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monke
         null=plain[0],
         plain=dict(zip(("gent", "yeoh"), plain, strict=True)),
         visible=[*TRIED, *TRIED],
-        unsought=(),
         question=SimpleNamespace(energy=None),
         twins=lambda: frozenset(),
         foreign=lambda *_: [],

@@ -12,7 +12,6 @@ from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.visible import LEAST, Ratio, log_seen, own_ratio
-from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
@@ -157,27 +156,6 @@ def test_a_bent_trace_is_as_large_as_what_a_fit_without_it_leaves(film: tuple[Se
     assert np.all(np.diff([absorbed, *seen]) >= 0)
     assert absorbed <= seen[1] < seen[2]
     assert log_seen(search, found, (), {"force_offset": 1e6}, 1.0) == log_seen(search, found, (), {}, 1.0)
-
-
-def test_what_the_free_law_of_another_effect_could_imitate_is_not_excluded(film: tuple[Search, float]) -> None:
-    """It is as it would be without. What the size of another could take is no trace of its own."""
-    search, _ = film
-    found = fitted(search)
-    both = with_effects(found.hypothesis, [components("effects")["friction"]()])
-    c = search.at(both, np.append(found.x, both.effects[-1].null))
-    assert c is not None
-    level, grows, offset = (both.names.index(n) for n in ("friction.level", "friction.grows", "force_offset.offset"))
-
-    def seen(slopes: Array) -> float:
-        return log_seen(search, replace(c, slopes=slopes), ("friction",), {}, 1.0)
-
-    def imitated_by(column: int) -> float:
-        slopes = c.slopes.copy()
-        slopes[:, column] = slopes[:, offset]
-        return seen(slopes)
-
-    assert imitated_by(level) < np.log(1e-3)
-    assert imitated_by(grows) == pytest.approx(seen(c.slopes), abs=0.5)
 
 
 def test_ratios_are_raised_and_never_lowered() -> None:
