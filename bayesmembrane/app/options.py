@@ -191,7 +191,6 @@ class RangeOption(OptionGroup):
     max_deflection_mm: Annotated[
         float | None, typer.Option("--max-deflection-mm", help="Use the curve up to here only, mm.")
     ] = None
-
     max_stretch: Annotated[
         float | None, typer.Option("--max-stretch", help="Use the curve of a strip or a sheet up to this stretch only.")
     ] = None
@@ -213,7 +212,7 @@ class RangeOption(OptionGroup):
         if self.max_deflection_mm is not None:
             raise SettingsError("the range is given twice", "--max-deflection-mm, --max-stretch", "give one of them")
         how = seen(whole)
-        if not how.bare:
+        if how.travel != "stretch":
             what = f"the curve is read over {how.travel}, and not over stretch"
             raise SettingsError(what, "--max-stretch", "give --max-deflection-mm")
         return how.meant(self.max_stretch)

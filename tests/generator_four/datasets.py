@@ -17,31 +17,10 @@ from tests.generator_four.courses import DriveCourse
 from tests.generator_four.noises import NoisyForce, scattered
 from tests.generator_four.recipes import BenchRecipe
 from tests.generator_four.trials import FoundCase, found_case
-from tests.generator_three.curves import FilmCurves
+from tests.generator_three.curves import SoundFilm
 from tests.generator_three.energies import COMMON, ENERGIES
 
 COLUMNS = "time_s,deflection_mm,force_N"
-
-
-@dataclass(frozen=True)
-class FaultlessFilm:
-    """The film without faults, SI."""
-
-    curves: FilmCurves
-
-    @property
-    def inner(self) -> float:
-        """m"""
-        return 1e-3 * self.curves.film.inner
-
-    @property
-    def outer(self) -> float:
-        """m"""
-        return 1e-3 * self.curves.film.outer
-
-    def force(self, deflection: Any) -> Any:
-        """(N,) N at deflections (N,) m."""
-        return self.curves.sound(1e3 * np.asarray(deflection))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +37,9 @@ class BenchDataset:
         return self.case.rig.course
 
     @cached_property
-    def film(self) -> FaultlessFilm:
+    def film(self) -> SoundFilm:
         """The film without faults."""
-        return FaultlessFilm(self.case.rig.curves)
+        return SoundFilm(self.case.rig.curves)
 
     @property
     def csv(self) -> str:

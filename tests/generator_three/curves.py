@@ -113,3 +113,24 @@ class FilmCurves:
         rubber = replace(self.rubber, stretch=stretch)
         exact = self.film.solve(between, rubber, (self._nodes[1:] + self._nodes[:-1]) / 2).force
         return float(abs(exact - self.curve(rubber.parameters, stretch)(between)).max())
+
+
+@dataclass(frozen=True)
+class SoundFilm:
+    """The film without faults, SI."""
+
+    curves: FilmCurves
+
+    @property
+    def inner(self) -> float:
+        """m"""
+        return 1e-3 * self.curves.film.inner
+
+    @property
+    def outer(self) -> float:
+        """m"""
+        return 1e-3 * self.curves.film.outer
+
+    def force(self, deflection: Any) -> Any:
+        """(N,) N at deflections (N,) m."""
+        return self.curves.sound(1e3 * np.asarray(deflection))

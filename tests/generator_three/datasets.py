@@ -11,9 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from tests.generator_three.curves import FilmCurves
+from tests.generator_three.curves import SoundFilm
 from tests.generator_three.energies import COMMON, ENERGIES
 from tests.generator_three.flaws import FLAWS
 from tests.generator_three.journey import Journey
@@ -22,27 +20,6 @@ from tests.generator_three.recipes import Recipe
 from tests.generator_three.trials import Accepted, accepted
 
 HEADER = "time_s,deflection_mm,force_N"
-
-
-@dataclass(frozen=True)
-class SoundFilm:
-    """The film without faults, SI."""
-
-    curves: FilmCurves
-
-    @property
-    def inner(self) -> float:
-        """m"""
-        return 1e-3 * self.curves.film.inner
-
-    @property
-    def outer(self) -> float:
-        """m"""
-        return 1e-3 * self.curves.film.outer
-
-    def force(self, deflection: Any) -> Any:
-        """(N,) N at deflections (N,) m."""
-        return self.curves.sound(1e3 * np.asarray(deflection))
 
 
 @dataclass(frozen=True, eq=False)
