@@ -89,17 +89,18 @@ study-loop: $(STAMP)
 study-cycles: $(STAMP)
 	$(PY) -m tests.studies.cycles $(CYCLES)
 
+# Pages in docs/studies say in words what was seen of one seed: tables are written beside the results instead.
 study-reliability: $(STAMP)
-	$(PY) -m tests.studies.reliability --jobs $(PYTEST_WORKERS) --table docs/studies/reliability.md $(RELIABILITY)
+	$(PY) -m tests.studies.reliability --jobs $(PYTEST_WORKERS) --table reports/study-reliability/reliability.md $(RELIABILITY)
 
 study-second: $(STAMP)
-	$(PY) -m tests.studies.reliability --generator second --jobs $(PYTEST_WORKERS) --table docs/studies/second.md $(SECOND)
+	$(PY) -m tests.studies.reliability --generator second --jobs $(PYTEST_WORKERS) --table reports/study-reliability/second.md $(SECOND)
 
 study-third: $(STAMP)
-	$(PY) -m tests.studies.reliability --generator third --jobs $(PYTEST_WORKERS) --table docs/studies/third.md $(THIRD)
+	$(PY) -m tests.studies.reliability --generator third --jobs $(PYTEST_WORKERS) --table reports/study-reliability/third.md $(THIRD)
 
 study-fourth: $(STAMP)
-	$(PY) -m tests.studies.reliability --generator fourth --jobs $(PYTEST_WORKERS) --table docs/studies/fourth.md $(FOURTH)
+	$(PY) -m tests.studies.reliability --generator fourth --jobs $(PYTEST_WORKERS) --table reports/study-reliability/fourth.md $(FOURTH)
 
 study-sequential: $(STAMP)
 	$(PY) -m tests.studies.sequential --table docs/studies/sequential.md $(SEQUENTIAL)

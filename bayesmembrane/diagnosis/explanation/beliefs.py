@@ -48,7 +48,7 @@ class Beliefs:
     cannot tell apart (`twins`). Of 14 cases of `visible` in which this held a set up, the other one was right in 13;
     with 4 instead of 12, two names fewer and a log score 0.01 worse."""
     flatter: float = 0.7
-    """Power to which probabilities are raised where none stands out: other laws than those of the library are behind
+    """Power to which those of sets are raised where none stands out: other laws than those of the library are behind
     most curves, and what is second or third by these laws is there more often than the sum says. Reckoned from stored
     answers: on the calibration half of `make study-reliability` (808 to 867) it takes the log score from -0.94 to -0.91
     and the truth in the 95 % set from 57 to 59 of 60, on seeds 32 to 34 of `make study-third` from -2.24 to -2.08 and
