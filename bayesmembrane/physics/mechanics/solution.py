@@ -99,6 +99,11 @@ class Curves:
         """(B, N) True where the force can be used."""
         return np.asarray(self.status == Status.OK)
 
+    def of(self, films: NDArray[np.intp]) -> Curves:
+        """Those of some films, in their order."""
+        every = {f.name: getattr(self, f.name) for f in fields(self)}
+        return replace(self, **{name: v[films] for name, v in every.items() if v is not None})
+
     def tally(self) -> dict[str, int]:
         """How many forces carry each status, by label; statuses that do not occur are left out."""
         codes, counts = np.unique(self.status, return_counts=True)

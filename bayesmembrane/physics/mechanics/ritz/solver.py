@@ -13,9 +13,10 @@ from bayesmembrane.physics.mechanics.locking import locking_deflection
 from bayesmembrane.physics.mechanics.request import Request, Spared, extensibility
 from bayesmembrane.physics.mechanics.ritz import kernels
 from bayesmembrane.physics.mechanics.ritz.batch import LEVELS, Shapes, films, follow, run
+from bayesmembrane.physics.mechanics.ritz.edges import ruled_out_at_the_edges
 from bayesmembrane.physics.mechanics.ritz.elements import evaluate
 from bayesmembrane.physics.mechanics.ritz.walk import RULED_OUT_ON_THE_WAY, Walks, nearly_resolved
-from bayesmembrane.physics.mechanics.solution import Curves, Note, Status
+from bayesmembrane.physics.mechanics.solution import Curves, Note, Status, joined
 
 # A film that is not deflected has a stiffness: it is looked at this far up (scaled).
 SMALLEST = 1e-4
@@ -54,8 +55,19 @@ def solve(request: Request) -> Curves:
     physically, and is given its reason; what is left is flagged.
 
     Of a film that is spared (a prior rules it out whatever its other forces are) what is not resolved at first stays
-    flagged. States whose forces are not ``read`` only show whether the film stays stable and convex.
+    flagged, and one whose edges show that already is not solved. States whose forces are not ``read`` only show whether
+    the film stays stable and convex.
     """
+    out = ruled_out_at_the_edges(request)
+    if not out.films.size:
+        return _solved(request)
+    rest = np.setdiff1d(np.arange(len(request.parameters)), out.films)
+    parts = [out.curves(request)] + ([_solved(request.of(rest))] if rest.size else [])
+    return joined(parts).of(np.argsort(np.concatenate([out.films, rest])))
+
+
+def _solved(request: Request) -> Curves:
+    """As `solve`, whatever the edges show."""
     d, order, back = _ascending(np.where(request.deflection == 0, SMALLEST, request.scaled))
     bound = extensibility(request)
     locked = np.zeros(d.shape, np.bool_)
