@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Uniform
@@ -21,9 +20,11 @@ class Hysteresis(Carried):
     """F = F0 + level z [(1 - steady) |F0| |delta / D|^grows + steady min(max |F0|, 10 |F0|)], a pull no less than 0.
 
     On each leg z = z_r + s u a / (t a + u), with s = +1 loading, -1 unloading, u the way since the reversal, z_r the z
-    there and a = 1 - s z_r what is left to turn; half of it is turned at u = t a. The length is t = travel ((1 -
-    similar) D + similar A), with A the length of the leg before the reversal (D, the full range, for the first
-    loading): the same in all cycles, or small in small cycles. z = 0 at the start, and max |F0| is the largest so far.
+    there and a = 1 - s z_r what is left to turn; half of it is turned at u = t a. Of the way a part ``by_force`` is
+    counted in force, the rest in deflection, each over its full range (`way_of`): sliders within the film know the one
+    or the other. The length is t = travel (1 - similar + similar A), with A the way of the leg before the reversal (1
+    for the first loading): the same in all cycles, or small in small cycles. z = 0 at the start, and max |F0| is the
+    largest so far.
 
     The reference's friction is constant in N (steady = 1); that of a filled rubber grows with the force that it carries
     (grows = 0), or, where the film lags behind the disc by a length, with the slope of the curve (about -1).
@@ -32,7 +33,8 @@ class Hysteresis(Carried):
     name: ClassVar[str] = "hysteresis"
     title: ClassVar[str] = "hysteresis of the material"
     reference: ClassVar[str] = (
-        "M. Berg, Veh. Syst. Dyn. 30 (1998) 197; M. Sjoberg, L. Kari, Nonlinear Dyn. 33 (2003) 323"
+        "M. Berg, Veh. Syst. Dyn. 30 (1998) 197; M. Sjoberg, L. Kari, Nonlinear Dyn. 33 (2003) 323; "
+        "W. D. Iwan, J. Appl. Mech. 33 (1966) 893"
     )
     signature: ClassVar[str] = (
         "Unloading below loading in every cycle and at any speed: closed loops, wider at larger forces or as wide at "
@@ -65,6 +67,7 @@ class Hysteresis(Carried):
         EffectParameter(
             "steady", "-", "part of the width that is as large at any force", Uniform(0.0, 1.0), (0.0, 1.0)
         ),
+        EffectParameter("by_force", "-", "part of the way that is counted in force", Uniform(0.0, 1.0), (0.0, 1.0)),
     )
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
@@ -73,27 +76,42 @@ class Hysteresis(Carried):
         # In the toe a steady width is no wider than the force: a slack film carries nothing, and none pushes.
         steady = np.minimum(np.fmax.accumulate(size, axis=-1), TOE * size)
         width = (1.0 - p[:, 4:5]) * size * part ** p[:, 3:4] + p[:, 4:5] * steady
-        out = force + p[:, :1] * turned(p[:, 1:2], p[:, 2:3], state.path) * width
+        z = turned(p[:, 1:2], p[:, 2:3], way_of(p[:, 5:6], force, state), state.path)
+        out = force + p[:, :1] * z * width
         return np.asarray(np.where(force > 0, np.maximum(out, 0.0), out))
 
 
-def turned(travel: Array, similar: Array, path: Motion) -> Array:
-    """z (B, N), -1 to 1, of the `Hysteresis` along a path, with ``travel`` and ``similar`` (B, 1)."""
-    out = np.empty((len(travel), path.deflection.size))
-    before, z = path.full_range, np.zeros((len(travel), 1))
-    for sign, start, part in _legs(path):
+def turned(travel: Array, similar: Array, come: Array, path: Motion) -> Array:
+    """z (B, N), -1 to 1, of the `Hysteresis` along a path, with ``travel`` and ``similar`` (B, 1).
+
+    ``come`` (B, N) is where the path is, 0 where it started, in parts of all there is: deflection, force, or both.
+    """
+    out = np.empty(come.shape)
+    before, z, start = np.ones_like(travel), np.zeros_like(travel), np.zeros_like(travel)
+    ends = np.flatnonzero(np.diff(path.leg)) + 1
+    if path.leg[0] < 0:  # a test that begins with unloading
+        start = come[:, :1]
+    for part in np.split(np.arange(path.deflection.size), ends):
+        sign = 1 if path.leg[part[0]] > 0 else -1
         # How far the leg has come: jitter within it is no way.
-        way = np.maximum.accumulate(np.maximum(sign * (path.deflection[part] - start), 0.0))
-        length = travel * ((1 - similar) * path.full_range + similar * before)
-        rest = 1.0 - sign * z
-        out[:, part] = z + sign * way * rest / np.maximum(length * rest + way, 1e-12 * path.full_range)
-        before, z = float(way[-1]), out[:, part[-1:]]
+        way = np.maximum.accumulate(np.maximum(sign * (come[:, part] - start), 0.0), axis=1)
+        length, rest = travel * (1 - similar + similar * before), 1.0 - sign * z
+        out[:, part] = z + sign * way * rest / np.maximum(length * rest + way, 1e-12)
+        before, z, start = way[:, -1:], out[:, part[-1:]], come[:, part[-1:]]
     return out
 
 
-def _legs(path: Motion) -> list[tuple[int, float, NDArray[np.intp]]]:
-    """(direction, deflection at which it starts, its points) of every leg; the first loading starts at zero."""
-    ends = np.flatnonzero(np.diff(path.leg)) + 1
-    parts = np.split(np.arange(path.deflection.size), ends)
-    starts = [0.0 if path.leg[0] > 0 else float(path.deflection[0]), *(float(path.deflection[i - 1]) for i in ends)]
-    return [(int(path.leg[part[0]]), start, part) for start, part in zip(starts, parts, strict=True)]
+def way_of(by_force: Array, force: Array, state: FilmState) -> Array:
+    """(B, N) where the path is: a part ``by_force`` (B, 1) in force, the rest in deflection, over their full ranges.
+
+    What is not reached yet is not known: each step in force is over what the tangent at the largest deflection so far
+    foretells of the full range.
+    """
+    path = state.path
+    foretold = np.abs(state.force) + np.abs(state.slope) * np.maximum(path.full_range - state.deflection, 0.0)
+    number = np.arange(path.deflection.size)
+    largest = path.deflection >= np.fmax.accumulate(path.deflection)
+    foretold = foretold[:, np.maximum.accumulate(np.where(largest, number, 0))]
+    over = 0.5 * (foretold + np.concatenate([foretold[:, :1], foretold[:, :-1]], axis=1))
+    steps = np.diff(force, axis=1, prepend=0.0) / np.where(over > 0, over, 1.0)
+    return np.asarray((1 - by_force) * path.deflection / path.full_range + by_force * np.cumsum(steps, axis=1))

@@ -4,14 +4,29 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from bayesmembrane.physics.effects.base import FilmState
-from bayesmembrane.physics.effects.hysteresis import Hysteresis, turned
+from bayesmembrane.physics.effects.hysteresis import Hysteresis, turned, way_of
 from tests.physics.effects.protocols import force, measured, path, staircase, two_speeds
 
 
 def loop(d: np.ndarray, travel: float = 0.05, similar: float = 0.5) -> np.ndarray:
-    return turned(np.array([[travel]]), np.array([[similar]]), path(d))[0]
+    way = path(d)
+    return turned(np.array([[travel]]), np.array([[similar]]), d[None] / way.full_range, way)[0]
+
+
+def carried(d: np.ndarray, elastic: np.ndarray, *shape: float) -> np.ndarray:
+    """(N,) of a film of these ``elastic`` forces (N,), with the coordinates ``shape``."""
+    slope = elastic_slope(d, elastic)
+    at = FilmState(force=elastic[None], slope=slope[None], deflection=d[None], path=path(d))
+    return Hysteresis().carried(np.array([shape]), elastic[None], at)[0]
+
+
+def elastic_slope(d: np.ndarray, elastic: np.ndarray) -> np.ndarray:
+    """(N,) the derivative of ``elastic`` (N,), which is a function of d alone."""
+    at, first = np.unique(d, return_index=True)
+    return np.interp(d, at, np.gradient(elastic[first], at))
 
 
 def triangles(*ends: float, points: int = 200) -> np.ndarray:
@@ -31,8 +46,8 @@ def test_it_is_the_same_at_any_speed() -> None:
 def test_loading_lies_above_and_unloading_below_in_every_cycle() -> None:
     d = staircase()
     m = measured(d)
-    level, travel, similar, grows, _ = Hysteresis().typical
-    change = force(m, "hysteresis", x=np.array([level, travel, similar, grows, 0.0])) / force(m) - 1
+    level, travel, similar, grows, *_ = Hysteresis().typical
+    change = force(m, "hysteresis", x=np.array([level, travel, similar, grows, 0.0, 0.0])) / force(m) - 1
     for cycle in range(1, 5):
         deep = (m.cycle == cycle) & (m.deflection < 0.6 * np.max(d[m.cycle == cycle]))
         assert np.all(change[deep & (m.leg < 0)] < 0)
@@ -83,19 +98,55 @@ def test_a_test_that_begins_with_unloading_has_a_start_too() -> None:
 def test_the_width_of_a_loop_grows_with_a_power_of_the_deflection(grows: float, power: float) -> None:
     """Of a force in proportion to the deflection: with the force, or the same everywhere."""
     d = triangles(0.04, 0.0, points=400)
-    at = FilmState(force=d[None], slope=np.ones_like(d)[None], deflection=d[None], path=path(d))
-    p = np.array([[0.1, 2e-3, 0.0, grows, 0.0]])
-    width = np.abs(Hysteresis().carried(p, d[None], at) - d)[0]
+    width = np.abs(carried(d, d, 0.1, 2e-3, 0.0, grows, 0.0, 0.0) - d)
     low, high = (np.argmin(np.abs(d[500:] - x)) + 500 for x in (0.01, 0.03))
     assert width[high] / width[low] == pytest.approx(3.0**power, rel=0.05)
 
 
 def test_a_steady_width_is_a_part_of_the_largest_force_so_far_and_no_film_pushes() -> None:
     d = triangles(0.02, 0.0, 0.04, 0.0, points=400)
-    at = FilmState(force=d[None], slope=np.ones_like(d)[None], deflection=d[None], path=path(d))
-    f = Hysteresis().carried(np.array([[0.1, 2e-3, 0.0, 0.0, 1.0]]), d[None], at)[0]
+    f = carried(d, d, 0.1, 2e-3, 0.0, 0.0, 1.0, 0.0)
     for leg, largest in ((1, 0.02), (3, 0.04)):
         part = slice(399 * leg, 399 * (leg + 1))
         pulled = (d[part] > 0.3 * largest) & (d[part] < 0.6 * largest)
         assert (d[part] - f[part])[pulled] == pytest.approx(np.full(np.count_nonzero(pulled), 0.1 * largest), rel=0.1)
     assert np.all(f >= 0)
+
+
+def test_once_the_full_range_is_reached_a_way_counted_in_force_is_that_of_the_force() -> None:
+    d = triangles(0.04, 0.01, 0.03, 0.0)
+    elastic = (d / 0.04) ** 3
+    at = FilmState(force=elastic[None], slope=elastic_slope(d, elastic)[None], deflection=d[None], path=path(d))
+    come = way_of(np.ones((1, 1)), elastic[None], at)[0]
+    later = slice(np.argmax(d), None)
+    assert np.diff(come[later]) == pytest.approx(np.diff(elastic[later]), rel=1e-9)
+    assert way_of(np.zeros((1, 1)), elastic[None], at)[0] == pytest.approx(d / 0.04)
+
+
+@pytest.mark.parametrize("most", [0.25, 0.6])
+def test_sliders_that_know_the_force_are_followed_better_by_a_way_in_force(most: float) -> None:
+    """Iwan's law: springs in a row with sliders, driven by the elastic force of a film that stiffens."""
+    d = triangles(0.03, 0.001, 0.04, 0.0, points=60)
+    elastic = 0.3 * d / 0.04 + 0.7 * (d / 0.04) ** 3
+    limits = np.geomspace(0.02, most, 6)
+    sliders = 0.05 * np.mean([stop(elastic, y) / y for y in limits], axis=0)
+    beside = np.maximum(elastic + sliders, 0.0) - elastic  # a slack film does not push
+
+    def left(by_force: float) -> float:
+        def rest(q: np.ndarray) -> np.ndarray:
+            return carried(d, elastic, q[0], np.exp(q[1]), *q[2:], by_force) - elastic - beside
+
+        bounds = ([0.0, np.log(2e-3), 0.0, -1.6, 0.0], [0.9, np.log(2.0), 1.0, 1.0, 1.0])
+        starts = ([0.05, np.log(t), 0.3, 0.0, 0.5] for t in (0.02, 0.2))
+        return min(least_squares(rest, x, bounds=bounds).cost for x in starts) ** 0.5
+
+    assert left(1.0) < 0.75 * left(0.0)
+
+
+def stop(drive: np.ndarray, limit: float) -> np.ndarray:
+    """(N,) force of a spring of stiffness 1 behind a slider that gives way at ``limit``."""
+    z, out = 0.0, []
+    for step in np.diff(drive, prepend=0.0):
+        z = min(max(z + step, -limit), limit)
+        out.append(z)
+    return np.array(out)
