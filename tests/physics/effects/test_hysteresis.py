@@ -8,6 +8,7 @@ from scipy.optimize import least_squares
 
 from bayesmembrane.physics.effects.base import FilmState
 from bayesmembrane.physics.effects.hysteresis import Hysteresis, turned, way_of
+from tests.generator_four.loss_laws import stopped
 from tests.physics.effects.protocols import force, measured, path, staircase, two_speeds
 
 
@@ -129,7 +130,7 @@ def test_sliders_that_know_the_force_are_followed_better_by_a_way_in_force(most:
     d = triangles(0.03, 0.001, 0.04, 0.0, points=60)
     elastic = 0.3 * d / 0.04 + 0.7 * (d / 0.04) ** 3
     limits = np.geomspace(0.02, most, 6)
-    sliders = 0.05 * np.mean([stop(elastic, y) / y for y in limits], axis=0)
+    sliders = 0.05 * np.mean([stopped(elastic, y) / y for y in limits], axis=0)
     beside = np.maximum(elastic + sliders, 0.0) - elastic  # a slack film does not push
 
     def left(by_force: float) -> float:
@@ -141,12 +142,3 @@ def test_sliders_that_know_the_force_are_followed_better_by_a_way_in_force(most:
         return min(least_squares(rest, x, bounds=bounds).cost for x in starts) ** 0.5
 
     assert left(1.0) < 0.75 * left(0.0)
-
-
-def stop(drive: np.ndarray, limit: float) -> np.ndarray:
-    """(N,) force of a spring of stiffness 1 behind a slider that gives way at ``limit``."""
-    z, out = 0.0, []
-    for step in np.diff(drive, prepend=0.0):
-        z = min(max(z + step, -limit), limit)
-        out.append(z)
-    return np.array(out)
