@@ -11,9 +11,8 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed, un
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
 from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, Tell, opened
-from bayesmembrane.diagnosis.explanation.growth import grown
-from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, set_name, summed
-from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, decided
+from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, set_name
+from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, explained
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
 from bayesmembrane.diagnosis.left.remaining import remaining
 from bayesmembrane.diagnosis.left.shape import residual_shape
@@ -58,9 +57,9 @@ def _diagnosed(case: OpenCase) -> Diagnosis:
         p = found.probabilities
         if min(p.effects[NOTHING], p.foreign[NOTHING]) > VERDICT.doubted:
             return _concluded(case, case.search, found)
-    every = grown(case)
-    assert isinstance(every.search, Search)
-    return _concluded(case, every.search, decided(case, summed(every)))
+    search, found = explained(case)
+    assert isinstance(search, Search)
+    return _concluded(case, search, found)
 
 
 def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:

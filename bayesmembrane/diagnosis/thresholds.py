@@ -399,6 +399,8 @@ class VerdictThresholds:
     most_members: int = 6
     """Of an ambiguous answer; if more are needed and no effect `leads`, nothing can be told. Only so many are held
     against each other when further tests are looked for."""
+    looked_again: int = 2
+    """Times that sets which nobody fitted are fitted for the answer's sake."""
     leads: float = 1 / 3
     """Probability of an effect, whatever else is at work, from which on a test that decides on it is worth making. Of
     seven films of seeds 993000 and 36 of `make study-second` and `study-third` whose first effect has a third to a half

@@ -127,6 +127,14 @@ def grown(case: DiagnosisCase) -> Grown:
     return out
 
 
+def with_sets(out: Grown, sets: Sequence[frozenset[str]]) -> None:
+    """Sets that promised nothing, from each of their parts; searched on and checked as what grew."""
+    known = set(out.found)
+    _add_effects(out, [step for names in sets for step in _last_steps(out, names)])
+    for c in out.search.all_polished([c for key, c in out.found.items() if key not in known]):
+        out.found[key_of(c)] = checked(out.search, c)
+
+
 def _checked(out: Grown) -> None:
     """Importance sampling of all that decides: of the null model, and of every hypothesis that has a share in the sum.
 

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
+from bayesmembrane.diagnosis.explanation.growth import grown, with_sets
 from bayesmembrane.diagnosis.explanation.promise import promised
-from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, Total, set_name
+from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, Total, set_name, summed
 from bayesmembrane.diagnosis.thresholds import GROWTH, VERDICT
 
 
@@ -50,6 +52,30 @@ def adequate(case: DiagnosisCase) -> Verdict:
     return Verdict("adequate", (judged,), (judged,), p, told)
 
 
+def explained(case: DiagnosisCase) -> tuple[Weighing, Verdict]:
+    """The verdict of all that could explain the curve, and the search under whose noise that was weighed.
+
+    Sets that nobody fitted, for they promised little, are fitted where the answer is one set or more according to them.
+    """
+    every = grown(case)
+    total = summed(every)
+    for _ in range(VERDICT.looked_again):
+        rivals = _unfitted_rivals(total, case.null.names)
+        if not rivals:
+            break
+        with_sets(every, rivals)
+        total = summed(every)
+    return every.search, decided(case, total)
+
+
+def _unfitted_rivals(total: Total, given: Sequence[str]) -> list[frozenset[str]]:
+    """Sets, the effects ``given`` among them, that were never fitted and share an answer with one set alone."""
+    fitted = {set_name(j.candidate, given) for j in total.ranking}
+    told = _smallest(total.probabilities.effects)
+    rest = [name for name in told if name not in fitted]
+    return [frozenset((*name.split("+"), *given)) for name in rest] if len(told) - len(rest) == 1 else []
+
+
 def decided(case: DiagnosisCase, total: Total) -> Verdict:
     """The verdict of a sum over hypotheses, of a model that misses something.
 
@@ -58,8 +84,11 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     """
     p, given = total.probabilities, case.null.names
     strange = _strange(total, given)
-    best = _first_of_each_set(total.ranking, given)
-    members = tuple(best[name] for name in _smallest(p.effects) if name in best)
+    best, told = _first_of_each_set(total.ranking, given), _smallest(p.effects)
+    fitted = [name for name in p.effects if name in best]
+    # What was never fitted is no member; that one alone is left of several does not make it sure.
+    count = max(sum(name in best for name in told), min(len(told), 2))
+    members = tuple(best[name] for name in fitted[:count])
     unknown = Verdict("unknown", (), total.ranking, p, strange)
     if not members or (len(members) > VERDICT.most_members and not p.likely(VERDICT.leads)):
         return unknown

@@ -13,9 +13,8 @@ from bayesmembrane.diagnosis.detection.detect import Detection
 from bayesmembrane.diagnosis.detection.scores import confounded
 from bayesmembrane.diagnosis.explanation.case import Question, Tell, opened
 from bayesmembrane.diagnosis.explanation.foreign import Foreign
-from bayesmembrane.diagnosis.explanation.growth import grown
-from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, summed
-from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, decided
+from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities
+from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, explained
 from bayesmembrane.diagnosis.joint.case import JointCase, opened_jointly
 from bayesmembrane.diagnosis.joint.effects import AT
 from bayesmembrane.diagnosis.joint.search import JointSearch
@@ -161,9 +160,9 @@ def _decided(case: JointCase) -> tuple[JointSearch, Verdict]:
         p = found.probabilities
         if min(p.effects[NOTHING], p.foreign[NOTHING]) > VERDICT.doubted:
             return case.search, found
-    every = grown(case)
-    assert isinstance(every.search, JointSearch)
-    return every.search, decided(case, summed(every))
+    search, found = explained(case)
+    assert isinstance(search, JointSearch)
+    return search, found
 
 
 def _concluded(

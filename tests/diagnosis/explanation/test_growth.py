@@ -19,6 +19,7 @@ from bayesmembrane.diagnosis.explanation.growth import (
     _with_exchanged,
     _with_less,
     _with_parts,
+    with_sets,
 )
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH
 from bayesmembrane.ground.registry import components
@@ -89,6 +90,29 @@ def test_what_decides_is_fitted_without_each_of_its_effects(monkeypatch: pytest.
     assert grown.found["gent", FRICTION].log_evidence == -9.5
     _with_parts(grown)
     assert shelf.asked == [FRICTION]
+
+
+def test_sets_that_the_answer_asks_for_are_fitted_from_their_parts_and_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was checked before keeps the ln Z that it has."""
+    shelf, both = Shelf({}, {FRICTION | MULLINS: -12.0}), claim("friction", "mullins")
+    parts = [candidate(claim("friction"), -10.0), candidate(claim("mullins"), -30.0), candidate(claim(), -60.0)]
+    steps: list[Any] = []
+
+    def add(out: Grown, pairs: Any) -> None:
+        steps.extend((frozenset(base.names), effect.name) for base, effect in pairs)
+        out.add(candidate(both, -15.0))
+
+    monkeypatch.setattr(growth, "_add_effects", add)
+    monkeypatch.setattr(growth, "checked", lambda _, c: replace(c, log_evidence=c.log_evidence + 1.0))
+    case = SimpleNamespace(effects=both.effects)
+    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, shelf)))
+    for c in parts:
+        grown.add(c)
+    with_sets(grown, [FRICTION | MULLINS])
+    assert set(steps) == {(FRICTION, "mullins"), (MULLINS, "friction")}
+    assert shelf.asked == [FRICTION | MULLINS]
+    found = {names: c.log_evidence for (_, names), c in grown.found.items()}
+    assert found == {FRICTION: -10.0, MULLINS: -30.0, frozenset(): -60.0, FRICTION | MULLINS: -11.0}
 
 
 def test_what_decides_is_searched_for_from_the_materials_of_others(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -67,6 +67,36 @@ def test_an_ambiguous_answer_holds_the_fewest_sets_that_are_enough() -> None:
     assert verdict({"friction": 0.6, "mullins": 0.36, "tearing": 0.04})[1] == ["friction", "mullins"]
 
 
+def unfitted(found: Total, *names: str) -> Total:
+    """The same sum, in which these sets have their probability by their traces alone."""
+    return replace(found, ranking=tuple(j for j in found.ranking if "+".join(j.candidate.names) not in names))
+
+
+def test_a_set_is_not_named_for_its_rivals_having_never_been_fitted() -> None:
+    case = cast(OpenCase, SimpleNamespace(null=candidate(NOTHING)))
+    sets = {"friction": 0.90, "mullins": 0.07, "tearing": 0.02, "clamp_slip": 0.01}
+    found = decided(case, unfitted(total(sets), "mullins"))
+    assert found.verdict == "ambiguous"
+    assert [m.candidate.names for m in found.members] == [("friction",), ("tearing",)]
+    assert decided(case, unfitted(total({"friction": 0.96, "mullins": 0.04}), "mullins")).verdict == "named"
+
+
+@pytest.mark.parametrize(("then", "answer"), [(0.97, "named"), (0.80, "ambiguous")])
+def test_sets_that_share_an_answer_with_one_that_was_fitted_are_fitted(
+    monkeypatch: pytest.MonkeyPatch, then: float, answer: str
+) -> None:
+    sets = {"friction": 0.90, "mullins": 0.07, "friction+mullins": 0.02, "tearing": 0.01}
+    before = unfitted(total(sets), "mullins", "friction+mullins")
+    sums = [before, total({"friction": then, "mullins": 1 - then})]
+    fitted: list[list[frozenset[str]]] = []
+    monkeypatch.setattr(verdicts, "grown", lambda _: SimpleNamespace(search=None))
+    monkeypatch.setattr(verdicts, "summed", lambda _: sums.pop(0))
+    monkeypatch.setattr(verdicts, "with_sets", lambda _, names: fitted.append(names))
+    _, found = verdicts.explained(cast(OpenCase, SimpleNamespace(null=candidate(NOTHING))))
+    assert fitted == [[frozenset({"mullins"})]]
+    assert (found.verdict, sums) == (answer, [])
+
+
 def test_too_many_sets_are_no_answer() -> None:
     names = ["friction", "mullins", "tearing", "clamp_slip", "viscoelastic", "hysteresis", "force_drift"]
     assert verdict(dict.fromkeys(names, 1 / 7))[0] == "unknown"
