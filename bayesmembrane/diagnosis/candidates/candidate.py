@@ -29,6 +29,7 @@ class Candidate:
     traces : (E, N) N, what each effect changes of the force; zeros for one that has no law that could be off
     theta : (h,) ln of noise over its reference, ln of the relative error of the energy and of every law
     form : (N,) N, of the residual what the form error carries; the rest is noise
+    by_draws : of ln Z what draws brought beyond its linear model, where they were asked
     """
 
     hypothesis: Hypothesis
@@ -40,6 +41,7 @@ class Candidate:
     traces: Array
     theta: Array
     form: Array
+    by_draws: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:

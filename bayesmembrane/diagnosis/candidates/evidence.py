@@ -85,11 +85,13 @@ class Linear:
     the covariance of the coefficients in units of their own eta.
 
     ln_scale_sd : sd of the prior of ln s about 0
+    counts : part of the likelihood that counts, a
     """
 
     data: Array
     blocks: tuple[Block, ...]
     ln_scale_sd: float
+    counts: float = 1.0
 
     def __post_init__(self) -> None:
         if not (self._gram.finite and np.all(np.isfinite(self._along))):
@@ -157,7 +159,7 @@ class Linear:
 
     def log_density(self, theta: Array) -> Density:
         """ln p(d, theta), without the noise's own determinant, which all hypotheses share."""
-        h, n = theta.size, self.data.size
+        h, n = theta.size, self.counts * self.data.size
         found = self._solved(theta)
         if found is None:  # larger than doubles hold: no size of noise or form error is like that
             return Density(-1e300, lambda: (np.zeros(h), -np.eye(h)))
@@ -179,7 +181,7 @@ class Linear:
 
         block by block.
         """
-        h, n = theta.size, self.data.size
+        h, n = theta.size, self.counts * self.data.size
         k = -found.inverse.whole
         k[np.diag_indices(found.own.size)] += 1.0
         inside, wide = self._members, self._members * found.own
@@ -360,3 +362,13 @@ def _log_between(mean: Array, sd: Array, low: Array, high: Array) -> Array:
 def extended(model: Linear, blocks: Sequence[Block]) -> Linear:
     """The same with further columns."""
     return replace(model, blocks=(*model.blocks, *blocks))
+
+
+def tempered(model: Linear, counts: float) -> Linear:
+    """The same with its likelihood to the power of ``counts``, and its priors as they are:
+
+        N(d; B c, s^2)^a  ~  s^(-a N) exp(-|a^(1/2) d - a^(1/2) B c|^2 / (2 s^2)).
+    """
+    root = float(np.sqrt(counts))
+    blocks = tuple(replace(b, columns=root * b.columns) for b in model.blocks)
+    return replace(model, data=root * model.data, blocks=blocks, counts=counts * model.counts)

@@ -68,7 +68,8 @@ def checked(search: Weighing, candidate: Candidate) -> Candidate:
     """
     rng = np.random.default_rng([search.seed, *candidate.label.encode()])
     found = sampled(search, candidate, rng)
-    return replace(candidate, log_evidence=candidate.log_evidence + found.difference) if found.good else candidate
+    more = found.difference
+    return replace(candidate, log_evidence=candidate.log_evidence + more, by_draws=more) if found.good else candidate
 
 
 def sampled(search: Weighing, candidate: Candidate, rng: np.random.Generator) -> ByDraws:

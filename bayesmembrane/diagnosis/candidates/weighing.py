@@ -7,11 +7,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import repeat
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
-from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, log_inside, weighed
+from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, log_inside, tempered, weighed
 from bayesmembrane.diagnosis.candidates.side_by_side import Freeing, Searching, run
 from bayesmembrane.diagnosis.candidates.standard import Standard
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
@@ -302,11 +303,28 @@ class Weighing(ABC):
         z = weighed(model, found.theta)
         mean = model.mean(z.theta)
         form = np.column_stack([c for _, c in self._columns(found)]) @ mean[u.size :]
-        out = replace(
-            found, log_evidence=z.log_evidence + self.log_corrected(found, model, z.theta), theta=z.theta, form=form
-        )
+        log_evidence = z.log_evidence + self.log_corrected(found, model, z.theta)
+        out = replace(found, log_evidence=log_evidence, theta=z.theta, form=form, by_draws=0.0)
         self._models.keep(out, model)  # it knows nothing of theta, nor of the evidence
         return out
+
+    @cached_property
+    def _tempered(self) -> WeakKeyDictionary[Candidate, tuple[float, float]]:
+        return WeakKeyDictionary()
+
+    def log_tempered(self, candidate: Candidate, counts: float) -> float:
+        """ln int p(u) L(u)^a du with a = ``counts``: ln Z of which a part of the likelihood counts, and the prior whole.
+
+        a ln Z would count a part of the prior too: what needs a large form error, or many parameters, would cost less
+        for it. Of what draws said of ln Z a part a is taken.
+        """
+        known = self._tempered.get(candidate)
+        if known is None or known[0] != counts:
+            model = tempered(self.linear(candidate), counts)
+            z = weighed(model, candidate.theta)
+            value = z.log_evidence + self.log_corrected(candidate, model, z.theta) + counts * candidate.by_draws
+            known = self._tempered[candidate] = counts, value
+        return known[1]
 
     def log_corrected(self, found: Candidate, model: Linear, theta: Array) -> float:
         """ln Z under the true priors within their bounds less ln Z of the linear ``model`` with its normal ones."""

@@ -64,10 +64,17 @@ class Grown:
         of = energy or candidate.hypothesis.material.name
         return of_set + BELIEFS.log_energy(of, self.case.question.energy, len(self.case.plain))
 
+    def log_evidences(self) -> dict[Key, float]:
+        """ln Z of each as far as likelihoods count (`Weighing.log_tempered`)."""
+        counts, best = self.counts, self.best
+        first = self.search.log_tempered(best, counts)
+        out = {key: first + counts * (c.log_evidence - best.log_evidence) for key, c in self.found.items()}
+        near = {key: c for key, c in self.found.items() if first - out[key] < GROWTH.share_reach}
+        return out | {key: self.search.log_tempered(c, counts) for key, c in near.items()}
+
     def weights(self) -> dict[Key, float]:
         """ln of the weight of each in the sum, but for what `seen` adds."""
-        counts = self.counts
-        return {key: counts * c.log_evidence + self.believed(c) for key, c in self.found.items()}
+        return {key: z + self.believed(self.found[key]) for key, z in self.log_evidences().items()}
 
     def seen(self) -> dict[Key, float]:
         """What the weight of each gains where effects below what can be seen count as absent."""

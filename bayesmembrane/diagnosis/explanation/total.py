@@ -211,12 +211,12 @@ def _leaders(every: Sequence[Candidate]) -> list[Candidate]:
 
 def _other_energies(grown: Grown, seen: Mapping[Key, float]) -> dict[Key, float]:
     """ln weight of the energies that a set was not fitted with, in which its effects are seen as with its best one."""
-    foretold = unfitted({key: c.log_evidence for key, c in grown.found.items()})
+    foretold = unfitted(grown.log_evidences())
     best: dict[frozenset[str], Candidate] = {}
     for c in sorted(grown.found.values(), key=lambda c: c.log_evidence):
         best[frozenset(c.names)] = c
     return {
-        (energy, names): grown.counts * z + grown.believed(best[names], energy) + seen[key_of(best[names])]
+        (energy, names): z + grown.believed(best[names], energy) + seen[key_of(best[names])]
         for (energy, names), z in foretold.items()
     }
 

@@ -88,23 +88,21 @@ class Ratio:
         places = np.concatenate([[faintest * (1 - 1e-9), faintest], usual * SCALES])
         return self._log_integral(log_q, places, self.sd / sqrt(counts))
 
-    @property
-    def log_before(self) -> float:
-        """ln int p(r) L(r) dr, its part in ln Z: fits are weighed with p(r) = 2 / (pi R (1 + (r / R)^2))."""
+    def log_before(self, counts: float) -> float:
+        """ln int p(r) L(r)^c dr, its part in ln Z: fits are weighed with p(r) = 2 / (pi R (1 + (r / R)^2))."""
         usual = max(self.expected, SHARPEST)
         constant = log(2 / (np.pi * usual))
-        return self._log_integral(lambda r: constant - np.log1p((r / usual) ** 2), usual * SCALES, self.sd)
+        own_sd = self.sd / sqrt(counts)
+        return self._log_integral(lambda r: constant - np.log1p((r / usual) ** 2), usual * SCALES, own_sd)
 
     def log_seen(self, counts: float, squares: float = 0.0) -> float:
-        """ln int q(r) L(r)^c dr - c ln int p(r) L(r) dr: what a weight of c ln Z gains where the prior is q, not p.
+        """ln int q(r) L(r)^c dr - ln int p(r) L(r)^c dr: what a weight gains where the prior is q, and not p.
 
-        A part c = ``counts`` of the likelihood speaks for or against an effect, but its prior whole: else a set whose
-        sizes cost much before the data would gain more by q than its likelihood does. With c = 1 it is ln E[q(r) /
-        p(r)] over the posterior.
+        Of the likelihood a part c = ``counts`` speaks for or against an effect, as in `Weighing.log_tempered`.
         ``squares`` : that the effect takes away beside the fit without it. A trace that is bent may be absorbed nearby
         though no fit without it comes near: where not even its expected size could be seen, these say how large it is.
         """
-        before = counts * self.log_before
+        before = self.log_before(counts)
         seen = self.at_least(sqrt(max(squares, 0.0))) if self.expected < BELIEFS.visible else self
         return max(seen.log_part(counts), before + log(LEAST)) - before
 
@@ -146,7 +144,7 @@ def all_seen(
 def log_seen(
     search: Weighing, candidate: Candidate, given: Collection[str], takes: Mapping[str, float], counts: float
 ) -> float:
-    """What a weight of ``counts`` ln Z gains where effects below what can be seen count as absent.
+    """What a weight gains where effects below what can be seen count as absent, with a part ``counts`` of likelihoods.
 
     The sum over the effects of a candidate but those given.
     ``takes`` : {effect: squares that it takes away beside the fit without it}, as far as there is one.

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import approx_fprime, minimize
 from scipy.stats import multivariate_normal, norm
 
-from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, log_inside, weighed
+from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, log_inside, tempered, weighed
 
 
 def model(seed: int, n: int = 60, size: float = 1.0) -> Linear:
@@ -34,16 +34,34 @@ def test_the_density_equals_that_of_the_dense_covariance(theta) -> None:
     assert linear.log_density(np.array(theta)).value == pytest.approx(dense(linear, np.array(theta)), abs=1e-8)
 
 
-def test_slopes_are_those_of_the_density() -> None:
-    linear, theta = model(2), np.array([0.1, -0.7, -1.5])
+@pytest.mark.parametrize("counts", [1.0, 0.4])
+def test_slopes_are_those_of_the_density(counts: float) -> None:
+    linear, theta = tempered(model(2), counts), np.array([0.1, -0.7, -1.5])
     numeric = approx_fprime(theta, lambda t: linear.log_density(t).value, 1e-6)
     assert linear.log_density(theta).slope == pytest.approx(numeric, rel=1e-4, abs=1e-4)
 
 
-def test_second_derivatives_are_those_of_the_slopes() -> None:
-    linear, theta = model(2), np.array([0.1, -0.7, -1.5])
+@pytest.mark.parametrize("counts", [1.0, 0.4])
+def test_second_derivatives_are_those_of_the_slopes(counts: float) -> None:
+    linear, theta = tempered(model(2), counts), np.array([0.1, -0.7, -1.5])
     numeric = approx_fprime(theta, lambda t: linear.log_density(t).slope, 1e-6)
     assert linear.log_density(theta).bend == pytest.approx(numeric, rel=1e-4, abs=1e-4)
+
+
+@pytest.mark.parametrize("counts", [1.0, 0.7, 0.2])
+def test_a_tempered_density_has_its_prior_whole(counts: float) -> None:
+    """int p(c) L(c)^a dc of one coefficient, by quadrature."""
+    rng, s, eta = np.random.default_rng(3), 1.3, 0.6
+    column = rng.standard_normal(12)
+    data = 0.8 * column + rng.standard_normal(12)
+    linear = tempered(Linear(data, (Block(column[:, None], (-1.0, 1.0)),), 0.25), counts)
+    theta = np.log([s, eta])
+
+    def density(c: float) -> float:
+        return float(norm.pdf(c, 0, eta) * np.exp(counts * norm.logpdf(data, c * column, s).sum()))
+
+    expected = np.log(quad(density, -6, 6, epsabs=0)[0]) + norm.logpdf(theta, [0.0, -1.0], [0.25, 1.0]).sum()
+    assert linear.log_density(theta).value == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -138,6 +138,19 @@ def _inverse(search: Search, found: Candidate) -> Array:
     return np.linalg.inv(eta[0] ** 2 * np.eye(N) + white @ white.T)
 
 
+def test_an_evidence_of_which_a_part_counts_has_its_prior_whole(cyclic) -> None:
+    """All of it: ln Z, what draws said of it too. A part: what is believed of the sizes costs as much as before."""
+    search, plain = cyclic
+    found = [plain, beside(search, plain, "force_offset")]
+    for c in found:
+        assert search.log_tempered(c, 1.0) == pytest.approx(c.log_evidence, abs=1e-3)
+        more = replace(c, by_draws=2.0)
+        assert search.log_tempered(more, 0.5) - search.log_tempered(c, 0.5) == pytest.approx(1.0, abs=1e-3)
+    whole, part = (search.log_tempered(found[1], a) - search.log_tempered(plain, a) for a in (1.0, 0.5))
+    assert whole < 0.0  # it is not there, and costs what it could have been
+    assert part < 0.7 * whole
+
+
 def test_traces_of_an_exact_effect_are_nothing(cyclic) -> None:
     search, plain = cyclic
     found = beside(search, plain, "force_offset")

@@ -49,6 +49,9 @@ class Shelf:
         named = [(h, frozenset(e.name for e in h.effects)) for h, _ in every]
         return [candidate(h, self.start[names]) if names in self.start else None for h, names in named]
 
+    def log_tempered(self, c: Candidate, counts: float) -> float:
+        return counts * c.log_evidence
+
     def all_polished(self, every: list[Candidate]) -> list[Candidate]:
         self.asked += [frozenset(c.names) for c in every]
         return [candidate(c.hypothesis, self.end[frozenset(c.names)]) for c in every]
@@ -128,7 +131,9 @@ def test_what_decides_is_searched_for_from_the_materials_of_others(monkeypatch: 
         asked.extend(sought)
         return [candidate(s.hypothesis, -30.0 if s.hypothesis is one.hypothesis else -9.0) for s in sought]
 
-    search = SimpleNamespace(fits=fits, all_polished=lambda every: every)
+    search = SimpleNamespace(
+        fits=fits, all_polished=lambda every: every, log_tempered=lambda c, counts: counts * c.log_evidence
+    )
     case = SimpleNamespace(null=plain, plain={"gent": plain}, visible=odds, question=SimpleNamespace(energy=None))
     grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
     for c in (plain, one, two):

@@ -77,7 +77,9 @@ def summed_up(
     monkeypatch.setattr(visible_module, "log_seen", visible)
     squares = {frozenset(): LEFT, frozenset({"friction"}): 20.0, frozenset({"friction", "mullins"}): 17.0}
     search = SimpleNamespace(
-        excess=lambda c: squares[frozenset(c.names)], expected_sizes=lambda e: np.array([e.size.scale])
+        excess=lambda c: squares[frozenset(c.names)],
+        expected_sizes=lambda e: np.array([e.size.scale]),
+        log_tempered=lambda c, counts: counts * c.log_evidence,
     )
     plain = candidate(log_evidence=-60.0)
     case = SimpleNamespace(
@@ -166,7 +168,11 @@ def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monke
         foreign=lambda *_: [],
         tell=lambda _: None,
     )
-    search = SimpleNamespace(excess=lambda c: LEFT, expected_sizes=lambda e: np.array([e.size.scale]))
+    search = SimpleNamespace(
+        excess=lambda c: LEFT,
+        expected_sizes=lambda e: np.array([e.size.scale]),
+        log_tempered=lambda c, counts: counts * c.log_evidence,
+    )
     grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
     both = [candidate("friction", log_evidence=-10.0, energy=name) for name in ("gent", "yeoh")]
     for c in (*plain, *both, candidate("mullins", log_evidence=-10.0)):
