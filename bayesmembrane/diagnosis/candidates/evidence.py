@@ -365,9 +365,9 @@ def extended(model: Linear, blocks: Sequence[Block]) -> Linear:
 
 
 def tempered(model: Linear, counts: float) -> Linear:
-    """The same with its likelihood to the power of ``counts``, and its priors as they are:
+    """The same with its likelihood to the power of a = ``counts``, and its priors as they are.
 
-    N(d; B c, s^2)^a  ~  s^(-a N) exp(-|a^(1/2) d - a^(1/2) B c|^2 / (2 s^2)).
+    N(d; B c, s^2)^a ~ s^(-a N) exp(-|a^(1/2) d - a^(1/2) B c|^2 / (2 s^2)), as if there were so many fewer readings.
     """
     root = float(np.sqrt(counts))
     blocks = tuple(replace(b, columns=root * b.columns) for b in model.blocks)

@@ -313,10 +313,11 @@ class Weighing(ABC):
         return WeakKeyDictionary()
 
     def log_tempered(self, candidate: Candidate, counts: float) -> float:
-        """ln int p(u) L(u)^a du with a = ``counts``: ln Z of which a part of the likelihood counts, and the prior whole.
+        """ln int p(u) L(u)^a du with a = ``counts``: of the likelihood a part counts, and the prior whole.
 
-        a ln Z would count a part of the prior too: what needs a large form error, or many parameters, would cost less
-        for it. Of what draws said of ln Z a part a is taken.
+        a ln Z would count a part of the prior too: what needs a large form error, or many parameters, would pay less
+        for it. J. W. Miller, D. B. Dunson, J. Am. Stat. Assoc. 114 (2019) 1113. Of what draws said of ln Z a part a is
+        taken.
         """
         known = self._tempered.get(candidate)
         if known is None or known[0] != counts:

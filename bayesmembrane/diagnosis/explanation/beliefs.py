@@ -53,16 +53,16 @@ class Beliefs:
     flatter: float = 0.6
     """Power to which those of sets are raised where none stands out: other laws than those of the library are behind
     most curves, and what is second or third by these laws is there more often than the sum says. Reckoned from stored
-    answers: on the 227 cases of `plain_gain` it takes the log score from -1.59 to -1.46 and the truth in the 95 % set from
-    194 to 207; no right name is lost, a wrong one is. With 0.7 it is -1.48 and 205, with 0.5 -1.46 and 210, but sets of
-    an answer are 11.5 in the mean, and not 8.0."""
+    answers: on the 227 cases of `plain_gain` it takes the log score from -1.59 to -1.46 and the truth in the 95 % set
+    from 194 to 207; no right name is lost, a wrong one is. With 0.7 it is -1.48 and 205, with 0.5 -1.46 and 210, but
+    there are 11.5 sets in an answer in the mean, and not 8.0."""
     energies_flatter: float = 0.4
     """Power to which probabilities of energies are raised, whether one stands out or not: beside a law that is a little
     off another energy than the true one may fit best. Chosen on 120 films of an energy of the library: 35 of the own
     generator's calibration half (888 to 927), 35 of the third generator (seed 35), 50 of the fourth (seed 11). Of 20
     energies that had 0.9 or more 14 were true; of the seven that are told so now five. Log score -1.76 as summed, -1.60
-    to the power of 0.7, -1.49 to 0.5, -1.46 to 0.2, which on the own generator is worse than none. With priors whole, on
-    the cases of `plain_gain`: -1.42 to 0.5, -1.37 to this one, -1.35 to 0.3 (own generator -0.87, -0.89, -0.94)."""
+    to the power of 0.7, -1.49 to 0.5, -1.46 to 0.2, which on the own generator is worse than none. With priors whole,
+    on the cases of `plain_gain`: -1.42 to 0.5, -1.37 to this one, -1.35 to 0.3 (own generator -0.87, -0.89, -0.94)."""
     stands_out: tuple[float, float] = (0.90, 0.95)
     """From the first of these on what is most probable begins to be left as it is, and from the second on it is: on
     those fresh seeds 45 of 50 were so (mean 0.98). To flatten these, too, takes two names of three, and one wrong one
