@@ -95,6 +95,26 @@ def test_what_decides_is_fitted_without_each_of_its_effects(monkeypatch: pytest.
     assert shelf.asked == [FRICTION]
 
 
+def test_what_is_far_behind_is_not_weighed_by_itself() -> None:
+    """Its ln Z is as far behind that of the best as a part of it says; the others have their priors whole."""
+    asked: list[frozenset[str]] = []
+
+    def log_tempered(c: Candidate, counts: float) -> float:
+        asked.append(frozenset(c.names))
+        return counts * c.log_evidence - 2.0 * len(c.names)
+
+    case = SimpleNamespace(null=candidate(claim(), 0.0))
+    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, SimpleNamespace(log_tempered=log_tempered))))
+    for names, z in (((), -1000.0), (("friction",), -10.0), (("friction", "mullins"), -9.0)):
+        grown.add(candidate(claim(*names), z))
+    counts = grown.counts
+    found = {names: z for (_, names), z in grown.log_evidences().items()}
+    assert frozenset() not in asked
+    assert found[FRICTION] == pytest.approx(counts * -10.0 - 2.0)
+    assert found[FRICTION | MULLINS] == pytest.approx(counts * -9.0 - 4.0)
+    assert found[frozenset()] == pytest.approx(counts * -1000.0 - 4.0)
+
+
 def test_sets_that_the_answer_asks_for_are_fitted_from_their_parts_and_checked(monkeypatch: pytest.MonkeyPatch) -> None:
     """What was checked before keeps the ln Z that it has."""
     shelf, both = Shelf({}, {FRICTION | MULLINS: -12.0}), claim("friction", "mullins")
