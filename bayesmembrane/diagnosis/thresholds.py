@@ -397,14 +397,14 @@ class VerdictThresholds:
     """Times by which an energy is more probable than another one with the same effects, up to which the one with fewer
     parameters stands for the set: what is sampled, and told. Probabilities are those of all."""
     most_members: int = 6
-    """Of an ambiguous answer; if more are needed and no effect `leads`, nothing can be told. Only so many are held
+    """Of an ambiguous answer; if more are needed and nothing `leads`, nothing can be told. Only so many are held
     against each other when further tests are looked for."""
     looked_again: int = 2
     """Times that sets which nobody fitted are fitted for the answer's sake."""
     leads: float = 1 / 3
-    """Probability of an effect, whatever else is at work, from which on a test that decides on it is worth making. Of
-    seven films of seeds 993000 and 36 of `make study-second` and `study-third` whose first effect has a third to a half
-    it is there in five; in the two whose first one has less there is none."""
+    """Probability of an effect, whatever else is at work, or of none, from which on a test that decides on it is worth
+    making. Of seven films of seeds 993000 and 36 of `make study-second` and `study-third` whose first effect has a
+    third to a half it is there in five; in the two whose first one has less there is none."""
     carried: float = 0.05
     """Relative error of an energy from which on none of those known is said to hold."""
     law_carried: float = 0.35

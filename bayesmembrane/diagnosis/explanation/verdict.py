@@ -90,7 +90,8 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     count = max(sum(name in best for name in told), min(len(told), 2))
     members = tuple(best[name] for name in fitted[:count])
     unknown = Verdict("unknown", (), total.ranking, p, strange)
-    if not members or (len(members) > VERDICT.most_members and not p.likely(VERDICT.leads)):
+    leads = p.likely(VERDICT.leads) or p.effects.get(NOTHING, 0.0) >= VERDICT.leads
+    if not members or (len(members) > VERDICT.most_members and not leads):
         return unknown
     first = members[0]
     if strange is not None and p.anything_foreign > 0.5 and _carries(strange, first, given):

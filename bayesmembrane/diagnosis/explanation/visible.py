@@ -91,9 +91,8 @@ class Ratio:
     def log_before(self, counts: float) -> float:
         """ln int p(r) L(r)^c dr, its part in ln Z: fits are weighed with p(r) = 2 / (pi R (1 + (r / R)^2))."""
         usual = max(self.expected, SHARPEST)
-        constant = log(2 / (np.pi * usual))
-        own_sd = self.sd / sqrt(counts)
-        return self._log_integral(lambda r: constant - np.log1p((r / usual) ** 2), usual * SCALES, own_sd)
+        constant, sd = log(2 / (np.pi * usual)), self.sd / sqrt(counts)
+        return self._log_integral(lambda r: constant - np.log1p((r / usual) ** 2), usual * SCALES, sd)
 
     def log_seen(self, counts: float, squares: float = 0.0) -> float:
         """ln int q(r) L(r)^c dr - ln int p(r) L(r)^c dr: what a weight gains where the prior is q, and not p.
