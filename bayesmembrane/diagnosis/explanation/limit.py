@@ -66,13 +66,23 @@ def _last_of_loadings(m: Measurement) -> NDArray[np.bool_]:
 def _limit_of(search: Search, base: Candidate, before: Limit | None) -> Limit | None:
     m = search.measurement
     flat = plateau_of(m.force)
-    if flat is None or not flat.largest or flat.readings < FOREIGN.plateau:
+    if flat is None or not flat.largest:
         return _before_the_converter(search, base, before)
     at = m.force >= flat.force - 1e-9 * abs(flat.force)
+    if np.count_nonzero(at & _moving(m)) < FOREIGN.plateau:
+        return _before_the_converter(search, base, before)
     # Each is within rounding of the limit.
     constant = -(flat.readings - 1) * float(np.log(max(flat.step, 1e-6 * flat.force)))
     found = _beside(search, base, at)
     return None if found is None else _with_evidence(search, base, found, at, flat.force, constant)
+
+
+def _moving(m: Measurement) -> NDArray[np.bool_]:
+    """(N,) False in holds: where the disc stands still, readings are alike for that."""
+    out = np.ones(len(m), dtype=bool)
+    for still in m.holds:
+        out[still] = False
+    return out
 
 
 def log_evidence_alone(search: Search, base: Candidate) -> float:

@@ -8,6 +8,7 @@ import pytest
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation.limit import limit_of, log_evidence_alone
+from bayesmembrane.diagnosis.left.shape import plateau_of
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -68,6 +69,22 @@ def test_one_that_leaves_more_does_not() -> None:
     assert log_evidence_alone(moved, again) == -np.inf
     plain, film, _ = fitted(2.0, True, 4110)
     assert log_evidence_alone(plain, film) == -np.inf
+
+
+@pytest.mark.parametrize("step", [1.5, 3.0])
+def test_a_hold_at_the_top_in_coarse_readings_is_no_limit(step: float) -> None:
+    """The film stands still, and its readings share the largest digit: that says nothing of the load cell."""
+    path = np.concatenate([np.linspace(0.0, 0.04, 121)[1:], np.full(60, 0.04), np.linspace(0.04, 0.0, 120)[1:]])
+    empty = measured(np.ones(path.size), path)
+    film = Forward(CLAIM, empty, empty.deflection, api.solve)(np.array([[np.log(16.0)]]), reached=False).force[0]
+    force = film + SD * np.random.default_rng(4141).standard_normal(film.size)
+    m = replace(empty, force=step * SD * np.round(force / (step * SD)))
+    assert plateau_of(m.force) is not None
+    search = Search(m, white_noise(m), 0, api.solve)
+    base = search.fit(CLAIM, search.material_starts(CLAIM))
+    assert base is not None
+    found = limit_of(search, base)
+    assert found is None or found.gain < 1.0
 
 
 def test_single_readings_that_go_astray_at_the_top_are_no_limit() -> None:
