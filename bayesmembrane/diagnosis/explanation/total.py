@@ -150,13 +150,20 @@ def summed(grown: Grown) -> Total:
 
 
 def _flattened(joint: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], float]:
-    """`Beliefs.flattened` over the sets beside each kind of what is foreign; together one, and falling."""
-    kinds = defaultdict[str, dict[str, float]](dict)
+    """`Beliefs.flattened` over the sets of effects beside each kind of what is foreign; together one, and falling.
+
+    No effect keeps what it has, for it is of laws that too much is said: of a hundred sets that are next to nothing
+    each, flattened with it, all together would come to more than it.
+    """
+    kinds, out = defaultdict[str, dict[str, float]](dict), dict[tuple[str, str], float]()
     for (name, kind), q in joint.items():
-        kinds[kind][name] = q
+        if name == NOTHING:
+            out[name, kind] = q
+        else:
+            kinds[kind][name] = q
+    out |= {(name, kind): q for kind, sets in kinds.items() for name, q in BELIEFS.flattened(sets).items()}
     whole = sum(joint.values())
-    flat = {kind: BELIEFS.flattened(sets) for kind, sets in kinds.items()}
-    return _falling({(name, kind): q / whole for kind, sets in flat.items() for name, q in sets.items()})
+    return _falling({key: q / whole for key, q in out.items()})
 
 
 def _like_a_tear(f: Foreign, every: Sequence[Candidate], weight: Callable[[Candidate], float]) -> float:

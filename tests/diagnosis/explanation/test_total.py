@@ -122,6 +122,16 @@ def test_sets_are_told_flattened_and_what_is_foreign_is_not(monkeypatch: pytest.
     assert [j.probability for j in flat.ranking] == sorted((j.probability for j in flat.ranking), reverse=True)
 
 
+def test_no_effect_keeps_what_it_has_where_sets_are_flattened() -> None:
+    """A hundred sets that are next to nothing each would else come to more than it."""
+    sets = {"friction": 0.2, **{f"set {i}": 0.003 for i in range(100)}}
+    flat = total._flattened({(NOTHING, NOTHING): 0.5, **{(name, NOTHING): p for name, p in sets.items()}})
+    assert flat[NOTHING, NOTHING] == pytest.approx(0.5)
+    assert {name: p for (name, _), p in flat.items() if name != NOTHING} == pytest.approx(BELIEFS.flattened(sets))
+    assert flat["friction", NOTHING] < 0.1
+    assert list(flat.values()) == sorted(flat.values(), reverse=True)
+
+
 def test_probabilities_add_up_to_one(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sum(effects(monkeypatch, seen=0.0, gain=-1.0).values()) == pytest.approx(1.0)
 
