@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import repeat
@@ -343,17 +343,22 @@ def beyond_noise(white: Array, candidate: Candidate) -> float:
     return max(float(white @ white) - (white.size - candidate.x.size), 0.0)
 
 
-def starts_with(bases: Sequence[Array], effect: Effect, expected: Array) -> list[Array]:
+def starts_with(
+    bases: Sequence[Array], effect: Effect, expected: Array, shapes: Sequence[Mapping[str, float]] | None = None
+) -> list[Array]:
     """Starts for ``bases`` (k,) with one more effect, in parts of its ``expected`` (s,) sizes: from the first a small
     and a middling one, from the others a small one, and both signs where both are allowed.
+
+    ``shapes`` : values of its other coordinates; without them usual ones, and from the first base `Effect.starts` too.
     """
+    from_first = [{}, *effect.starts] if shapes is None else shapes
     signs = (1.0,) if effect.size.one_sided else (1.0, -1.0)
     small, middling = SEARCH.small_share, SEARCH.middling_share
     out = []
     for i, base in enumerate(bases):
         for sign in signs:
             for share in (small, middling) if i == 0 else (small,):
-                for shape in [{}, *effect.starts] if i == 0 else [{}]:
+                for shape in from_first if i == 0 else [{}]:
                     theta = np.array([shape.get(p.name, p.typical) for p in effect.coordinates])
                     for j, scale in zip(effect.sizes, expected.tolist(), strict=True):
                         theta[j] = (effect.coordinates[j].null or 0.0) + sign * share * scale

@@ -12,6 +12,7 @@ from bayesmembrane.diagnosis.candidates.sampled import checked
 from bayesmembrane.diagnosis.candidates.weighing import Sought, Weighing, starts_with
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
+from bayesmembrane.diagnosis.explanation.foreign import Foreign
 from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pairs
 from bayesmembrane.diagnosis.explanation.twins import swapped
 from bayesmembrane.diagnosis.explanation.unfitted import Key
@@ -136,10 +137,46 @@ def grown(case: DiagnosisCase) -> Grown:
 
 def with_sets(out: Grown, sets: Sequence[frozenset[str]]) -> None:
     """Sets that promised nothing, from each of their parts; searched on and checked as what grew."""
-    known = set(out.found)
-    _add_effects(out, [step for names in sets for step in _last_steps(out, names)])
-    for c in out.search.all_polished([c for key, c in out.found.items() if key not in known]):
-        out.found[key_of(c)] = checked(out.search, c)
+    _beside_known(out, [step for names in sets for step in _last_steps(out, names)])
+
+
+def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
+    """Effects that begin at some moment, from those at which the force falls beside a set; True if any got better.
+
+    One is found from nearby only, and a search for a fall looks at every reading. What is best by that is grown from
+    once more.
+    """
+    sought = []
+    for f in falls:
+        for effect in out.case.visible:
+            shape = next((s for s in effect.starts if effect.begins in s), None)
+            if shape is not None and effect.sudden and effect.name not in f.base.names:
+                shapes = [{**shape, effect.begins: f.clock}]
+                starts = starts_with([f.base.x], effect, out.search.expected_sizes(effect), shapes)
+                sought.append(Sought(with_effects(f.base.hypothesis, [effect]), starts, f.base))
+    better = _kept(out, [c for c in out.search.fits(sought) if c is not None])
+    first = max(better, key=lambda c: c.log_evidence, default=None)
+    if first is not None and not out.case.question.quick and len(_own(out, first)) < BELIEFS.most:
+        rest = [e for e in out.case.visible if e.name not in first.names]
+        rest.sort(key=lambda e: -first_order(out.search, first, e))
+        _beside_known(out, [(first, e) for e in rest[: GROWTH.refits]])
+    return bool(better)
+
+
+def _beside_known(out: Grown, steps: Sequence[tuple[Candidate, Effect]]) -> None:
+    """Each of these candidates with one more effect, beside what was checked already."""
+    _kept(out, _fitted(out, steps))
+
+
+def _kept(out: Grown, fits: Sequence[Candidate]) -> list[Candidate]:
+    """Those that are better than what is known of their hypotheses, searched on and checked."""
+    better = []
+    for c in out.search.all_polished(fits):
+        known = out.found.get(key_of(c))
+        if known is None or c.log_evidence > known.log_evidence:
+            out.found[key_of(c)] = checked(out.search, c)
+            better.append(out.found[key_of(c)])
+    return better
 
 
 def _checked(out: Grown) -> None:
@@ -388,15 +425,20 @@ def _promising(out: Grown, base: Candidate, size: int) -> list[Effect]:
 
 
 def _add_effects(out: Grown, pairs: Sequence[tuple[Candidate, Effect]]) -> None:
-    """Each of these candidates with one more effect."""
+    """Each of these candidates with one more effect, where that is better than what is known of it."""
+    for c in _fitted(out, pairs):
+        out.add(c)
+
+
+def _fitted(out: Grown, pairs: Sequence[tuple[Candidate, Effect]]) -> list[Candidate]:
+    """Each of these candidates with one more effect, as far as there is a film."""
     sought = []
     for base, effect in pairs:
         names = [e.title for e in base.hypothesis.effects if e.name not in out.case.null.names]
         out.case.tell(f"refitting with {' and '.join([*names, effect.title])}")
         starts = starts_with(_bases(out, base), effect, out.search.expected_sizes(effect))
         sought.append(Sought(with_effects(base.hypothesis, [effect]), starts, base))
-    for c in out.search.fits(sought):
-        out.add(c)
+    return [c for c in out.search.fits(sought) if c is not None]
 
 
 def _bases(out: Grown, base: Candidate) -> list[Array]:

@@ -12,7 +12,7 @@ from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
-from bayesmembrane.diagnosis.explanation.growth import grown, with_sets
+from bayesmembrane.diagnosis.explanation.growth import grown, with_falls, with_sets
 from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, Total, set_name, summed
 from bayesmembrane.diagnosis.thresholds import GROWTH, VERDICT
@@ -55,10 +55,13 @@ def adequate(case: DiagnosisCase) -> Verdict:
 def explained(case: DiagnosisCase) -> tuple[Weighing, Verdict]:
     """The verdict of all that could explain the curve, and the search under whose noise that was weighed.
 
-    Sets that nobody fitted, for they promised little, are fitted where the answer is one set or more according to them.
+    Sets that nobody fitted, for they promised little, are fitted where the answer is one set or more according to them;
+    and what begins at some moment is looked for where the force is seen to fall.
     """
     every = grown(case)
     total = summed(every)
+    if with_falls(every, _falls(total)):
+        total = summed(every)
     for _ in range(VERDICT.looked_again):
         rivals = _unfitted_rivals(total, case.null.names)
         if not rivals:
@@ -66,6 +69,12 @@ def explained(case: DiagnosisCase) -> tuple[Weighing, Verdict]:
         with_sets(every, rivals)
         total = summed(every)
     return every.search, decided(case, total)
+
+
+def _falls(total: Total) -> list[Foreign]:
+    """Falls of the force that are worth a word."""
+    p = total.probabilities
+    return [f for f in total.foreign if f.falls and p.foreign.get(f.kind, 0.0) > VERDICT.foreign_told]
 
 
 def _unfitted_rivals(total: Total, given: Sequence[str]) -> list[frozenset[str]]:

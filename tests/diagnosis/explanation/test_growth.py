@@ -11,6 +11,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation import growth
 from bayesmembrane.diagnosis.explanation.case import OpenCase
+from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, Foreign
 from bayesmembrane.diagnosis.explanation.growth import (
     Grown,
     _last_steps,
@@ -19,6 +20,7 @@ from bayesmembrane.diagnosis.explanation.growth import (
     _with_exchanged,
     _with_less,
     _with_parts,
+    with_falls,
     with_sets,
 )
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH
@@ -121,11 +123,11 @@ def test_sets_that_the_answer_asks_for_are_fitted_from_their_parts_and_checked(m
     parts = [candidate(claim("friction"), -10.0), candidate(claim("mullins"), -30.0), candidate(claim(), -60.0)]
     steps: list[Any] = []
 
-    def add(out: Grown, pairs: Any) -> None:
+    def fitted(_: Grown, pairs: Any) -> list[Candidate]:
         steps.extend((frozenset(base.names), effect.name) for base, effect in pairs)
-        out.add(candidate(both, -15.0))
+        return [candidate(both, -15.0)]
 
-    monkeypatch.setattr(growth, "_add_effects", add)
+    monkeypatch.setattr(growth, "_fitted", fitted)
     monkeypatch.setattr(growth, "checked", lambda _, c: replace(c, log_evidence=c.log_evidence + 1.0))
     case = SimpleNamespace(effects=both.effects)
     grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, shelf)))
@@ -136,6 +138,47 @@ def test_sets_that_the_answer_asks_for_are_fitted_from_their_parts_and_checked(m
     assert shelf.asked == [FRICTION | MULLINS]
     found = {names: c.log_evidence for (_, names), c in grown.found.items()}
     assert found == {FRICTION: -10.0, MULLINS: -30.0, frozenset(): -60.0, FRICTION | MULLINS: -11.0}
+
+
+@pytest.mark.parametrize(("end", "better"), [(-9.0, True), (-20.0, False)])
+def test_a_tear_is_looked_for_where_the_force_is_seen_to_fall(
+    monkeypatch: pytest.MonkeyPatch, end: float, better: bool
+) -> None:
+    """From that moment, beside the set beside which it falls; what is best by that is grown from once more."""
+    torn, base = claim("mullins", "tearing"), candidate(claim("mullins"), -15.0)
+    tear = torn.effects[1]
+    asked: list[Any] = []
+    grew: list[Any] = []
+
+    def fits(sought: list[Any]) -> list[Candidate | None]:
+        asked.extend(sought)
+        return [candidate(s.hypothesis, -30.0) for s in sought]
+
+    monkeypatch.setattr(growth, "_fitted", lambda _, pairs: grew.extend(pairs) or [])
+    monkeypatch.setattr(growth, "checked", lambda _, c: c)
+    monkeypatch.setattr(growth, "first_order", lambda *_: 1.0)
+    search = SimpleNamespace(
+        fits=fits,
+        all_polished=lambda every: [replace(c, log_evidence=end) for c in every],
+        expected_sizes=lambda e: np.array([0.1]),
+    )
+    friction = claim("friction").effects[0]
+    case = SimpleNamespace(
+        null=candidate(claim(), 0.0), visible=[tear, friction], question=SimpleNamespace(quick=False)
+    )
+    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
+    grown.add(base)
+    grown.add(candidate(torn, -12.0))
+    falls = [
+        Foreign(SUDDEN, base, 30.0, size=-0.03, clock=0.7),
+        Foreign(SUDDEN, grown.best, 3.0, size=-0.01, clock=0.2),
+    ]
+    assert with_falls(grown, falls) is better
+    assert [[e.name for e in s.hypothesis.effects] for s in asked] == [["mullins", "tearing"]]
+    place = base.x.size + [c.name for c in tear.coordinates].index("moment")
+    assert {float(start[place]) for start in asked[0].starts} == {0.7}
+    assert grown.found["gent", MULLINS | {"tearing"}].log_evidence == max(end, -12.0)
+    assert [e.name for _, e in grew] == (["friction"] if better else [])
 
 
 def test_what_decides_is_searched_for_from_the_materials_of_others(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -92,9 +92,25 @@ def test_sets_that_share_an_answer_with_one_that_was_fitted_are_fitted(
     monkeypatch.setattr(verdicts, "grown", lambda _: SimpleNamespace(search=None))
     monkeypatch.setattr(verdicts, "summed", lambda _: sums.pop(0))
     monkeypatch.setattr(verdicts, "with_sets", lambda _, names: fitted.append(names))
+    monkeypatch.setattr(verdicts, "with_falls", lambda _, falls: bool(falls))
     _, found = verdicts.explained(cast(OpenCase, SimpleNamespace(null=candidate(NOTHING))))
     assert fitted == [[frozenset({"mullins"})]]
     assert (found.verdict, sums) == (answer, [])
+
+
+def test_falls_of_the_force_that_are_worth_a_word_are_looked_at_once_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    fall = replace(total({"mullins": 1.0}, strange=0.9), foreign=())
+    falls = [Foreign(SUDDEN, candidate("mullins"), 30.0, size=s) for s in (-0.1, 0.1)]
+    said = replace(fall, foreign=tuple(falls))
+    sums, asked = [said, total({"mullins+tearing": 0.97, "mullins": 0.03})], list[list[Foreign]]()
+    monkeypatch.setattr(verdicts, "grown", lambda _: SimpleNamespace(search=None))
+    monkeypatch.setattr(verdicts, "summed", lambda _: sums.pop(0))
+    monkeypatch.setattr(verdicts, "with_falls", lambda _, found: asked.append(found) or True)
+    _, found = verdicts.explained(cast(OpenCase, SimpleNamespace(null=candidate(NOTHING))))
+    assert asked == [falls[:1]]
+    assert [m.candidate.names for m in found.members] == [("mullins", "tearing")]
+    faint = replace(said, probabilities=total({"mullins": 1.0}, strange=0.01).probabilities)
+    assert verdicts._falls(faint) == []
 
 
 def test_too_many_sets_are_no_answer() -> None:
