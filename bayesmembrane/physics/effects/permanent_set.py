@@ -12,13 +12,18 @@ from bayesmembrane.ground.parameters import Array, HalfNormal, Uniform
 from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, REPEATED, SATURATION, growth
 from bayesmembrane.physics.effects.base import Deflection, EffectParameter, running_max
 
+FLAT = 1e-3
+"""Of the largest deflection so far: below it a film that has any set is slack."""
+
 
 @dataclass(frozen=True)
 class PermanentSet(Deflection):
-    """delta_film = delta - set G (1 - rejoin delta / m), slack below; m: largest deflection so far.
+    """delta_film = delta - set G (1 - rejoin y) (1 / (2 y))^relieved, y = delta / m, slack below; m: largest deflection
+    so far.
 
     G is the growth law of the test (1 after a first loading to its full range). ``rejoin`` 1 comes back to the first
-    loading curve at m, 0 keeps the whole shift.
+    loading curve at m, 0 keeps the whole shift. What is lost may be a length (``relieved`` 0), or stay in the film as a
+    force, which moves a flat, soft film further than a taut one (1 to 2, as the slope of its curve rises).
     """
 
     name: ClassVar[str] = "permanent_set"
@@ -33,7 +38,12 @@ class PermanentSet(Deflection):
     needs_return: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
-            "set", "m", "deflection at which the film is slack after the test", HalfNormal(1e-3), (0.0, 2e-2), 0.0
+            "set",
+            "m",
+            "shift at half of the largest deflection; of a lost length that at which the film is slack after the test",
+            HalfNormal(1e-3),
+            (0.0, 2e-2),
+            0.0,
         ),
         EXPONENT,
         EffectParameter(
@@ -46,6 +56,13 @@ class PermanentSet(Deflection):
         REPEATED,
         SATURATION,
         CREEPS,
+        EffectParameter(
+            "relieved",
+            "-",
+            "power by which the shift is larger the less the film is lifted",
+            HalfNormal(1.0),
+            (0.0, 4.0),
+        ),
     )
 
     def deflect(self, p: Array, deflection: Array, path: Motion) -> Array:
@@ -53,4 +70,5 @@ class PermanentSet(Deflection):
         lasting = p[:, :1] * growth(p[:, 1:2], p[:, 3:4], deflection, path, p[:, 4:5], p[:, 5:6])
         with np.errstate(all="ignore"):
             part = np.where(largest > 0, np.maximum(deflection, 0.0) / largest, 0.0)
-        return np.asarray(deflection - lasting * (1 - p[:, 2:3] * part))
+        further = (2 * np.maximum(part, FLAT)) ** -p[:, 6:7]
+        return np.asarray(deflection - lasting * (1 - p[:, 2:3] * part) * further)
