@@ -122,11 +122,16 @@ def summed(grown: Grown) -> Total:
     found = _foreign(grown, every, given)
     kinds = kinds_of(found)
     nothing = BELIEFS.log_foreign(0) if kinds else 0.0
-    terms = [(c, NOTHING, weight(c) + nothing) for c in every]
     # What the data do not speak for is neither seen nor excluded.
     told = [f for f in found if f.counted(counts) > BELIEFS.supported]
     strange = [own(f.base) + f.counted(counts) + BELIEFS.log_foreign(kinds) for f in told]
-    terms += [(f.base, f.kind, max(w, _like_a_tear(f, every, weight))) for f, w in zip(told, strange, strict=True)]
+    least = [_like_a_tear(f, every, weight) for f in told]
+    for f, w in zip(told, strange, strict=True):
+        for c in _tears(f, every):
+            raised[frozenset(c.names)] += max(w - float(np.log(BELIEFS.apart)) - weight(c) - nothing, 0.0)
+    every.sort(key=weight, reverse=True)
+    terms = [(c, NOTHING, weight(c) + nothing) for c in every]
+    terms += [(f.base, f.kind, max(w, low)) for f, w, low in zip(told, strange, least, strict=True)]
     guessed = [(key, w + raised[key[1]] + nothing) for key, w in others.items()]
     p = _normalised(np.array([*(w for _, _, w in terms), *(w for _, w in guessed)]))
     parts = [(c.hypothesis.material.name, set_name(c, given), kind) for c, kind, _ in terms]
@@ -172,17 +177,26 @@ def _like_a_tear(f: Foreign, every: Sequence[Candidate], weight: Callable[[Candi
     Where it stands nearly as well as the same energy with a tear beside the same set, neither is told to be more than
     `BELIEFS.apart` times as probable: what warms up, or a cell whose zero moves, leaves the same trace.
     """
-    stands, energy = f.base.log_evidence + f.gain - f.chance, f.base.hypothesis.material
-    tears = [
-        weight(c)
+    tears = [weight(c) for c in _tears(f, every) if c.log_evidence - _stands(f) < TWINS.behind]
+    return max(tears, default=-np.inf) - float(np.log(BELIEFS.apart))
+
+
+def _tears(f: Foreign, every: Sequence[Candidate]) -> list[Candidate]:
+    """The same energy and set as beside a fall, with an effect that comes so; not far behind it."""
+    return [
+        c
         for c in every
         if f.falls
-        and c.hypothesis.material is energy
-        and c.log_evidence - stands < TWINS.behind
+        and c.hypothesis.material is f.base.hypothesis.material
+        and _stands(f) - c.log_evidence < TWINS.behind
         and len(c.names) == len(f.base.names) + 1
         and all(e.sudden or e.name in f.base.names for e in c.hypothesis.effects)
     ]
-    return max(tears, default=-np.inf) - float(np.log(BELIEFS.apart))
+
+
+def _stands(f: Foreign) -> float:
+    """ln Z with it, where it was found."""
+    return f.base.log_evidence + f.gain - f.chance
 
 
 def _untried(grown: Grown, every: Sequence[Candidate], joint: Mapping[tuple[str, str], float]) -> dict[str, float]:

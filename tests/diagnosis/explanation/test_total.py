@@ -163,6 +163,39 @@ def test_a_fall_that_stays_is_at_most_twelve_times_less_probable_than_a_tear_tha
         assert least(gain, size, other) == -np.inf
 
 
+@pytest.mark.parametrize(("size", "behind", "held"), [(-0.1, 0.9, True), (0.1, 0.9, False), (-0.1, 1.1, False)])
+def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_little_better(
+    monkeypatch: pytest.MonkeyPatch, size: float, behind: float, held: bool
+) -> None:
+    monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
+    monkeypatch.setattr(total, "promised", lambda *_: -np.inf)
+    monkeypatch.setattr(visible_module, "log_seen", lambda *_: 0.0)
+    monkeypatch.setattr(total, "BELIEFS", replace(BELIEFS, flatter=1.0))
+    base = candidate("friction", log_evidence=-60.0)
+    torn = candidate("friction", "tearing", log_evidence=-35.0 - behind * TWINS.behind)
+    case = SimpleNamespace(
+        null=candidate(log_evidence=-90.0),
+        plain={"gent": base},
+        visible=[*TRIED, SimpleNamespace(odds=1.0, name="tearing")],
+        question=SimpleNamespace(energy=None),
+        twins=lambda: frozenset(),
+        foreign=lambda *_: [Foreign(SUDDEN, base, 24.0, -1.0, size=size)],
+        tell=lambda _: None,
+    )
+    search = SimpleNamespace(
+        excess=lambda c: LEFT,
+        expected_sizes=lambda e: np.array([e.size.scale]),
+        log_tempered=lambda c, counts: counts * c.log_evidence,
+    )
+    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
+    for c in (case.null, base, torn):
+        grown.add(c)
+    joint = total.summed(grown).joint
+    ratio = joint["friction", SUDDEN] / joint["friction+tearing", NOTHING]
+    assert (ratio == pytest.approx(BELIEFS.apart)) is held
+    assert held or ratio > 2 * BELIEFS.apart
+
+
 def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two energies are alike without effects: friction fitted with both has no more than Mullins fitted with one."""
     monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
