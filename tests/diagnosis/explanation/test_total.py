@@ -101,6 +101,23 @@ def summed_up(
     return total.summed(grown)
 
 
+def by_likelihood_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No twins, nothing that a trace promises, and all effects as large as can be seen."""
+    monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
+    monkeypatch.setattr(total, "promised", lambda *_: -np.inf)
+    monkeypatch.setattr(visible_module, "log_seen", lambda *_: 0.0)
+
+
+def grown_of(case: Any) -> Grown:
+    """Nothing yet, of a case under whose noise all fits leave the same squares."""
+    search = SimpleNamespace(
+        excess=lambda c: LEFT,
+        expected_sizes=lambda e: np.array([e.size.scale]),
+        log_tempered=lambda c, counts: counts * c.log_evidence,
+    )
+    return Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
+
+
 @pytest.mark.parametrize("seen", [1.5, 0.0, -25.0])
 def test_a_set_counts_as_far_as_its_effects_can_be_seen(monkeypatch: pytest.MonkeyPatch, seen: float) -> None:
     """Whole: it is the prior of its sizes that changes, while only a part of ln Z counts."""
@@ -167,9 +184,7 @@ def test_a_fall_that_stays_is_at_most_twelve_times_less_probable_than_a_tear_tha
 def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_little_better(
     monkeypatch: pytest.MonkeyPatch, size: float, behind: float, held: bool
 ) -> None:
-    monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
-    monkeypatch.setattr(total, "promised", lambda *_: -np.inf)
-    monkeypatch.setattr(visible_module, "log_seen", lambda *_: 0.0)
+    by_likelihood_alone(monkeypatch)
     monkeypatch.setattr(total, "BELIEFS", replace(BELIEFS, flatter=1.0))
     base = candidate("friction", log_evidence=-60.0)
     torn = candidate("friction", "tearing", log_evidence=-35.0 - behind * TWINS.behind)
@@ -182,12 +197,7 @@ def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_li
         foreign=lambda *_: [Foreign(SUDDEN, base, 24.0, -1.0, size=size)],
         tell=lambda _: None,
     )
-    search = SimpleNamespace(
-        excess=lambda c: LEFT,
-        expected_sizes=lambda e: np.array([e.size.scale]),
-        log_tempered=lambda c, counts: counts * c.log_evidence,
-    )
-    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
+    grown = grown_of(case)
     for c in (case.null, base, torn):
         grown.add(c)
     joint = total.summed(grown).joint
@@ -198,9 +208,7 @@ def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_li
 
 def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two energies are alike without effects: friction fitted with both has no more than Mullins fitted with one."""
-    monkeypatch.setattr(total, "levelled", lambda weights, *_: dict.fromkeys(weights, 0.0))
-    monkeypatch.setattr(total, "promised", lambda *_: -np.inf)
-    monkeypatch.setattr(visible_module, "log_seen", lambda *_: 0.0)
+    by_likelihood_alone(monkeypatch)
     plain = [candidate(log_evidence=-60.0, energy=name) for name in ("gent", "yeoh")]
     case = SimpleNamespace(
         null=plain[0],
@@ -211,12 +219,7 @@ def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monke
         foreign=lambda *_: [],
         tell=lambda _: None,
     )
-    search = SimpleNamespace(
-        excess=lambda c: LEFT,
-        expected_sizes=lambda e: np.array([e.size.scale]),
-        log_tempered=lambda c, counts: counts * c.log_evidence,
-    )
-    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
+    grown = grown_of(case)
     both = [candidate("friction", log_evidence=-10.0, energy=name) for name in ("gent", "yeoh")]
     for c in (*plain, *both, candidate("mullins", log_evidence=-10.0)):
         grown.add(c)
