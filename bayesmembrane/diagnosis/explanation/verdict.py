@@ -99,8 +99,7 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     count = max(sum(name in best for name in told), min(len(told), 2))
     members = tuple(best[name] for name in fitted[:count])
     unknown = Verdict("unknown", (), total.ranking, p, strange)
-    leads = p.likely(VERDICT.leads) or p.effects.get(NOTHING, 0.0) >= VERDICT.leads
-    if not members or (len(members) > VERDICT.most_members and not leads):
+    if not members or (len(members) > VERDICT.most_members and not _worth_telling(p)):
         return unknown
     first = members[0]
     if strange is not None and p.anything_foreign > 0.5 and _carries(strange, first, given):
@@ -110,6 +109,13 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     if _carried(first.candidate):
         return unknown
     return Verdict("named" if len(members) == 1 else "ambiguous", members, total.ranking, p, strange)
+
+
+def _worth_telling(p: Probabilities) -> bool:
+    """True if an effect or none leads, or a few sets do, however many share the rest."""
+    few, together = VERDICT.few
+    first = sum(list(p.effects.values())[:few])
+    return bool(p.likely(VERDICT.leads)) or p.effects.get(NOTHING, 0.0) >= VERDICT.leads or first >= together
 
 
 def _first_of_each_set(ranking: Sequence[Judged], given: Sequence[str]) -> dict[str, Judged]:
