@@ -42,7 +42,7 @@ class Foreign:
     relative : see ``size``
     place : number of the reading at which a step comes, else 0
     moment : its time in s, or None
-    clock : the same on the clock of the test (`Motion.clock`), s
+    on_clock : the same on the clock of the test (`Motion.clock`), s
     period : of a wave, s or m
     against : "time" or "deflection": what a wave repeats with
     share : part of the squares that the model leaves, which it takes away
@@ -59,7 +59,7 @@ class Foreign:
     relative: bool = False
     place: int = 0
     moment: float | None = None
-    clock: float = 0.0
+    on_clock: float = 0.0
     period: float = 0.0
     against: str = ""
     share: float = 0.0
@@ -229,8 +229,7 @@ def _steps(m: Measurement, base: Candidate) -> _Family:
         relative = best >= each
         size = coefficient * FOREIGN.size * (1.0 if relative else largest)
         moment = None if m.time is None else float(m.time[place])
-        clock = float(m.path.clock[m.on_path][place])
-        return replace(found, size=size, relative=relative, place=place, moment=moment, clock=clock)
+        return replace(found, size=size, relative=relative, place=place, moment=moment, on_clock=float(clock[place]))
 
     return _Family(SUDDEN, 2 * each, traces, told)
 

@@ -65,7 +65,7 @@ class Grown:
         of = energy or candidate.hypothesis.material.name
         return of_set + BELIEFS.log_energy(of, self.case.question.energy, len(self.case.plain))
 
-    def log_evidences(self) -> dict[Key, float]:
+    def log_tempered(self) -> dict[Key, float]:
         """ln Z of each as far as likelihoods count (`Weighing.log_tempered`)."""
         counts, best = self.counts, self.best
         first = self.search.log_tempered(best, counts)
@@ -75,7 +75,7 @@ class Grown:
 
     def weights(self) -> dict[Key, float]:
         """ln of the weight of each in the sum, but for what `seen` adds."""
-        return {key: z + self.believed(self.found[key]) for key, z in self.log_evidences().items()}
+        return {key: z + self.believed(self.found[key]) for key, z in self.log_tempered().items()}
 
     def seen(self) -> dict[Key, float]:
         """What the weight of each gains where effects below what can be seen count as absent."""
@@ -137,7 +137,7 @@ def grown(case: DiagnosisCase) -> Grown:
 
 def with_sets(out: Grown, sets: Sequence[frozenset[str]]) -> None:
     """Sets that promised nothing, from each of their parts; searched on and checked as what grew."""
-    _beside_known(out, [step for names in sets for step in _last_steps(out, names)])
+    _kept(out, _fitted(out, [step for names in sets for step in _last_steps(out, names)]))
 
 
 def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
@@ -151,7 +151,7 @@ def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
         for effect in out.case.visible:
             shape = next((s for s in effect.starts if effect.begins in s), None)
             if shape is not None and effect.sudden and effect.name not in f.base.names:
-                shapes = [{**shape, effect.begins: f.clock}]
+                shapes = [{**shape, effect.begins: f.on_clock}]
                 starts = starts_with([f.base.x], effect, out.search.expected_sizes(effect), shapes)
                 sought.append(Sought(with_effects(f.base.hypothesis, [effect]), starts, f.base))
     better = _kept(out, [c for c in out.search.fits(sought) if c is not None])
@@ -159,21 +159,19 @@ def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
     if first is not None and not out.case.question.quick and len(_own(out, first)) < BELIEFS.most:
         rest = [e for e in out.case.visible if e.name not in first.names]
         rest.sort(key=lambda e: -first_order(out.search, first, e))
-        _beside_known(out, [(first, e) for e in rest[: GROWTH.refits]])
+        _kept(out, _fitted(out, [(first, e) for e in rest[: GROWTH.refits]]))
     return bool(better)
 
 
-def _beside_known(out: Grown, steps: Sequence[tuple[Candidate, Effect]]) -> None:
-    """Each of these candidates with one more effect, beside what was checked already."""
-    _kept(out, _fitted(out, steps))
-
-
 def _kept(out: Grown, fits: Sequence[Candidate]) -> list[Candidate]:
-    """Those that are better than what is known of their hypotheses, searched on and checked."""
+    """Those that are better than what is known of their hypotheses, searched on and checked.
+
+    What is known may have been checked: linear evidences are compared, for only those are of one kind.
+    """
     better = []
     for c in out.search.all_polished(fits):
         known = out.found.get(key_of(c))
-        if known is None or c.log_evidence > known.log_evidence:
+        if known is None or c.log_evidence > known.log_evidence - known.by_draws:
             out.found[key_of(c)] = checked(out.search, c)
             better.append(out.found[key_of(c)])
     return better

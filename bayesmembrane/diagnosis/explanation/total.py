@@ -232,7 +232,7 @@ def _leaders(every: Sequence[Candidate]) -> list[Candidate]:
 
 def _other_energies(grown: Grown, seen: Mapping[Key, float]) -> dict[Key, float]:
     """ln weight of the energies that a set was not fitted with, in which its effects are seen as with its best one."""
-    foretold = unfitted(grown.log_evidences())
+    foretold = unfitted(grown.log_tempered())
     best: dict[frozenset[str], Candidate] = {}
     for c in sorted(grown.found.values(), key=lambda c: c.log_evidence):
         best[frozenset(c.names)] = c

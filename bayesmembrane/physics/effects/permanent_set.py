@@ -13,7 +13,7 @@ from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, REPEATED, S
 from bayesmembrane.physics.effects.base import Deflection, EffectParameter, running_max
 
 FLAT = 1e-3
-"""Of the largest deflection so far: below it a film that has any set is slack."""
+"""Of the largest deflection so far: below it the shift grows no more, for its power is without bounds at zero."""
 
 
 @dataclass(frozen=True)
