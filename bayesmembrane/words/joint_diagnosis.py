@@ -9,7 +9,14 @@ from bayesmembrane.diagnosis.explanation.total import NOTHING
 from bayesmembrane.diagnosis.joint.diagnose import DiagnosedTest, JointDiagnosis, JointMember
 from bayesmembrane.diagnosis.thresholds import VERDICT, WORDS
 from bayesmembrane.ground.registry import components
-from bayesmembrane.words.diagnosis import foreign_sentence, percent, set_aside_sentence, set_title, thinning_sentence
+from bayesmembrane.words.diagnosis import (
+    foreign_sentence,
+    percent,
+    probabilities_told,
+    set_aside_sentence,
+    set_title,
+    thinning_sentence,
+)
 from bayesmembrane.words.hypothesis import effect_title, material_title
 from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.seen import seen
@@ -69,10 +76,7 @@ def document(found: JointDiagnosis) -> dict[str, Any]:
 
 def sentence(found: JointDiagnosis) -> str:
     """What to read first: how probable, the verdict, how large and in which test, what remains."""
-    told = [f"{set_title(n)} {percent(q)}" for n, q in found.probabilities.effects.items() if q >= WORDS.probable][:3]
-    if (strange := found.probabilities.anything_foreign) >= WORDS.probable:
-        told.append(f"something foreign {percent(strange)}")
-    parts = [f"Probability: {', '.join(told)}.", _answer(found), _foreign(found)]
+    parts = [f"Probability: {', '.join(probabilities_told(found.probabilities))}.", _answer(found), _foreign(found)]
     if found.verdict != "adequate":
         parts += [_errors(found), remaining_sentence(found)]
     return " ".join(p for p in (*parts, *_left_out(found)) if p)

@@ -5,6 +5,7 @@ import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.explanation.total import Probabilities
 from bayesmembrane.diagnosis.left.shape import residual_shape
 from bayesmembrane.diagnosis.result import Thinned, thinning
 from bayesmembrane.ground.parameters import Array
@@ -13,7 +14,7 @@ from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.base import Rig
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
-from bayesmembrane.words.diagnosis import percent, thinning_sentence
+from bayesmembrane.words.diagnosis import percent, probabilities_told, thinning_sentence
 from bayesmembrane.words.shape import shape_in_words
 from bayesmembrane.words.sizes import flagged_size, units_of
 from bayesmembrane.words.units import SCALES, read_as, size_in_words
@@ -113,3 +114,22 @@ def test_a_rate_of_a_test_that_nobody_timed_says_what_is_assumed(timed: bool) ->
     x[1 + effect.sizes[0]] = 1e-4
     drifts = Candidate(h, x, nothing, nothing[:, None], 0.0, (), nothing[None], np.zeros(3), nothing)
     assert ("assumed 1 mm/s" in flagged_size(effect, drifts, m)) is not timed
+
+
+def test_what_is_sure_whatever_is_beside_it_is_told_first() -> None:
+    sets = {"viscoelastic": 0.5, "friction+viscoelastic": 0.3, "tearing+viscoelastic": 0.18, "tearing": 0.02}
+    told = probabilities_told(Probabilities(sets, {"yeoh": 1.0}, {"none": 0.9, "ripple": 0.1}))
+    relaxation = "viscoelastic relaxation"
+    assert told[:4] == [
+        f"{relaxation} 98 %",
+        "alone 50 %",
+        "with friction in the guide 30 %",
+        "with tearing of the film 18 %",
+    ]
+    sets = {"friction+viscoelastic": 0.6, "tearing": 0.4}
+    assert probabilities_told(Probabilities(sets, {"yeoh": 1.0}, {"none": 1.0})) == [
+        f"friction in the guide and {relaxation} 60 %",
+        "tearing of the film 40 %",
+    ]
+    sets = {"viscoelastic": 0.97, "friction+viscoelastic": 0.03}
+    assert probabilities_told(Probabilities(sets, {"yeoh": 1.0}, {"none": 1.0}))[0] == f"{relaxation} 97 %"
