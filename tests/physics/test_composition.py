@@ -85,24 +85,25 @@ def test_the_frame_takes_its_part(exponent: float) -> None:
     assert again == pytest.approx(total, rel=1e-12)
 
 
-@pytest.mark.parametrize("measure", [0.0, -2.0])
-def test_relaxation_is_the_convolution(measure: float) -> None:
+@pytest.mark.parametrize(("measure", "tilt"), [(0.0, 0.0), (-2.0, 0.0), (0.0, 0.4), (-1.0, -0.3)])
+def test_relaxation_is_the_convolution(measure: float, tilt: float) -> None:
     """Against direct quadrature of int (1 - G(t - s)) d(F / w^m)(s), with F / w^m linear between points."""
     d = staircase((0.03, 0.05), 15)
     rng = np.random.default_rng(3)
     time = np.cumsum(rng.uniform(0.2, 8.0, d.size))
     m = measured(d, time)
     g, tau, decades = 0.4, 12.0, 1.5
-    f, pushed = (force(m, "viscoelastic", x=np.array([g, tau, decades, part, measure])) for part in (0.0, 1.0))
+    f, pushed = (force(m, "viscoelastic", x=np.array([g, tau, decades, part, measure, tilt])) for part in (0.0, 1.0))
     clock, whole, weight = m.path.clock, direct("yeoh", d), (1 + d / np.max(d)) ** measure
     knots, values = np.concatenate([[0.0], clock]), np.concatenate([[0.0], whole / weight])
-    times = tau * 10 ** (decades * np.linspace(-5 / 12, 5 / 12, 6))
+    times = tau * 10 ** (decades * np.linspace(-9 / 20, 9 / 20, 10))
+    share = times**-tilt / np.sum(times**-tilt)
     fine = np.unique(np.concatenate([np.linspace(a, b, 400) for a, b in itertools.pairwise(knots)]))
     rate = np.diff(np.interp(fine, knots, values))
     middle = 0.5 * (fine[1:] + fine[:-1])
     for n in (0, 5, 20, d.size - 1):
         past = middle < clock[n]
-        gone = 1 - np.mean(np.exp(-(clock[n] - middle[past][:, None]) / times), axis=1)
+        gone = 1 - np.exp(-(clock[n] - middle[past][:, None]) / times) @ share
         left = whole[n] - g * weight[n] * (gone @ rate[past])
         assert pushed[n] == pytest.approx(left, rel=1e-4, abs=1e-6)
         assert f[n] == pytest.approx(max(left, 0.0), rel=1e-4, abs=1e-6)

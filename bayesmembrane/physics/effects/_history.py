@@ -63,21 +63,22 @@ def growth(
     return np.asarray((1 - repeated) * first + repeated * np.cumsum(again, axis=-1))
 
 
-def relaxing(values: Array, gap: Array, times: Array) -> Array:
-    """(B, N) mean over T ``times`` (B, T) of h, which relaxes to zero and is moved by ``values`` (B, N):
-    h_n = e_n h_(n-1) + s_n (v_n - v_(n-1)), from zero.
+def relaxing(values: Array, gap: Array, times: Array, shares: Array | None = None) -> Array:
+    """(B, N) sum over T ``times`` (B, T), with their ``shares`` (B, T) or with equal ones, of h, which relaxes to zero
+    and is moved by ``values`` (B, N): h_n = e_n h_(n-1) + s_n (v_n - v_(n-1)), from zero.
 
     Exact for values that move evenly over each ``gap`` (N,) of time, with g the gap in relaxation times: e = exp(-g)
     and s = (1 - e) / g. The values come from zero to the first one over its own gap. What relaxes with the way has
     gaps and lengths of that instead.
     """
     out = np.zeros_like(values)
-    _relax(values, np.ascontiguousarray(gap, dtype=float), np.ascontiguousarray(times, dtype=float), out)
-    return np.asarray(out / times.shape[1])
+    shares = np.full(times.shape, 1 / times.shape[1]) if shares is None else np.ascontiguousarray(shares, dtype=float)
+    _relax(values, np.ascontiguousarray(gap, dtype=float), np.ascontiguousarray(times, dtype=float), shares, out)
+    return out
 
 
 @compiled(error_model="numpy")
-def _relax(values, gap, times, out):  # type: ignore[no-untyped-def]
+def _relax(values, gap, times, shares, out):  # type: ignore[no-untyped-def]
     for b in range(values.shape[0]):
         for t in range(times.shape[1]):
             h, before, last, e, s = 0.0, 0.0, -1.0, 1.0, 1.0
@@ -93,4 +94,4 @@ def _relax(values, gap, times, out):  # type: ignore[no-untyped-def]
                         s = 1.0 - 0.5 * g
                 h = e * h + s * (values[b, n] - before)
                 before = values[b, n]
-                out[b, n] += h
+                out[b, n] += shares[b, t] * h
