@@ -29,6 +29,17 @@ class Periodicity:
     squares: float = 0.0
 
 
+def most_waves(measurement: Measurement) -> float:
+    """Waves over the range of the deflection that its steps tell from slower ones.
+
+    Two legs are often read half a step apart: what is smooth on each, and differs between them, repeats from step to
+    step there.
+    """
+    steps = np.abs(np.diff(measurement.deflection))
+    step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else np.inf
+    return float(np.ptp(measurement.deflection)) / (2 * step)
+
+
 def periodicity(measurement: Measurement, model: Whitened) -> Periodicity | None:
     """The wave that explains most of what a model leaves beside the reference, against time or against deflection.
 
@@ -44,7 +55,7 @@ def periodicity(measurement: Measurement, model: Whitened) -> Periodicity | None
     # In a hold a wave of the deflection stands still like the disc: only the readings in between tell two apart.
     moving = n - sum(hold.size for hold in measurement.holds)
     if moving >= DETECTION.fewest_points:
-        ends = REFERENCE.spline_columns / 2, moving / 2
+        ends = REFERENCE.spline_columns / 2, min(moving / 2, most_waves(measurement))
         found.append(_strongest(measurement.deflection, model, "deflection", ends))
     best = min(found, key=lambda f: f.p_value)
     return replace(best, p_value=min(1.0, len(found) * best.p_value))

@@ -18,6 +18,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, extended, weighed
 from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.detection.periodicity import most_waves
 from bayesmembrane.diagnosis.explanation.limit import Limit, limit_of
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
@@ -242,9 +243,9 @@ def _resting(time: float, since: Array) -> Array:
     return -np.expm1(-np.maximum(since, 0.0) / time)
 
 
-def _frequencies(readings: int) -> Array:
-    """Waves over the range that so many readings may show, near enough for none to be missed between two of them."""
-    most = max(readings / 2, FOREIGN.least_waves + 1)
+def _frequencies(most: float) -> Array:
+    """Up to ``most`` waves over the range, near enough for none to be missed between two of them."""
+    most = max(most, FOREIGN.least_waves + 1)
     count = min(int(np.ceil((most - FOREIGN.least_waves) / FOREIGN.wave_step)) + 1, FOREIGN.waves)
     return np.linspace(FOREIGN.least_waves, most, count)
 
@@ -253,9 +254,9 @@ def _waves(m: Measurement) -> _Family:
     """Cosines and sines over the readings' time, then over the deflection where the disc moves."""
     size = FOREIGN.size / 3 * float(np.max(np.abs(m.force)))
     moving = len(m) - sum(hold.size for hold in m.holds)
-    places = [("time", m.path.clock[m.on_path], _frequencies(len(m)))]
+    places = [("time", m.path.clock[m.on_path], _frequencies(len(m) / 2))]
     if moving >= FOREIGN.least_points:  # a wave of the deflection stands still in a hold, like the disc
-        places.append(("deflection", m.deflection, _frequencies(moving)))
+        places.append(("deflection", m.deflection, _frequencies(min(moving / 2, most_waves(m)))))
     phases = [(_phase(place), frequencies) for _, place, frequencies in places]
 
     def traces(numbers: NDArray[np.intp]) -> Array:

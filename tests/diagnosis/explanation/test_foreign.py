@@ -88,6 +88,15 @@ def test_in_noise_nothing_is_foreign(seed: int, rho: float) -> None:
     assert max(f.gain for f in foreign(search, base)) < 1.0
 
 
+def test_legs_read_half_a_step_apart_show_no_wave_of_their_steps() -> None:
+    """cos(2 pi x / step) is 1 on each loading and -1 on each unloading: it imitates any loop."""
+    up = np.linspace(1e-3, 0.04, 40)
+    d = np.concatenate([up, up[::-1] - 5e-4, up, up[::-1] - 5e-4])
+    loop = np.where(np.diff(d, prepend=0.0) > 0, 6 * SD, -6 * SD)
+    found = kind(foreign(*searched(film_on(d, np.arange(1.0, d.size + 1)), loop, 7)), WAVE)
+    assert found.period > 2e-3 or found.against == "time"
+
+
 def test_a_step_is_told_with_its_moment_and_its_part_of_the_force() -> None:
     m = film_on(*cycles())
     found = kind(foreign(*searched(m, 0.02 * m.force * (m.time > 140.0), 4408)), SUDDEN)
