@@ -1,6 +1,7 @@
 """A small fixed part of `make study-loop`: clear cases at strength 1, from a generator that shares no code."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.result import VERDICTS, Diagnosis
 from bayesmembrane.diagnosis.thresholds import VERDICT
 from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.ogden import Ogden
@@ -156,24 +158,42 @@ def test_what_the_form_of_a_named_effect_leaves_is_no_further_effect(tmp_path) -
     assert second.probabilities.effects["none"] > 0.3
 
 
-def test_a_relaxation_test_shows_relaxation() -> None:
-    """A strip is pulled within five seconds and held; the convolution is summed here, with a stretched exponential."""
-    time = np.concatenate([np.linspace(0.1, 5, 100), np.linspace(5.3, 100, 300)])
-    stretch = 1 + 0.8 * np.minimum(time / 5, 1)
+def held(time: Array, ramp: float, kept: Callable[[Array], Array], noise: float, seed: int) -> Measurement:
+    """A strip that is pulled within ``ramp`` s and held; the convolution with what is ``kept`` after a lag is summed
+    here, and ``noise`` is a part of the largest force.
+    """
+    stretch = 1 + 0.8 * np.minimum(time / ramp, 1)
     elastic = np.concatenate([[0.0], 60 * (stretch - 1 / stretch**2)])
     ticks = np.concatenate([[0.0], time])
     lag = time[:, None] - 0.5 * (ticks[1:] + ticks[:-1])
-    kernel = np.where(lag > 0, 1 - 0.35 * -np.expm1(-((np.maximum(lag, 0) / 12) ** 0.6)), 0.0)
+    kernel = np.where(lag > 0, kept(np.maximum(lag, 0)), 0.0)
     rig = Uniaxial()
     force = rig.width * (kernel @ np.diff(elastic))
-    noisy = force + 3e-3 * force.max() * np.random.default_rng(50811).standard_normal(time.size)
-    m = Measurement(rig.length * (stretch - 1), noisy, rig, Specimen("strip", 1e-3), time=time)
+    noisy = force + noise * force.max() * np.random.default_rng(seed).standard_normal(time.size)
+    return Measurement(rig.length * (stretch - 1), noisy, rig, Specimen("strip", 1e-3), time=time)
+
+
+def test_a_relaxation_test_shows_relaxation() -> None:
+    time = np.concatenate([np.linspace(0.1, 5, 100), np.linspace(5.3, 100, 300)])
+    m = held(time, 5.0, lambda lag: 1 - 0.35 * -np.expm1(-((lag / 12) ** 0.6)), 3e-3, 50811)
     found = diagnose(m, Hypothesis(materials()["neo_hookean"]))
     assert found.verdict in ("named", "ambiguous")  # a further effect that is not seen may be there
     assert all("viscoelastic" in j.candidate.names for j in found.members)
     assert found.probabilities.of_effect("viscoelastic") > 0.95
     assert next(iter(found.probabilities.effects)) == "viscoelastic"
     assert found.best.parameters["viscoelastic.strength"] == pytest.approx(0.35, rel=0.25)
+
+
+@pytest.mark.parametrize("seed", [50812, 50813])
+def test_a_power_law_of_time_over_four_decades_is_relaxation(seed: int) -> None:
+    """As raw tapes and filled rubbers relax: no single time, and no box of times, comes near it."""
+    time = np.concatenate([np.linspace(0.1, 10, 60), 10 + np.geomspace(0.2, 1800, 80)])
+    m = held(time, 10.0, lambda lag: (1 + lag / 0.05) ** -0.12, 1e-3, seed)
+    found = diagnose(m, Hypothesis(materials()["mooney_rivlin"]))
+    assert found.verdict in ("named", "ambiguous")
+    assert all("viscoelastic" in j.candidate.names for j in found.members)
+    assert next(iter(found.probabilities.effects)) == "viscoelastic"
+    assert found.after.reduced_chi2 < 2
 
 
 def test_a_stated_deviation_that_the_readings_contradict_raises_no_alarm(tmp_path) -> None:

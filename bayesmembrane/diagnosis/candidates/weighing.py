@@ -26,6 +26,8 @@ from bayesmembrane.physics.hypothesis import Hypothesis
 
 ROUND_OFF = 1e-11
 """Of the largest number of columns: what differs by less is the same."""
+POOR = 0.08
+"""A law's error from which on it may carry what its effect is to explain: one in four is larger before the data."""
 MODELS = 4
 """Linear models that are kept: what is looked for beside one candidate is looked for piece by piece."""
 
@@ -142,19 +144,43 @@ class Weighing(ABC):
     def polished(self, found: Candidate) -> Candidate:
         """The same hypothesis, searched on from where it is with the form error that it shows.
 
-        The end counts even if its evidence is less: that of the start rests on a linear model far from where it holds.
+        The form error keeps the traces of the start. Where it is large it may carry what the effects did, and leave
+        them nothing to do: then it is also searched with one that is no larger than usual. An end counts if its
+        evidence is more, or else if it is more probable than the start, whose evidence may rest on a linear model far
+        from where that holds.
         """
         return self.all_polished([found])[0]
 
     def all_polished(self, every: Sequence[Candidate]) -> list[Candidate]:
         """`polished` of each, side by side."""
+        asked = [(c, False) for c in every]
+        asked += [(c, True) for c in every if max(c.law_errors.values(), default=0.0) > POOR]
         searches = [
-            self._search(c.hypothesis, self._freeing(c, False), c.x[None, :], SEARCH.last_iterations) for c in every
+            self._search(c.hypothesis, self._freeing(c, capped), c.x[None, :], SEARCH.last_iterations)
+            for c, capped in asked
         ]
         run(searches, self.batches)
         reached = [s for s in searches if np.isfinite(s.size[0])]
         found = dict(zip(reached, self._candidates([(s.hypothesis, s.axes, s.u[0]) for s in reached]), strict=True))
-        return [found.get(s, c) for c, s in zip(every, searches, strict=True)]
+        best = {id(c): c for c in every}
+        for (c, capped), search in zip(asked, searches, strict=True):
+            end, so_far = found.get(search, c), best[id(c)]
+            best[id(c)] = max(so_far, end, key=_evidence) if capped else self._better(end, so_far)
+        return [best[id(c)] for c in every]
+
+    def _better(self, end: Candidate, start: Candidate) -> Candidate:
+        """The end of a search, or its start."""
+        if end is start or end.log_evidence >= start.log_evidence:
+            return end
+        return end if self.log_there(end) >= self.log_there(start) else start
+
+    def log_there(self, candidate: Candidate) -> float:
+        """ln p(y, x) at the coordinates x of a candidate, form error and noise integrated out: no linear model of the
+        film is in it.
+        """
+        axes = self.axes(candidate.hypothesis)
+        rest = Linear(self.noise.white(candidate.residual), tuple(self._forms(candidate)), self.scale_sd)
+        return weighed(rest, candidate.theta).log_evidence + float(axes.log_prior(axes.to_u(candidate.x)))
 
     def weighed_anew(self, candidate: Candidate) -> Candidate:
         """The same fit under the present noise: its evidence moves with it, and the linear model says how."""
@@ -364,6 +390,10 @@ def starts_with(
                         theta[j] = (effect.coordinates[j].null or 0.0) + sign * share * scale
                     out.append(np.concatenate([base, effect.within_bounds(theta)]))
     return out
+
+
+def _evidence(candidate: Candidate) -> float:
+    return candidate.log_evidence
 
 
 def _eta(usual: float, found: float, capped: bool) -> float:
