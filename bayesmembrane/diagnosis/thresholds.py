@@ -522,6 +522,8 @@ class WordsThresholds:
 
     likely: float = 0.5
     """Probability of an effect, summed over sets, from which on an ambiguous answer says so."""
+    nearly_all: float = 0.9
+    """The same from which on it is told first, and the sets by what they add to it."""
     rounded: float = 0.25
     """Part of the variance of the noise that is rounding, from which on it is told."""
     listed_sets: int = 4

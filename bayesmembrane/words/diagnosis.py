@@ -144,23 +144,24 @@ def probability_sentence(found: Diagnosis) -> str:
 
 def probabilities_told(p: Probabilities) -> list[str]:
     """The most probable sets of effects, and what is foreign where it counts: ``viscoelastic relaxation 99 %``, ``alone
-    60 %``, ``with friction in the guide 30 %``. What is sure in sum where no set is comes first.
+    60 %``, ``with friction in the guide 30 %``. What is in nearly all of them comes first, where no set is sure.
     """
-    probable, sure = [(n, q) for n, q in p.effects.items() if q >= WORDS.probable][:3], set(p.sure())
+    probable = [(name, q) for name, q in p.effects.items() if q >= WORDS.probable][:3]
+    first = set(p.likely(WORDS.nearly_all))
     told = [f"{set_title(name)} {percent(q)}" for name, q in probable]
-    if sure and max(p.effects.values()) < VERDICT.sure:
-        in_sum = sum(q for name, q in p.effects.items() if sure <= set(name.split("+")))
-        told = [f"{set_title('+'.join(sorted(sure)))} {percent(in_sum)}"]
-        told += [f"{_beyond(sure, name)} {percent(q)}" for name, q in probable]
+    if first and max(p.effects.values()) < VERDICT.sure:
+        in_sum = sum(q for name, q in p.effects.items() if first <= set(name.split("+")))
+        told = [f"{set_title('+'.join(sorted(first)))} {percent(in_sum)}"]
+        told += [f"{_beyond(first, name)} {percent(q)}" for name, q in probable]
     if p.anything_foreign >= WORDS.probable:
         told.append(f"something foreign {percent(p.anything_foreign)}")
     return told
 
 
-def _beyond(sure: set[str], name: str) -> str:
-    """A set of effects after those that are sure were told."""
-    rest = sorted(set(name.split("+")) - sure)
-    if not sure <= set(name.split("+")):
+def _beyond(first: set[str], name: str) -> str:
+    """A set of effects after those of ``first`` were told."""
+    rest = sorted(set(name.split("+")) - first)
+    if not first <= set(name.split("+")):
         return set_title(name)
     return f"with {set_title('+'.join(rest))}" if rest else "alone"
 

@@ -116,7 +116,7 @@ def test_a_rate_of_a_test_that_nobody_timed_says_what_is_assumed(timed: bool) ->
     assert ("assumed 1 mm/s" in flagged_size(effect, drifts, m)) is not timed
 
 
-def test_what_is_sure_whatever_is_beside_it_is_told_first() -> None:
+def test_what_is_in_nearly_all_sets_is_told_first() -> None:
     sets = {"viscoelastic": 0.5, "friction+viscoelastic": 0.3, "tearing+viscoelastic": 0.18, "tearing": 0.02}
     told = probabilities_told(Probabilities(sets, {"yeoh": 1.0}, {"none": 0.9, "ripple": 0.1}))
     relaxation = "viscoelastic relaxation"
