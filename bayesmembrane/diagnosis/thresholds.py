@@ -122,6 +122,8 @@ class SearchThresholds:
     """Of the usual size of an effect: the second start, from the best fit of the plain model only."""
     last_iterations: int = 8
     """Steps from the best end, once its own form error is known."""
+    polishings: int = 3
+    """Times that these are made at most, where they show another form error than they were made with."""
     slow_below: float = 3e-5
     """Of the sum of squares: searches whose steps gain less are near enough, for the linear model knows the rest."""
     settled: float = 3e-7
@@ -347,6 +349,8 @@ class ForeignThresholds:
     several not to be grown."""
     settled_sd: float = 3.0
     """Standard deviations of the squares of noise within which what it leaves is noise."""
+    beyond: float = 4.0
+    """Standard deviations of the noise by which a reading may be above a limit of the load cell."""
     ln_unnamed: tuple[float, float] = (-4.6, 1.0)
     """Mean and sd of ln of what is smooth and has no name, in parts of the force: 1 % within a factor of three."""
     bases: int = 3

@@ -147,12 +147,23 @@ class Weighing(ABC):
         The form error keeps the traces of the start. Where it is large it may carry what the effects did, and leave
         them nothing to do: then it is also searched with one that is no larger than usual. An end counts if its
         evidence is more, or else if it is more probable than the start, whose evidence may rest on a linear model far
-        from where that holds.
+        from where that holds. Where a law turns out to be off by another error, it is searched once more.
         """
         return self.all_polished([found])[0]
 
     def all_polished(self, every: Sequence[Candidate]) -> list[Candidate]:
-        """`polished` of each, side by side."""
+        """`polished` of each, side by side, and again where that showed another form error than it was done with."""
+        out, todo = list(every), list(range(len(every)))
+        for _ in range(SEARCH.polishings):
+            ends = self._searched_on([out[i] for i in todo])
+            moved = [_moved(out[i].law_errors, end.law_errors) for i, end in zip(todo, ends, strict=True)]
+            for i, end in zip(todo, ends, strict=True):
+                out[i] = end
+            todo = [i for i, again in zip(todo, moved, strict=True) if again]
+        return out
+
+    def _searched_on(self, every: Sequence[Candidate]) -> list[Candidate]:
+        """The best of where each was and where searches from there end, by its form error and by a usual one."""
         asked = [(c, False) for c in every]
         asked += [(c, True) for c in every if max(c.law_errors.values(), default=0.0) > POOR]
         searches = [
@@ -390,6 +401,11 @@ def starts_with(
                         theta[j] = (effect.coordinates[j].null or 0.0) + sign * share * scale
                     out.append(np.concatenate([base, effect.within_bounds(theta)]))
     return out
+
+
+def _moved(before: Mapping[str, float], after: Mapping[str, float]) -> bool:
+    """True if an error of a law is another one than it was, by more than a factor of e."""
+    return any(abs(np.log(after[name] / before[name])) > 1.0 for name in before)
 
 
 def _evidence(candidate: Candidate) -> float:

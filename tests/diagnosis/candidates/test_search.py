@@ -20,6 +20,7 @@ from bayesmembrane.physics.form_error import form_columns, traces
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.diagnosis.curves import triangle, white_noise
 from tests.generator.film import Film
 
@@ -177,3 +178,26 @@ def test_a_polished_fit_is_where_its_linear_model_has_its_mode(cyclic, name) -> 
     inside = ~standard(found.hypothesis, search.measurement).one_sided  # at a bound the mode may lie beyond
     off = (mean[:k] - search.coefficients_at(found)) / np.sqrt(np.diag(covariance))[:k]
     assert np.max(np.abs(off[inside])) < 0.5
+
+
+def test_a_large_form_error_keeps_no_search_from_the_film() -> None:
+    """A strip that relaxes by a power of time: searched on as if the law were off by 40 %, it had ended 35 % of the
+    force away, where that error would have carried it.
+    """
+    time = np.concatenate([np.linspace(0.1, 10, 60), 10 + np.geomspace(0.2, 1800, 80)])
+    stretch = 1 + 0.8 * np.minimum(time / 10, 1)
+    ticks = np.concatenate([[0.0], time])
+    lag = np.maximum(time[:, None] - 0.5 * (ticks[1:] + ticks[:-1]), -0.04)
+    pull = np.concatenate([[0.0], stretch - stretch**-2])
+    force = np.where(lag > 0, (1 + lag / 0.05) ** -0.2, 0.0) @ np.diff(pull)
+    rig, sd = Uniaxial(), 1e-3 * float(np.max(force))
+    noisy = force + sd * np.random.default_rng(50814).standard_normal(time.size)
+    m = Measurement(rig.length * (stretch - 1), noisy, rig, Specimen("strip", 1e-3), time=time)
+    search = Search(m, white_noise(m, sd, 80.0))
+    plain = search.fit(PLAIN, search.material_starts(PLAIN))
+    assert plain is not None
+    found = beside(search, plain, "viscoelastic")
+    thought = np.append(found.theta[:2], [np.log(0.4), found.theta[-1]])
+    again = search.polished(replace(found, theta=thought))
+    assert np.std(again.residual) < 5 * sd
+    assert again.log_evidence == pytest.approx(found.log_evidence, abs=1.0)
