@@ -96,11 +96,10 @@ def log_evidence_alone(search: Search, base: Candidate) -> float:
 
 
 def _before_the_converter(search: Search, base: Candidate, before: Limit | None) -> Limit | None:
-    """A limit that readings scatter about."""
-    found = saturated(search, base, None if before is None else before.law)
-    if found is None:
+    """A limit that readings scatter about: none goes far beyond."""
+    found, m = saturated(search, base, None if before is None else before.law), search.measurement
+    if found is None or np.max(m.force - FOREIGN.beyond * search.noise.each) > found.law.limit:
         return None
-    m = search.measurement
     gain = found.log_evidence - weighed(search.linear(base), base.theta).log_evidence
     reached = np.flatnonzero(found.reached)
     first = int(reached[0] if reached.size else np.argmax(m.force))

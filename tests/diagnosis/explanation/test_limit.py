@@ -102,3 +102,17 @@ def test_single_readings_that_go_astray_at_the_top_are_no_limit() -> None:
     assert base is not None
     found = limit_of(search, base)
     assert found is None or found.gain < 1.0
+
+
+@pytest.mark.parametrize("seed", [4151, 4152])
+def test_what_readings_go_far_beyond_is_no_limit(seed: int) -> None:
+    """The first cycle is bent at its top, and the second one, which goes as far, is not."""
+    empty = measured(np.ones(240), triangle(240, (0.04, 0.04)))
+    film = Forward(CLAIM, empty, empty.deflection, api.solve)(np.array([[np.log(16.0)]]), reached=False).force[0]
+    most = SHARE * float(np.max(film))
+    bent = np.where(np.arange(240) < 120, film * (1 + (film / most) ** 60) ** (-1 / 60), film)
+    m = replace(empty, force=bent + SD * np.random.default_rng(seed).standard_normal(240))
+    search = Search(m, white_noise(m), 0, api.solve)
+    base = search.fit(CLAIM, search.material_starts(CLAIM))
+    assert base is not None
+    assert limit_of(search, base) is None
