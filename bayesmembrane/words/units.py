@@ -26,5 +26,5 @@ def size_in_words(value: float, unit: str, shown: Units = SCALES) -> str:
     """A value in SI in the unit that people read."""
     factor, name = shown.get(unit, (1.0, unit.removeprefix("-")))
     value = 0.0 if abs(value) < NOTHING_LEFT else value
-    digits = 5 if unit == "-" and abs(value - 1) < WORDS.near_one else 3
+    digits = 5 if unit == "-" and 0 < value - 1 < WORDS.near_one else 3  # a stretch
     return f"{factor * value:.{digits}g} {name}".strip()
