@@ -149,8 +149,9 @@ def probabilities_told(p: Probabilities) -> list[str]:
     probable = [(name, q) for name, q in p.effects.items() if q >= WORDS.probable][:3]
     first = set(p.likely(WORDS.nearly_all))
     told = [f"{set_title(name)} {percent(q)}" for name, q in probable]
-    if first and max(p.effects.values()) < VERDICT.sure:
-        in_sum = sum(q for name, q in p.effects.items() if first <= set(name.split("+")))
+    in_sum = sum(q for name, q in p.effects.items() if first <= set(name.split("+")))
+    alone = p.effects.get("+".join(sorted(first)), 0.0)
+    if first and alone < VERDICT.sure and in_sum - alone > WORDS.probable:
         told = [f"{set_title('+'.join(sorted(first)))} {percent(in_sum)}"]
         told += [f"{_beyond(first, name)} {percent(q)}" for name, q in probable]
     if p.anything_foreign >= WORDS.probable:

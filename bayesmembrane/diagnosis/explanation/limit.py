@@ -21,6 +21,7 @@ from bayesmembrane.diagnosis.explanation.saturation import Saturated, saturated
 from bayesmembrane.diagnosis.left.shape import plateau_of
 from bayesmembrane.diagnosis.thresholds import FOREIGN
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.form_error import unsteady
 
 
 @dataclass(frozen=True)
@@ -96,15 +97,25 @@ def log_evidence_alone(search: Search, base: Candidate) -> float:
 
 
 def _before_the_converter(search: Search, base: Candidate, before: Limit | None) -> Limit | None:
-    """A limit that readings scatter about: none goes far beyond."""
+    """A limit that readings scatter about."""
     found, m = saturated(search, base, None if before is None else before.law), search.measurement
-    if found is None or np.max(m.force - FOREIGN.beyond * search.noise.each) > found.law.limit:
+    if found is None or not _is_met(search, found):
         return None
     gain = found.log_evidence - weighed(search.linear(base), base.theta).log_evidence
     reached = np.flatnonzero(found.reached)
     first = int(reached[0] if reached.size else np.argmax(m.force))
     trace = found.reading - (m.force - base.residual)
     return Limit(found.law.limit, gain, first, trace, 1 / found.law.sharpness, found)
+
+
+def _is_met(search: Search, found: Saturated) -> bool:
+    """True if no reading goes far beyond the limit, and enough readings of a steady motion yield to it."""
+    m, sd = search.measurement, search.noise.each
+    if np.max(m.force - FOREIGN.beyond * sd) > found.law.limit:
+        return False
+    yields = m.force - found.film.residual - found.reading > sd
+    yields[unsteady(m)] = False
+    return bool(np.count_nonzero(yields) >= FOREIGN.plateau)
 
 
 def _beside(search: Search, base: Candidate, at: NDArray[np.bool_]) -> Candidate | None:
