@@ -111,7 +111,7 @@ class TextTable:
         example = _example(name, quantity)
         nearest = difflib.get_close_matches(name, [split_header(h)[0].lower() for h in self.header], n=1, cutoff=0.5)
         like = next((h for h in self.header if nearest and split_header(h)[0].lower() == nearest[0]), None)
-        guess = f'rename "{like}" if that is it' if like else "name its columns with their units"
+        guess = f'rename "{like}" if that is it' if like else f"name its columns with their units or {_IMPORT}"
         shown = ", ".join(h or '""' for h in self.header[:12])
         raise DataError(f"the column {example} is missing among {shown}", self._place(), guess)
 

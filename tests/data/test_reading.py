@@ -158,6 +158,10 @@ def test_hash_depends_on_what_a_likelihood_depends_on(files: Files) -> None:
             'the column force_N is missing among deflection_mm, farce_N; rename "farce_N"',
         ),
         ("deflection_mm\n1\n2\n", "the column force_N is missing"),
+        (
+            "时间,位移,力\n0,1,2\n1,2,3\n",
+            "is missing among 时间, 位移, 力; name its columns with their units or use `bayesmembrane import`.",
+        ),
         ("deflection_mm,force_N\n", "at least two points, and this one has 0"),
         ("deflection_mm,force_N\n1,2\n", "at least two points, and this one has 1"),
         ("deflection_mm,force_n\n1,2\n3,4\n", 'there is no unit "n" of force; did you mean "N"?'),
