@@ -123,7 +123,11 @@ class SearchThresholds:
     last_iterations: int = 8
     """Steps from the best end, once its own form error is known."""
     polishings: int = 3
-    """Times that these are made at most, where they show another form error than they were made with."""
+    """Times that these are made at most, where a law turns out to be off by another error than they knew."""
+    poor_law: float = 0.08
+    """A law's error from which on it may carry what its effect is to explain: a third of the prior lies above."""
+    law_matters: float = 0.01
+    """A law's error below which its size is no matter."""
     slow_below: float = 3e-5
     """Of the sum of squares: searches whose steps gain less are near enough, for the linear model knows the rest."""
     settled: float = 3e-7
@@ -349,6 +353,8 @@ class ForeignThresholds:
     several not to be grown."""
     settled_sd: float = 3.0
     """Standard deviations of the squares of noise within which what it leaves is noise."""
+    met: int = 3
+    """Readings of a steady motion that yield to a limit, at the least."""
     beyond: float = 4.0
     """Standard deviations of the noise by which a reading may be above a limit of the load cell."""
     ln_unnamed: tuple[float, float] = (-4.6, 1.0)

@@ -21,13 +21,11 @@ from bayesmembrane.ground.lately import Lately
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.ground.symmetric import eigh
 from bayesmembrane.physics.effects.base import Effect
-from bayesmembrane.physics.form_error import LARGEST, LOCAL
+from bayesmembrane.physics.form_error import LARGEST, LAW, LOCAL
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 ROUND_OFF = 1e-11
 """Of the largest number of columns: what differs by less is the same."""
-POOR = 0.08
-"""A law's error from which on it may carry what its effect is to explain: one in four is larger before the data."""
 MODELS = 4
 """Linear models that are kept: what is looked for beside one candidate is looked for piece by piece."""
 
@@ -144,46 +142,49 @@ class Weighing(ABC):
     def polished(self, found: Candidate) -> Candidate:
         """The same hypothesis, searched on from where it is with the form error that it shows.
 
-        The form error keeps the traces of the start. Where it is large it may carry what the effects did, and leave
-        them nothing to do: then it is also searched with one that is no larger than usual. An end counts if its
-        evidence is more, or else if it is more probable than the start, whose evidence may rest on a linear model far
-        from where that holds. Where a law turns out to be off by another error, it is searched once more.
+        The form error keeps the traces of the start. Where a law's is large it may carry what its effect did, and
+        leave that nothing to do: then it is also searched with sizes no larger than usual. The most probable counts,
+        the start among them: evidences rest on linear models, and one may be far from where it holds. Where a law turns
+        out to be off by another error than the search knew, it is searched on once more, `SEARCH.polishings` times in
+        all. A start without an evidence never counts.
         """
         return self.all_polished([found])[0]
 
     def all_polished(self, every: Sequence[Candidate]) -> list[Candidate]:
-        """`polished` of each, side by side, and again where that showed another form error than it was done with."""
+        """`polished` of each, side by side."""
         out, todo = list(every), list(range(len(every)))
         for _ in range(SEARCH.polishings):
+            if not todo:
+                break
             ends = self._searched_on([out[i] for i in todo])
-            moved = [_moved(out[i].law_errors, end.law_errors) for i, end in zip(todo, ends, strict=True)]
-            for i, end in zip(todo, ends, strict=True):
+            for i, (end, _) in zip(todo, ends, strict=True):
                 out[i] = end
-            todo = [i for i, again in zip(todo, moved, strict=True) if again]
+            todo = [i for i, (_, again) in zip(todo, ends, strict=True) if again]
         return out
 
-    def _searched_on(self, every: Sequence[Candidate]) -> list[Candidate]:
-        """The best of where each was and where searches from there end, by its form error and by a usual one."""
-        asked = [(c, False) for c in every]
-        asked += [(c, True) for c in every if max(c.law_errors.values(), default=0.0) > POOR]
+    def _searched_on(self, every: Sequence[Candidate]) -> list[tuple[Candidate, bool]]:
+        """Of each the most probable of where it was and where searches end, and whether a law is off by another error
+        than that search knew.
+        """
+        asked = [(i, False) for i in range(len(every))]
+        asked += [(i, True) for i, c in enumerate(every) if max(c.law_errors.values(), default=0.0) > SEARCH.poor_law]
         searches = [
             self._search(c.hypothesis, self._freeing(c, capped), c.x[None, :], SEARCH.last_iterations)
-            for c, capped in asked
+            for c, capped in ((every[i], capped) for i, capped in asked)
         ]
         run(searches, self.batches)
         reached = [s for s in searches if np.isfinite(s.size[0])]
         found = dict(zip(reached, self._candidates([(s.hypothesis, s.axes, s.u[0]) for s in reached]), strict=True))
-        best = {id(c): c for c in every}
-        for (c, capped), search in zip(asked, searches, strict=True):
-            end, so_far = found.get(search, c), best[id(c)]
-            best[id(c)] = max(so_far, end, key=_evidence) if capped else self._better(end, so_far)
-        return [best[id(c)] for c in every]
-
-    def _better(self, end: Candidate, start: Candidate) -> Candidate:
-        """The end of a search, or its start."""
-        if end is start or end.log_evidence >= start.log_evidence:
-            return end
-        return end if self.log_there(end) >= self.log_there(start) else start
+        out = []
+        for i, start in enumerate(every):
+            knew = _law_errors(start, False)
+            best, height = start, self.log_there(start) if np.isfinite(start.log_evidence) else -np.inf
+            for (j, capped), search in zip(asked, searches, strict=True):
+                end = found.get(search) if i == j else None
+                if end is not None and self.log_there(end) > height:
+                    best, height, knew = end, self.log_there(end), _law_errors(start, capped)
+            out.append((best, _differ(knew, best.law_errors)))
+        return out
 
     def log_there(self, candidate: Candidate) -> float:
         """ln p(y, x) at the coordinates x of a candidate, form error and noise integrated out: no linear model of the
@@ -403,13 +404,17 @@ def starts_with(
     return out
 
 
-def _moved(before: Mapping[str, float], after: Mapping[str, float]) -> bool:
-    """True if an error of a law is another one than it was, by more than a factor of e."""
-    return any(abs(np.log(after[name] / before[name])) > 1.0 for name in before)
+def _law_errors(candidate: Candidate, capped: bool) -> dict[str, float]:
+    """Of a search from a candidate, the sizes that it knows of its laws' errors."""
+    usual = float(np.exp(_moments(LAW)[0]))
+    return {name: min(e, usual) if capped else e for name, e in candidate.law_errors.items()}
 
 
-def _evidence(candidate: Candidate) -> float:
-    return candidate.log_evidence
+def _differ(knew: Mapping[str, float], shows: Mapping[str, float]) -> bool:
+    """True if an error of a law that matters is another one, by more than a factor of e."""
+    return any(
+        max(e, shows[name]) > SEARCH.law_matters and abs(np.log(shows[name] / e)) > 1.0 for name, e in knew.items()
+    )
 
 
 def _eta(usual: float, found: float, capped: bool) -> float:

@@ -180,10 +180,8 @@ def test_a_polished_fit_is_where_its_linear_model_has_its_mode(cyclic, name) -> 
     assert np.max(np.abs(off[inside])) < 0.5
 
 
-def test_a_large_form_error_keeps_no_search_from_the_film() -> None:
-    """A strip that relaxes by a power of time: searched on as if the law were off by 40 %, it had ended 35 % of the
-    force away, where that error would have carried it.
-    """
+def relaxing() -> tuple[Search, Candidate]:
+    """A strip that relaxes by a power of time, pulled and held, and its fit with relaxation."""
     time = np.concatenate([np.linspace(0.1, 10, 60), 10 + np.geomspace(0.2, 1800, 80)])
     stretch = 1 + 0.8 * np.minimum(time / 10, 1)
     ticks = np.concatenate([[0.0], time])
@@ -196,8 +194,25 @@ def test_a_large_form_error_keeps_no_search_from_the_film() -> None:
     search = Search(m, white_noise(m, sd, 80.0))
     plain = search.fit(PLAIN, search.material_starts(PLAIN))
     assert plain is not None
-    found = beside(search, plain, "viscoelastic")
-    thought = np.append(found.theta[:2], [np.log(0.4), found.theta[-1]])
-    again = search.polished(replace(found, theta=thought))
-    assert np.std(again.residual) < 5 * sd
+    return search, beside(search, plain, "viscoelastic")
+
+
+@pytest.mark.parametrize("error", [0.1, 0.2, 0.4])
+def test_no_search_ends_where_it_is_less_probable_than_where_it_began(error: float) -> None:
+    """Searched on as if the law were off by so much, it had ended far from the film, where that error carries it."""
+    search, found = relaxing()
+    thought = replace(found, theta=np.append(found.theta[:2], [np.log(error), found.theta[-1]]))
+    again = search.polished(thought)
+    assert search.log_there(again) >= search.log_there(found) - 0.1
+    assert np.std(again.residual) < 5 * search.noise.sd
     assert again.log_evidence == pytest.approx(found.log_evidence, abs=1.0)
+    assert search.polished(replace(thought, log_evidence=-np.inf)) is not thought
+
+
+def test_of_several_fits_each_is_searched_on_as_alone() -> None:
+    search, found = relaxing()
+    thought = replace(found, theta=np.append(found.theta[:2], [np.log(0.3), found.theta[-1]]))
+    both = search.all_polished([found, thought, found])
+    assert both[1].x == pytest.approx(search.polished(thought).x)
+    assert both[0].x == pytest.approx(both[2].x)
+    assert search.all_polished([]) == []
