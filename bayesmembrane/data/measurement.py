@@ -145,6 +145,14 @@ class Measurement:
         return holds(self.deflection)
 
     @property
+    def moving(self) -> NDArray[np.bool_]:
+        """(N,) False in holds, where readings are alike for that."""
+        out = np.ones(len(self), dtype=bool)
+        for still in self.holds:
+            out[still] = False
+        return out
+
+    @property
     def noise_covariance(self) -> Array | None:
         """(N, N) N^2: the covariance, or the squared standard deviations on a diagonal, or None if noise is unknown."""
         if self.covariance is not None:

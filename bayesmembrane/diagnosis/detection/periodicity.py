@@ -30,14 +30,17 @@ class Periodicity:
 
 
 def most_waves(measurement: Measurement) -> float:
-    """Waves over the range of the deflection that its steps tell from slower ones.
+    """Waves over the range of the deflection that readings tell from slower ones: half as many as these, or as steps.
 
     Two legs are often read half a step apart: what is smooth on each, and differs between them, repeats from step to
-    step there.
+    step there. In a hold a wave stands still like the disc, and without a path there are no steps.
     """
-    steps = np.abs(np.diff(measurement.deflection))
-    step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else np.inf
-    return float(np.ptp(measurement.deflection)) / (2 * step)
+    moving, d = measurement.moving, measurement.deflection
+    steps = np.abs(np.diff(d))[moving[1:] & moving[:-1]]
+    most = np.count_nonzero(moving) / 2
+    if not measurement.rig.has_path or not np.any(steps > 0):
+        return most
+    return min(most, float(np.ptp(d) / (2 * np.median(steps[steps > 0]))))
 
 
 def periodicity(measurement: Measurement, model: Whitened) -> Periodicity | None:
@@ -52,10 +55,8 @@ def periodicity(measurement: Measurement, model: Whitened) -> Periodicity | None
         return None
     t = np.arange(n, dtype=float) if measurement.time is None else measurement.time
     found = [_strongest(t, model, "time", (DETECTION.slowest_part * n / 2, n / 2))]
-    # In a hold a wave of the deflection stands still like the disc: only the readings in between tell two apart.
-    moving = n - sum(hold.size for hold in measurement.holds)
-    if moving >= DETECTION.fewest_points:
-        ends = REFERENCE.spline_columns / 2, min(moving / 2, most_waves(measurement))
+    if np.count_nonzero(measurement.moving) >= DETECTION.fewest_points:
+        ends = REFERENCE.spline_columns / 2, most_waves(measurement)
         found.append(_strongest(measurement.deflection, model, "deflection", ends))
     best = min(found, key=lambda f: f.p_value)
     return replace(best, p_value=min(1.0, len(found) * best.p_value))
@@ -65,7 +66,6 @@ def _strongest(place: Array, model: Whitened, against: str, ends: tuple[float, f
     """The strongest of so many waves over the range: of slower ones the smooth reference has taken the evidence."""
     rest, q = model.rest, model.reference
     span, freedom = float(np.ptp(place)), rest.size - q.shape[1]
-    # As many frequencies as half the points could tell apart, were they evenly spaced.
     waves = np.arange(max(DETECTION.least_waves, ends[0]), ends[1])
     if span == 0 or waves.size < 2 or freedom < 4:
         return Periodicity(against, np.inf, 0.0, 1.0)

@@ -253,10 +253,9 @@ def _frequencies(most: float) -> Array:
 def _waves(m: Measurement) -> _Family:
     """Cosines and sines over the readings' time, then over the deflection where the disc moves."""
     size = FOREIGN.size / 3 * float(np.max(np.abs(m.force)))
-    moving = len(m) - sum(hold.size for hold in m.holds)
     places = [("time", m.path.clock[m.on_path], _frequencies(len(m) / 2))]
-    if moving >= FOREIGN.least_points:  # a wave of the deflection stands still in a hold, like the disc
-        places.append(("deflection", m.deflection, _frequencies(min(moving / 2, most_waves(m)))))
+    if np.count_nonzero(m.moving) >= FOREIGN.least_points:
+        places.append(("deflection", m.deflection, _frequencies(most_waves(m))))
     phases = [(_phase(place), frequencies) for _, place, frequencies in places]
 
     def traces(numbers: NDArray[np.intp]) -> Array:

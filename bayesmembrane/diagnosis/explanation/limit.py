@@ -53,6 +53,8 @@ def limit_of(search: Search, base: Candidate, before: Limit | None = None) -> Li
     found = _limit_of(search, base, before)
     if found is None or found.gain <= BELIEFS.supported:
         return found
+    if found.law is not None and not _is_met(search, found.law):
+        return None
     rest = ~_last_of_loadings(search.measurement)
     again = found if np.all(rest) else _limit_of(_part(search, rest), base.at(rest), found)
     return None if again is None else replace(found, gain=min(found.gain, again.gain))
@@ -70,20 +72,12 @@ def _limit_of(search: Search, base: Candidate, before: Limit | None) -> Limit | 
     if flat is None or not flat.largest:
         return _before_the_converter(search, base, before)
     at = m.force >= flat.force - 1e-9 * abs(flat.force)
-    if np.count_nonzero(at & _moving(m)) < FOREIGN.plateau:
+    if np.count_nonzero(at & m.moving) < FOREIGN.plateau:
         return _before_the_converter(search, base, before)
     # Each is within rounding of the limit.
     constant = -(flat.readings - 1) * float(np.log(max(flat.step, 1e-6 * flat.force)))
     found = _beside(search, base, at)
     return None if found is None else _with_evidence(search, base, found, at, flat.force, constant)
-
-
-def _moving(m: Measurement) -> NDArray[np.bool_]:
-    """(N,) False in holds: where the disc stands still, readings are alike for that."""
-    out = np.ones(len(m), dtype=bool)
-    for still in m.holds:
-        out[still] = False
-    return out
 
 
 def log_evidence_alone(search: Search, base: Candidate) -> float:
@@ -99,7 +93,7 @@ def log_evidence_alone(search: Search, base: Candidate) -> float:
 def _before_the_converter(search: Search, base: Candidate, before: Limit | None) -> Limit | None:
     """A limit that readings scatter about."""
     found, m = saturated(search, base, None if before is None else before.law), search.measurement
-    if found is None or not _is_met(search, found):
+    if found is None:
         return None
     gain = found.log_evidence - weighed(search.linear(base), base.theta).log_evidence
     reached = np.flatnonzero(found.reached)
@@ -115,7 +109,7 @@ def _is_met(search: Search, found: Saturated) -> bool:
         return False
     yields = m.force - found.film.residual - found.reading > sd
     yields[unsteady(m)] = False
-    return bool(np.count_nonzero(yields) >= FOREIGN.plateau)
+    return bool(np.count_nonzero(yields & m.moving) >= FOREIGN.met)
 
 
 def _beside(search: Search, base: Candidate, at: NDArray[np.bool_]) -> Candidate | None:

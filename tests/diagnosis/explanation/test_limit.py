@@ -130,3 +130,18 @@ def test_what_the_inertia_of_a_grip_takes_at_a_turn_is_no_limit(seed: int) -> No
     base = search.fit(CLAIM, search.material_starts(CLAIM))
     assert base is not None
     assert limit_of(search, base) is None
+
+
+@pytest.mark.parametrize(("readings", "share"), [(160, 0.95), (240, 0.95), (480, 0.98)])
+def test_a_limit_that_few_readings_of_one_cycle_meet_is_found(readings: int, share: float) -> None:
+    empty = measured(np.ones(readings), triangle(readings, (0.04,)))
+    film = Forward(CLAIM, empty, empty.deflection, api.solve)(np.array([[np.log(16.0)]]), reached=False).force[0]
+    most = share * float(np.max(film))
+    m = replace(empty, force=np.minimum(film, most) + SD * np.random.default_rng(4171).standard_normal(readings))
+    search = Search(m, white_noise(m), 0, api.solve)
+    base = search.fit(CLAIM, search.material_starts(CLAIM))
+    assert base is not None
+    found = limit_of(search, base)
+    assert found is not None
+    assert found.gain > 10.0
+    assert found.force == pytest.approx(most, abs=3 * SD)
