@@ -96,7 +96,7 @@ def test_relaxation_is_the_convolution(measure: float, tilt: float) -> None:
     f, pushed = (force(m, "viscoelastic", x=np.array([g, tau, decades, part, measure, tilt])) for part in (0.0, 1.0))
     clock, whole, weight = m.path.clock, direct("yeoh", d), (1 + d / np.max(d)) ** measure
     knots, values = np.concatenate([[0.0], clock]), np.concatenate([[0.0], whole / weight])
-    times = tau * 10 ** (decades * np.linspace(-9 / 20, 9 / 20, 10))
+    times = tau * 10 ** (decades * np.linspace(-11 / 24, 11 / 24, 12))
     share = times**-tilt / np.sum(times**-tilt)
     fine = np.unique(np.concatenate([np.linspace(a, b, 400) for a, b in itertools.pairwise(knots)]))
     rate = np.diff(np.interp(fine, knots, values))

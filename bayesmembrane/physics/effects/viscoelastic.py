@@ -12,18 +12,18 @@ from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal
 from bayesmembrane.physics.effects._history import relaxing
 from bayesmembrane.physics.effects.base import EffectParameter, Memory
 
-TERMS = 10
+TERMS = 12
+"""Nearly two to a decade at the largest width."""
 
 
 @dataclass(frozen=True)
 class Viscoelastic(Memory):
     """F(t) = F_e(t) - strength w(t)^m int (1 - sum_i g_i exp(-(t - s) / time_i)) d(F_e w^-m)(s), sum_i g_i = 1.
 
-    Ten times are evenly spread in log time within ``decades`` decades around ``time``: one relaxation time if it is
+    Twelve times are evenly spread in log time within ``decades`` decades around ``time``: one relaxation time if it is
     zero, a broad spectrum if not. Their weights are g_i ~ time_i^-tilt: a box of times if the ``tilt`` is zero, a wedge
-    if not, which is a power law of time. Acrylic tape, held for half an hour at a stretch of 3.5, relaxes by one from
-    0.1 s on (tilt 0.4 over 6 decades), and so does a filled rubber (0.2). F_e is the instantaneous force. Without times
-    the clock is the distance travelled at 1 mm/s.
+    if not, which is a power law of time, as tapes and filled rubbers follow. F_e is the instantaneous force. Without
+    times the clock is the distance travelled at 1 mm/s.
 
     w = 1 + |x| / D, with x the deflection and D the full range of the test, and m is the ``measure``: which stress
     relaxes linearly. Theories differ in that: nominal stress is m = 0 (Fung), and with w near the stretch second
@@ -56,7 +56,7 @@ class Viscoelastic(Memory):
             "strength", "-", "part of the instantaneous force that relaxes", HalfNormal(0.3), (0.0, 0.99), 0.0
         ),
         EffectParameter("time", "s", "middle relaxation time", LogNormal(30.0, 1.5), (0.05, 2e4)),
-        EffectParameter("decades", "-", "width of the spectrum of times", HalfNormal(2.4), (0.0, 8.0)),
+        EffectParameter("decades", "-", "width of the spectrum of times", HalfNormal(2.1), (0.0, 7.0)),
         EffectParameter("withstood", "-", "part of a push that does not make it slack", Uniform(0.0, 1.0), (0.0, 1.0)),
         EffectParameter(
             "measure", "-", "power of w = 1 + |x| / D in the stress that relaxes", Normal(0.0, 1.5), (-5.0, 5.0)
