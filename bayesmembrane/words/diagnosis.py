@@ -149,9 +149,8 @@ def probabilities_told(p: Probabilities) -> list[str]:
     probable = [(name, q) for name, q in p.effects.items() if q >= WORDS.probable][:3]
     first = set(p.likely(WORDS.nearly_all))
     told = [f"{set_title(name)} {percent(q)}" for name, q in probable]
-    in_sum = sum(q for name, q in p.effects.items() if first <= set(name.split("+")))
-    alone = p.effects.get("+".join(sorted(first)), 0.0)
-    if first and alone < VERDICT.sure and in_sum - alone > WORDS.probable:
+    in_sum, alone = p.of_effect(*first), p.effects.get("+".join(sorted(first)), 0.0)
+    if first and alone < VERDICT.sure and in_sum >= max(WORDS.nearly_all, alone + WORDS.probable):
         told = [f"{set_title('+'.join(sorted(first)))} {percent(in_sum)}"]
         told += [f"{_beyond(first, name)} {percent(q)}" for name, q in probable]
     if p.anything_foreign >= WORDS.probable:

@@ -62,9 +62,9 @@ class Probabilities:
     energies: Mapping[str, float]
     foreign: Mapping[str, float]
 
-    def of_effect(self, name: str) -> float:
-        """Of one effect, whatever else is at work."""
-        return float(sum(p for key, p in self.effects.items() if name in key.split("+")))
+    def of_effect(self, *names: str) -> float:
+        """Of an effect, or of several together, whatever else is at work."""
+        return float(sum(p for key, p in self.effects.items() if set(names) <= set(key.split("+"))))
 
     def sure(self) -> list[str]:
         """Effects that are in all that is probable, by name: what is known even where the whole set is not."""
