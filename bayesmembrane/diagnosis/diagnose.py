@@ -11,8 +11,8 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate, absorbed, un
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.detection.scores import confounded, smallest_sizes
 from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, Tell, opened
-from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, set_name
-from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, explained
+from bayesmembrane.diagnosis.explanation.total import Judged, set_name
+from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, explained, undoubted
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
 from bayesmembrane.diagnosis.left.remaining import remaining
 from bayesmembrane.diagnosis.left.shape import residual_shape
@@ -51,11 +51,9 @@ def diagnose(
 
 
 def _diagnosed(case: OpenCase) -> Diagnosis:
-    # A declared energy may follow the curve by parameters that nobody would expect: then all are weighed none the less.
-    if case.detection.adequate and (case.null is case.best_plain or case.tested(case.best_plain).adequate):
+    if case.sees_nothing:
         found = adequate(case)
-        p = found.probabilities
-        if min(p.effects[NOTHING], p.foreign[NOTHING]) > VERDICT.doubted:
+        if undoubted(found.probabilities):
             return _concluded(case, case.search, found)
     search, found = explained(case)
     assert isinstance(search, Search)

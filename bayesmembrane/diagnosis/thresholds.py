@@ -400,9 +400,10 @@ class VerdictThresholds:
     sure: float = 0.95
     """From which an answer is given; sets of an ambiguous one hold as much together."""
     doubted: float = 0.85
-    """Of no effect, and of nothing foreign, to first order: where one is less probable, all are weighed although no
-    test sees a misfit. Of 104 plain films (`make study-loop`, seeds 300000 to 300159) 2 have less, and 12 less than
-    0.95; of five films with effects of ratios 3 to 8 that no test saw, on both generators, three."""
+    """Of no effect, and of nothing foreign, where no test sees a misfit: if both are more probable, the answer is that
+    nothing is missing; if one is less by traces to first order, all are weighed. Of 104 plain films (`make study-loop`,
+    seeds 300000 to 300159) 2 have less, and 12 less than 0.95; of five films with effects of ratios 3 to 8 that no test
+    saw, on both generators, three."""
     alike: float = 3.0
     """Times by which an energy is more probable than another one with the same effects, up to which the one with fewer
     parameters stands for the set: what is sampled, and told. Probabilities are those of all."""

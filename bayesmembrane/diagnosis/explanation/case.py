@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -102,6 +103,15 @@ class DiagnosisCase(ABC):
     def best_plain(self) -> Candidate:
         """The most probable energy without any but the given effects."""
         return max(self.plain.values(), key=lambda c: c.log_evidence)
+
+    @cached_property
+    def sees_nothing(self) -> bool:
+        """True if no test sees a misfit: of the null model, nor of the most probable energy.
+
+        A declared energy may follow the curve by parameters that nobody would expect.
+        """
+        best = self.best_plain
+        return self.detection.adequate and (self.null is best or self.tested(best).adequate)
 
     def tested(self, candidate: Candidate) -> Detection:
         """The tests of another model."""

@@ -52,6 +52,11 @@ def adequate(case: DiagnosisCase) -> Verdict:
     return Verdict("adequate", (judged,), (judged,), p, told)
 
 
+def undoubted(p: Probabilities) -> bool:
+    """True if no effect and nothing foreign are as probable as they must be where no test sees a misfit."""
+    return min(p.effects.get(NOTHING, 0.0), p.foreign[NOTHING]) > VERDICT.doubted
+
+
 def explained(case: DiagnosisCase) -> tuple[Weighing, Verdict]:
     """The verdict of all that could explain the curve, and the search under whose noise that was weighed.
 
@@ -94,6 +99,8 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     p, given = total.probabilities, case.null.names
     strange = _strange(total, given)
     best, told = _first_of_each_set(total.ranking, given), _smallest(p.effects)
+    if case.sees_nothing and undoubted(p) and NOTHING in best:
+        return Verdict("adequate", (best[NOTHING],), total.ranking, p, strange)
     fitted = [name for name in p.effects if name in best]
     # What was never fitted is no member; that one alone is left of several does not make it sure.
     count = max(sum(name in best for name in told), min(len(told), 2))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -39,6 +40,11 @@ class JointCase(DiagnosisCase):
     search: JointSearch
     alone: tuple[OpenCase, ...]
     labels: tuple[str, ...]
+
+    @cached_property
+    def sees_nothing(self) -> bool:
+        """True if no test sees a misfit: of all measurements together, nor of each alone."""
+        return all(c.detection.adequate for c in self.alone) and super().sees_nothing
 
     def detected(self, white: Whitened, found: Sequence[Signature]) -> Detection:
         return Detection(lack_of_fit(white), score_test(white, found, self.rng), None)

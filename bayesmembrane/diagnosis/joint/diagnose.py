@@ -14,7 +14,7 @@ from bayesmembrane.diagnosis.detection.scores import confounded
 from bayesmembrane.diagnosis.explanation.case import Question, Tell, opened
 from bayesmembrane.diagnosis.explanation.foreign import Foreign
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities
-from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, explained
+from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, explained, undoubted
 from bayesmembrane.diagnosis.joint.case import JointCase, opened_jointly
 from bayesmembrane.diagnosis.joint.effects import AT
 from bayesmembrane.diagnosis.joint.search import JointSearch
@@ -22,7 +22,6 @@ from bayesmembrane.diagnosis.left.heldout import Misfit, misfit_of
 from bayesmembrane.diagnosis.left.remaining import Remaining, remaining
 from bayesmembrane.diagnosis.reference.outliers import SetAside, without_outliers
 from bayesmembrane.diagnosis.result import Thinned, thinning
-from bayesmembrane.diagnosis.thresholds import VERDICT
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.ground.threads import one_thread
@@ -150,15 +149,9 @@ def diagnose_jointly(
 
 
 def _decided(case: JointCase) -> tuple[JointSearch, Verdict]:
-    every_test = all(c.detection.adequate for c in case.alone)
-    if (
-        every_test
-        and case.detection.adequate
-        and (case.null is case.best_plain or case.tested(case.best_plain).adequate)
-    ):
+    if case.sees_nothing:
         found = adequate(case)
-        p = found.probabilities
-        if min(p.effects[NOTHING], p.foreign[NOTHING]) > VERDICT.doubted:
+        if undoubted(found.probabilities):
             return case.search, found
     search, found = explained(case)
     assert isinstance(search, JointSearch)

@@ -50,10 +50,10 @@ def total(
 
 
 def verdict(
-    sets: dict[str, float], null: str = "gent", describes: bool = True, **more: Any
+    sets: dict[str, float], null: str = "gent", describes: bool = True, unseen: bool = False, **more: Any
 ) -> tuple[str, list[str], bool]:
     tested = SimpleNamespace(adequate=describes)
-    case = SimpleNamespace(null=candidate(NOTHING, material=null), tested=lambda _: tested)
+    case = SimpleNamespace(null=candidate(NOTHING, material=null), tested=lambda _: tested, sees_nothing=unseen)
     found = decided(cast(OpenCase, case), total(sets, **more))
     return found.verdict, ["+".join(m.candidate.names) for m in found.members], found.foreign is not None
 
@@ -67,13 +67,21 @@ def test_an_ambiguous_answer_holds_the_fewest_sets_that_are_enough() -> None:
     assert verdict({"friction": 0.6, "mullins": 0.36, "tearing": 0.04})[1] == ["friction", "mullins"]
 
 
+def test_where_no_test_sees_a_misfit_nothing_is_missing_unless_that_is_doubted() -> None:
+    """The same whether single effects were weighed by their traces, or all of them by fits."""
+    assert verdict({NOTHING: 0.88, "friction": 0.12}, unseen=True) == ("adequate", [""], False)
+    assert verdict({NOTHING: 0.88, "friction": 0.12})[0] == "ambiguous"
+    assert verdict({NOTHING: 0.83, "friction": 0.17}, unseen=True)[0] == "ambiguous"
+    assert verdict({NOTHING: 0.88, "friction": 0.12}, unseen=True, strange=0.3)[0] != "adequate"
+
+
 def unfitted(found: Total, *names: str) -> Total:
     """The same sum, in which these sets have their probability by their traces alone."""
     return replace(found, ranking=tuple(j for j in found.ranking if "+".join(j.candidate.names) not in names))
 
 
 def test_a_set_is_not_named_for_its_rivals_having_never_been_fitted() -> None:
-    case = cast(OpenCase, SimpleNamespace(null=candidate(NOTHING)))
+    case = cast(OpenCase, SimpleNamespace(null=candidate(NOTHING), sees_nothing=False))
     sets = {"friction": 0.90, "mullins": 0.07, "tearing": 0.02, "clamp_slip": 0.01}
     found = decided(case, unfitted(total(sets), "mullins"))
     assert found.verdict == "ambiguous"
@@ -93,7 +101,7 @@ def test_sets_that_share_an_answer_with_one_that_was_fitted_are_fitted(
     monkeypatch.setattr(verdicts, "summed", lambda _: sums.pop(0))
     monkeypatch.setattr(verdicts, "with_sets", lambda _, names: fitted.append(names))
     monkeypatch.setattr(verdicts, "with_falls", lambda _, falls: bool(falls))
-    _, found = verdicts.explained(cast(OpenCase, SimpleNamespace(null=candidate(NOTHING))))
+    _, found = verdicts.explained(cast(OpenCase, SimpleNamespace(null=candidate(NOTHING), sees_nothing=False)))
     assert fitted == [[frozenset({"mullins"})]]
     assert (found.verdict, sums) == (answer, [])
 
@@ -106,7 +114,7 @@ def test_falls_of_the_force_that_are_worth_a_word_are_looked_at_once_more(monkey
     monkeypatch.setattr(verdicts, "grown", lambda _: SimpleNamespace(search=None))
     monkeypatch.setattr(verdicts, "summed", lambda _: sums.pop(0))
     monkeypatch.setattr(verdicts, "with_falls", lambda _, found: asked.append(found) or True)
-    _, found = verdicts.explained(cast(OpenCase, SimpleNamespace(null=candidate(NOTHING))))
+    _, found = verdicts.explained(cast(OpenCase, SimpleNamespace(null=candidate(NOTHING), sees_nothing=False)))
     assert asked == [falls[:1]]
     assert [m.candidate.names for m in found.members] == [("mullins", "tearing")]
     faint = replace(said, probabilities=total({"mullins": 1.0}, strange=0.01).probabilities)
@@ -158,7 +166,7 @@ def test_of_energies_as_good_the_one_with_fewest_parameters_stands_for_a_set(
     """It need not be the first, but its form may not be what explains the curve."""
     both = ("ogden", 0.96 - yeoh, 1e-3), ("yeoh", yeoh, error)
     ranking = tuple(Judged(candidate("friction", e, m), p, 0.0, 0.01, 1.0) for m, p, e in both)
-    case = SimpleNamespace(null=candidate(NOTHING))
+    case = SimpleNamespace(null=candidate(NOTHING), sees_nothing=False)
     found = decided(cast(OpenCase, case), replace(total({"friction": 0.96, "mullins": 0.04}), ranking=ranking))
     assert [m.candidate.hypothesis.material.name for m in found.members] == [chosen]
     assert found.ranking == ranking
