@@ -147,7 +147,7 @@ def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
     once more.
     """
     sought = []
-    for f in falls:
+    for f in (f for f in falls if len(_own(out, f.base)) < _most(out)):
         for effect in out.case.visible:
             shape = next((s for s in effect.starts if effect.begins in s), None)
             if shape is not None and effect.sudden and effect.name not in f.base.names:
@@ -156,7 +156,7 @@ def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
                 sought.append(Sought(with_effects(f.base.hypothesis, [effect]), starts, f.base))
     better = _kept(out, [c for c in out.search.fits(sought) if c is not None])
     first = max(better, key=lambda c: c.log_evidence, default=None)
-    if first is not None and not out.case.question.quick and len(_own(out, first)) < BELIEFS.most:
+    if first is not None and len(_own(out, first)) < _most(out):
         rest = [e for e in out.case.visible if e.name not in first.names]
         rest.sort(key=lambda e: -first_order(out.search, first, e))
         _kept(out, _fitted(out, [(first, e) for e in rest[: GROWTH.refits]]))
@@ -199,7 +199,7 @@ def _grow(out: Grown) -> bool:
 
     Growth ends where a larger set has less than `GROWTH.worth` of what the smaller ones have together.
     """
-    most, any_new = 1 if out.case.question.quick else BELIEFS.most, False
+    most, any_new = _most(out), False
     for size in range(1, most + 1):
         beam = [out.case.best_plain] if size == 1 else _beam(out, size - 1)
         bases = [c for c in beam if frozenset(c.names) not in out.followed]
@@ -271,6 +271,11 @@ def _with_crossed(out: Grown) -> None:
     near = [c for c in found if c.log_evidence > out.found[key_of(c)].log_evidence - GROWTH.less_gain]
     for c in out.search.all_polished(near):
         out.add(c)
+
+
+def _most(out: Grown) -> int:
+    """Effects of the largest set that is asked for."""
+    return 1 if out.case.question.quick else BELIEFS.most
 
 
 def _own(out: Grown, c: Candidate) -> list[str]:

@@ -144,7 +144,9 @@ def test_sets_that_the_answer_asks_for_are_fitted_from_their_parts_and_checked(m
 def test_a_tear_is_looked_for_where_the_force_is_seen_to_fall(
     monkeypatch: pytest.MonkeyPatch, end: float, better: bool
 ) -> None:
-    """From that moment, beside the set beside which it falls; what is best by that is grown from once more."""
+    """From that moment, beside the set beside which it falls; what is best by that is grown from once more. No set
+    gets more effects than are asked for.
+    """
     torn, base = claim("mullins", "tearing"), candidate(claim("mullins"), -15.0)
     tear = torn.effects[1]
     asked: list[Any] = []
@@ -172,6 +174,7 @@ def test_a_tear_is_looked_for_where_the_force_is_seen_to_fall(
     falls = [
         Foreign(SUDDEN, base, 30.0, size=-0.03, on_clock=0.7),
         Foreign(SUDDEN, grown.best, 3.0, size=-0.01, on_clock=0.2),
+        Foreign(SUDDEN, candidate(claim("mullins", "friction", "rate"), -9.0), 30.0, size=-0.03, on_clock=0.5),
     ]
     assert with_falls(grown, falls) is better
     assert [[e.name for e in s.hypothesis.effects] for s in asked] == [["mullins", "tearing"]]
