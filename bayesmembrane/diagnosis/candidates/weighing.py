@@ -181,8 +181,8 @@ class Weighing(ABC):
             best, height = start, self.log_there(start) if np.isfinite(start.log_evidence) else -np.inf
             for (j, capped), search in zip(asked, searches, strict=True):
                 end = found.get(search) if i == j else None
-                if end is not None and self.log_there(end) > height:
-                    best, height, knew = end, self.log_there(end), _law_errors(start, capped)
+                if end is not None and (there := self.log_there(end)) > height:
+                    best, height, knew = end, there, _law_errors(start, capped)
             out.append((best, _differ(knew, best.law_errors)))
         return out
 
