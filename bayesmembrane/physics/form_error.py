@@ -240,14 +240,16 @@ def form_columns(
 def unseen_columns(factors: FormFactors, force: Array, effects: Sequence[Effect], traces: Array) -> list[Array]:
     """Of every effect whose law could be off columns (N, q) N of what a test at another speed may show beside it:
 
-        (t^2 + (F |t| / |F|)^2)^(1/2) v(progress),
+        min((t^2 + (F |t| / |F|)^2)^(1/2), |F|) v(progress),
 
     with its trace t of ``traces`` (E, N) N and the ``force`` F (N,) N. What relaxed before the first reading, or would
-    in a slower test only, is no part of the trace, but of the force.
+    in a slower test only, is no part of the trace, but of the force; and a trace that is larger than the force, as that
+    of a film that relaxes by a power law of time is, says how far the law goes on beyond the test, and not how far it
+    is off.
     """
     laws = [trace for effect, trace in zip(effects, traces, strict=True) if not effect.exact]
     whole = max(float(np.linalg.norm(force)), 1e-300)
-    sizes = [np.hypot(trace, np.linalg.norm(trace) / whole * force) for trace in laws]
+    sizes = [np.minimum(np.hypot(t, np.linalg.norm(t) / whole * force), np.abs(force)) for t in laws]
     return [size[:, None] * factors.progress for size in sizes]
 
 
