@@ -24,6 +24,7 @@ from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.diagnosis.thresholds import FOREIGN
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.form_error import LARGEST, LAW
 
 SUDDEN, WAVE, PLAY, CLIPPED, UNNAMED = "sudden_change", "ripple", "play", "clipped", "unnamed"
 KINDS = (SUDDEN, WAVE, PLAY, CLIPPED, UNNAMED)
@@ -329,11 +330,14 @@ def _share(search: Search, base: Candidate, trace: Array) -> float:
 
 
 def _unnamed(search: Search, base: Candidate) -> Foreign | None:
-    """A smooth relative error of the whole curve along the test: memory of a kind that is not in the library."""
+    """A smooth relative error of the whole curve along the test: memory of a kind that is not in the library.
+
+    No larger than the error of a law may be: what is as large as the force itself would be any curve.
+    """
     fitted = search.measurement.force - base.residual
     columns = search.noise.white(fitted[:, None] * search.factors.progress)
     model = search.linear(base)
-    wider = extended(model, [Block(columns, FOREIGN.ln_unnamed)])
+    wider = extended(model, [Block(columns, FOREIGN.ln_unnamed, float(np.log(LARGEST[LAW.name])))])
     z = weighed(wider)
     mean = wider.mean(z.theta)
     trace = fitted * (search.factors.progress @ mean[-columns.shape[1] :])

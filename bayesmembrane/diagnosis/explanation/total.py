@@ -124,7 +124,7 @@ def summed(grown: Grown) -> Total:
     nothing = BELIEFS.log_foreign(0) if kinds else 0.0
     # What the data do not speak for is neither seen nor excluded.
     told = [f for f in found if f.counted(counts) > BELIEFS.supported]
-    strange = [own(f.base) + f.counted(counts) + BELIEFS.log_foreign(kinds) for f in told]
+    strange = [own(f.base) - counts * _undone(f) + f.counted(counts) + BELIEFS.log_foreign(kinds) for f in told]
     least = [_like_a_tear(f, every, weight) for f in told]
     for f, w in zip(told, strange, strict=True):
         for c in _tears(f, every):
@@ -281,6 +281,11 @@ def _foreign(grown: Grown, every: Sequence[Candidate], given: Sequence[str]) -> 
     grown.case.tell("looking for what no effect describes")
     plain = [c for c in every if set_name(c, given) == NOTHING and c is not chosen[NOTHING]]
     return grown.case.foreign(grown.search, list(chosen.values()), plain)
+
+
+def _undone(f: Foreign) -> float:
+    """What draws brought its base is of the squares that the base leaves: not of those that ``f`` takes away."""
+    return f.share * max(f.base.by_draws, 0.0)
 
 
 def _normalised(log_weights: Array) -> Array:

@@ -9,7 +9,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation import foreign as foreign_module
-from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, SUDDEN, WAVE, Foreign, beside, foreign
+from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, SUDDEN, UNNAMED, WAVE, Foreign, beside, foreign
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.ground.parameters import Array
@@ -95,6 +95,14 @@ def test_legs_read_half_a_step_apart_show_no_wave_of_their_steps() -> None:
     loop = np.where(np.diff(d, prepend=0.0) > 0, 6 * SD, -6 * SD)
     found = kind(foreign(*searched(film_on(d, np.arange(1.0, d.size + 1)), loop, 7)), WAVE)
     assert found.period > 2e-3 or found.against == "time"
+
+
+def test_what_has_no_name_is_smaller_than_the_force() -> None:
+    """A loop as wide as the force: no smooth error of a film without one is that large."""
+    d, time = triangle(240, (0.04, 0.04)), np.arange(1.0, 241)
+    plain = film_on(d, time)
+    loop = np.where(np.diff(d, prepend=0.0) > 0, 1.0, -1.0) * 0.9 * plain.force
+    assert kind(foreign(*searched(plain, loop, 11)), UNNAMED).size <= 0.4 + 1e-9
 
 
 def test_a_step_is_told_with_its_moment_and_its_part_of_the_force() -> None:

@@ -14,7 +14,7 @@ from bayesmembrane.diagnosis.explanation import total
 from bayesmembrane.diagnosis.explanation import visible as visible_module
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase
-from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, Foreign
+from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, UNNAMED, Foreign
 from bayesmembrane.diagnosis.explanation.growth import Grown
 from bayesmembrane.diagnosis.explanation.total import NOTHING
 from bayesmembrane.diagnosis.thresholds import TWINS
@@ -234,3 +234,28 @@ def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monke
     assert summed.energies["gent"] > 1.2 * summed.energies["yeoh"]
     assert told.energies == pytest.approx(BELIEFS.energies_flattened(summed.energies))
     assert told.effects == pytest.approx(summed.effects)
+
+
+def test_draws_of_a_poor_model_say_nothing_of_what_takes_its_misfit_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draws about a fit that misses everything brought 55: something smooth beside it had 87 % for that."""
+    by_likelihood_alone(monkeypatch)
+
+    def foreign_with(by_draws: float, share: float) -> float:
+        null = replace(candidate(log_evidence=-900.0 + by_draws), by_draws=by_draws)
+        case = SimpleNamespace(
+            null=null,
+            plain={"gent": null},
+            visible=[*TRIED, *TRIED],
+            question=SimpleNamespace(energy=None),
+            twins=lambda: frozenset(),
+            foreign=lambda *_: [Foreign(UNNAMED, null, 850.0, share=share)],
+            tell=lambda _: None,
+        )
+        grown = grown_of(case)
+        for c in (null, candidate("friction", log_evidence=-50.0)):
+            grown.add(c)
+        return total.summed(grown).probabilities.anything_foreign
+
+    assert foreign_with(55.0, 1.0) == pytest.approx(foreign_with(0.0, 1.0), rel=0.2)
+    assert foreign_with(55.0, 0.0) > 0.9
+    assert foreign_with(-55.0, 1.0) < foreign_with(0.0, 1.0)
