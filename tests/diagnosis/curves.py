@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement, Specimen
@@ -9,6 +11,7 @@ from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.noise.ar1 import gaps_of
 from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 
 SD = 0.004
 RIG, SPECIMEN = Annulus(0.010, 0.035), Specimen("film", 50e-6)
@@ -32,6 +35,21 @@ def measured(
     d = triangle(force.size) if deflection is None else deflection
     t = np.arange(1.0, force.size + 1) if time is None else time
     return Measurement(d, force, RIG, SPECIMEN, time=t, covariance=covariance, force_sd=force_sd)
+
+
+def pulled_and_held(time: Array, ramp: float, kept: Callable[[Array], Array], noise: float, seed: int) -> Measurement:
+    """A strip that is pulled within ``ramp`` s and held; the convolution with what is ``kept`` after a lag is summed
+    here, and ``noise`` is a part of the largest force.
+    """
+    stretch = 1 + 0.8 * np.minimum(time / ramp, 1)
+    elastic = np.concatenate([[0.0], 60 * (stretch - 1 / stretch**2)])
+    ticks = np.concatenate([[0.0], time])
+    lag = time[:, None] - 0.5 * (ticks[1:] + ticks[:-1])
+    kernel = np.where(lag > 0, kept(np.maximum(lag, 0)), 0.0)
+    rig = Uniaxial()
+    force = rig.width * (kernel @ np.diff(elastic))
+    noisy = force + noise * force.max() * np.random.default_rng(seed).standard_normal(time.size)
+    return Measurement(rig.length * (stretch - 1), noisy, rig, Specimen("strip", 1e-3), time=time)
 
 
 def correlated(rng: np.random.Generator, time: Array, rho: float, sd: float = SD) -> Array:

@@ -1,7 +1,6 @@
 """A small fixed part of `make study-loop`: clear cases at strength 1, from a generator that shares no code."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +12,12 @@ from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.result import VERDICTS, Diagnosis
 from bayesmembrane.diagnosis.thresholds import VERDICT
 from bayesmembrane.ground.errors import SettingsError
-from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components, materials
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.materials.ogden import Ogden
 from bayesmembrane.physics.rigs.equibiaxial import Equibiaxial
-from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.words.diagnosis import document, sentence
-from tests.diagnosis.curves import measured
+from tests.diagnosis.curves import measured, pulled_and_held
 from tests.generator.datasets import Dataset, generate
 
 ALL, SOME = 1, 3
@@ -147,7 +144,7 @@ def test_a_sudden_change_where_films_tear_is_a_tear_or_worse_and_nothing_is_sure
 
 @pytest.mark.study
 def test_what_the_form_of_a_named_effect_leaves_is_no_further_effect(tmp_path) -> None:
-    """A stretched exponential of a signal-to-noise ratio of 60: the library's spectrum leaves more than noise."""
+    """A stretched exponential of a signal-to-noise ratio of 60, which the library's spectrum has not."""
     data = generate("viscoelastic", "neo_hookean", "staircase", "white", 3.0, 50701)
     m = some(read_measurement(*data.write(tmp_path)))
     first = diagnose(m, Hypothesis(materials()["neo_hookean"]))
@@ -158,24 +155,9 @@ def test_what_the_form_of_a_named_effect_leaves_is_no_further_effect(tmp_path) -
     assert second.probabilities.effects["none"] > 0.3
 
 
-def held(time: Array, ramp: float, kept: Callable[[Array], Array], noise: float, seed: int) -> Measurement:
-    """A strip that is pulled within ``ramp`` s and held; the convolution with what is ``kept`` after a lag is summed
-    here, and ``noise`` is a part of the largest force.
-    """
-    stretch = 1 + 0.8 * np.minimum(time / ramp, 1)
-    elastic = np.concatenate([[0.0], 60 * (stretch - 1 / stretch**2)])
-    ticks = np.concatenate([[0.0], time])
-    lag = time[:, None] - 0.5 * (ticks[1:] + ticks[:-1])
-    kernel = np.where(lag > 0, kept(np.maximum(lag, 0)), 0.0)
-    rig = Uniaxial()
-    force = rig.width * (kernel @ np.diff(elastic))
-    noisy = force + noise * force.max() * np.random.default_rng(seed).standard_normal(time.size)
-    return Measurement(rig.length * (stretch - 1), noisy, rig, Specimen("strip", 1e-3), time=time)
-
-
 def test_a_relaxation_test_shows_relaxation() -> None:
     time = np.concatenate([np.linspace(0.1, 5, 100), np.linspace(5.3, 100, 300)])
-    m = held(time, 5.0, lambda lag: 1 - 0.35 * -np.expm1(-((lag / 12) ** 0.6)), 3e-3, 50811)
+    m = pulled_and_held(time, 5.0, lambda lag: 1 - 0.35 * -np.expm1(-((lag / 12) ** 0.6)), 3e-3, 50811)
     found = diagnose(m, Hypothesis(materials()["neo_hookean"]))
     assert found.verdict in ("named", "ambiguous")  # a further effect that is not seen may be there
     assert all("viscoelastic" in j.candidate.names for j in found.members)
@@ -188,7 +170,7 @@ def test_a_relaxation_test_shows_relaxation() -> None:
 def test_a_power_law_of_time_over_four_decades_is_relaxation(seed: int) -> None:
     """As raw tapes and filled rubbers relax: no single time, and no box of times, comes near it."""
     time = np.concatenate([np.linspace(0.1, 10, 60), 10 + np.geomspace(0.2, 1800, 80)])
-    m = held(time, 10.0, lambda lag: (1 + lag / 0.05) ** -0.12, 1e-3, seed)
+    m = pulled_and_held(time, 10.0, lambda lag: (1 + lag / 0.05) ** -0.12, 1e-3, seed)
     found = diagnose(m, Hypothesis(materials()["mooney_rivlin"]))
     assert found.verdict in ("named", "ambiguous")
     assert all("viscoelastic" in j.candidate.names for j in found.members)

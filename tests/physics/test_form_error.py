@@ -101,9 +101,7 @@ def test_rest_is_no_speed() -> None:
     assert held.leg_speed == pytest.approx(0.039 / 29, rel=0.05)
 
 
-def test_what_another_speed_may_show_is_as_large_as_trace_and_part_of_the_force_together_and_no_larger_than_that() -> (
-    None
-):
+def test_what_another_speed_may_show_is_of_trace_and_force_but_no_larger_than_the_force() -> None:
     m, h = cyclic(40), hypothesis("neo_hookean", ["force_offset", "friction"])
     rng = np.random.default_rng(2)
     force, trace = m.force, rng.standard_normal((2, 40))

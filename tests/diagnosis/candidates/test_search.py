@@ -20,8 +20,7 @@ from bayesmembrane.physics.form_error import form_columns, traces
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
-from bayesmembrane.physics.rigs.uniaxial import Uniaxial
-from tests.diagnosis.curves import triangle, white_noise
+from tests.diagnosis.curves import pulled_and_held, triangle, white_noise
 from tests.generator.film import Film
 
 SD, N = 0.004, 90
@@ -183,15 +182,9 @@ def test_a_polished_fit_is_where_its_linear_model_has_its_mode(cyclic, name) -> 
 def relaxing() -> tuple[Search, Candidate]:
     """A strip that relaxes by a power of time, pulled and held, and its fit with relaxation."""
     time = np.concatenate([np.linspace(0.1, 10, 60), 10 + np.geomspace(0.2, 1800, 80)])
-    stretch = 1 + 0.8 * np.minimum(time / 10, 1)
-    ticks = np.concatenate([[0.0], time])
-    lag = np.maximum(time[:, None] - 0.5 * (ticks[1:] + ticks[:-1]), -0.04)
-    pull = np.concatenate([[0.0], stretch - stretch**-2])
-    force = np.where(lag > 0, (1 + lag / 0.05) ** -0.2, 0.0) @ np.diff(pull)
-    rig, sd = Uniaxial(), 1e-3 * float(np.max(force))
-    noisy = force + sd * np.random.default_rng(50814).standard_normal(time.size)
-    m = Measurement(rig.length * (stretch - 1), noisy, rig, Specimen("strip", 1e-3), time=time)
-    search = Search(m, white_noise(m, sd, 80.0))
+    noise = 1e-3
+    m = pulled_and_held(time, 10.0, lambda lag: (1 + lag / 0.05) ** -0.2, noise, 50814)
+    search = Search(m, white_noise(m, noise * float(np.max(m.force)), 80.0))
     plain = search.fit(PLAIN, search.material_starts(PLAIN))
     assert plain is not None
     return search, beside(search, plain, "viscoelastic")
