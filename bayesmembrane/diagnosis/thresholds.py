@@ -242,6 +242,10 @@ class GrowthThresholds:
     """ln of the Bayes factor that a trace must promise for a fit, and an effect must bring for further energies."""
     least_refits: int = 2
     """Effects that are fitted beside each of these sets none the less, for a trace is that of a little effect."""
+    second_events: int = 2
+    """Places of a second event that are searched from, those that promise most."""
+    no_event: float = 0.03
+    """Part of what came at once, below which there was no second event yet."""
     with_other_energies: int = 3
     """Sets of each size that are tried with every energy."""
     untried: int = 6

@@ -5,7 +5,7 @@
 
 with t_e the trace of effect e, what it changes of the force, and m what effects may take of the film's own force or
 leave to it: `MIXED` times the size of their traces over that of the force, up to `MOST_MIXED`. A reading is unsteady
-where the test starts, turns or goes slack. Beside the noise S of the readings the covariance is
+where the test starts, turns, goes slack or stops on its way. Beside the noise S of the readings the covariance is
 S + (eta_a^2 + m^2) D_F K_u D_F + sum_e eta_e^2 D_t K_v D_t + (eta_l F_max)^2 P, with D of F and t on their diagonals, P
 with ones at the unsteady readings: but for P of low rank, as K is smooth.
 
@@ -139,11 +139,13 @@ def form_factors(measurement: Measurement) -> FormFactors:
 
 
 def unsteady(measurement: Measurement) -> NDArray[np.int64]:
-    """Numbers of the readings at which the test starts, turns, or goes slack."""
+    """Numbers of the readings at which the test starts, turns, goes slack, or stops on its way."""
     leg, n = measurement.leg, len(measurement)
     moves = np.flatnonzero(leg != 0)
     turns = moves[1:][np.diff(leg[moves]) != 0]
     near = {i + j for i in (0, *turns) for j in range(AFTER + 1)} | {i - 1 for i in turns}
+    if measurement.moving[-1]:
+        near |= {n - 1, n - 2}  # the drive comes to rest
     force = np.abs(measurement.force)
     ends = np.flatnonzero((leg < 0) & (force < SLACK * np.max(force)))
     return np.array(sorted(i for i in near | set(ends.tolist()) if 0 <= i < n), dtype=int)

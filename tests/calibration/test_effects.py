@@ -42,7 +42,7 @@ def test_at_null_the_posterior_is_that_of_the_film(name: str, film: Film) -> Non
 
 
 def test_prior_draws_are_all_accounted_for(film: Film) -> None:
-    m = film("yeoh", FILMS["yeoh"], points=60, noise=2e-3)
+    m = film("yeoh", FILMS["yeoh"], points=80, noise=2e-3)
     names = tuple(n for n, e in components("effects").items() if not e().unavailable(m.rig, m.path))
     posterior = Posterior(hypothesis("mooney_rivlin", names), m)
     x = posterior.prior.draw(np.random.default_rng(2), 64)

@@ -148,7 +148,7 @@ def test_what_grows_never_shrinks(name: str) -> None:
 def test_a_clamp_that_slips_at_once_does_so_at_its_place_and_stays() -> None:
     """As one that sticks until then: nothing before that deflection is reached for the first time."""
     m = measured(staircase((0.02, 0.06, 0.02), 400))
-    f, plain = force(m, "clamp_slip", x=np.array([0.03, 2.0, 0.0, 0.0, 1.0, 0.5, 0.5])), force(m)
+    f, plain = force(m, "clamp_slip", x=np.array([0.03, 2.0, 0.0, 0.0, 1.0, 0.5, 0.5, 0.0, 0.5, 0.015])), force(m)
     first, last = m.cycle == 1, m.cycle == 3
     over = (m.cycle == 2) & (m.leg > 0) & (m.deflection > 0.034)
     assert f[first] == pytest.approx(plain[first], rel=1e-2)
@@ -165,7 +165,7 @@ def test_a_tear_runs_at_its_moment_in_a_hold_too_and_comes_to_rest() -> None:
     whole, plain = float(m.path.clock[-1]), force(m)
     torn = Tearing().on(Reach(0.06, 1.0, whole))
     clock = m.path.clock
-    p = np.array([[0.1, 2.0, 0.0, 0.0, 1.0, 50.0, 3.0, 0.5]])
+    p = np.array([[0.1, 2.0, 0.0, 0.0, 1.0, 50.0, 3.0, 0.5, 0.0, 0.0]])
     f = torn.carried(p, plain[None], FilmState(m.path, d[None], plain[None], plain[None]))[0]
     assert f[clock <= 50] == pytest.approx(plain[clock <= 50])
     assert f[clock > 50] == pytest.approx(plain[clock > 50] * np.exp(-0.1 * -np.expm1(-(clock[clock > 50] - 50) / 3)))

@@ -141,7 +141,7 @@ def test_one_law_that_may_be_off_adds_one_coordinate_however_many_there_are() ->
     assert one.natural_names[-4:] == ("noise.sd", "noise.eta", "noise.eta_local", "noise.eta_law")
 
 
-def test_unsteady_readings_are_those_at_the_start_at_turns_and_at_slack_ends() -> None:
+def test_unsteady_readings_are_those_at_the_start_at_turns_at_slack_ends_and_where_it_stops() -> None:
     up = np.linspace(0.0, 0.02, 11)
     deflection = np.concatenate([up, up[-2::-1], up[1:]])
     force = np.maximum(100.0 * deflection - 0.5 * (np.arange(31) > 10) * (np.arange(31) < 20), 0.0)
@@ -150,5 +150,12 @@ def test_unsteady_readings_are_those_at_the_start_at_turns_and_at_slack_ends() -
     assert {0, 1, 2} <= found  # the start
     assert {10, 11, 12, 20, 21, 22} <= found  # either turn
     assert {18, 19} <= found  # slack on the way down
+    assert {29, 30} <= found  # the drive comes to rest
     assert not {5, 15, 25} & found
     assert np.array_equal(form_factors(m).local, np.eye(31)[:, sorted(found)])
+
+
+def test_a_test_that_ends_in_a_hold_is_steady_there() -> None:
+    deflection = np.concatenate([np.linspace(0.0, 0.02, 11), np.full(20, 0.02)])
+    m = Measurement(deflection, 100.0 * deflection, Annulus(0.010, 0.035), Specimen("film", 5e-5))
+    assert not {29, 30} & set(unsteady(m).tolist())

@@ -397,7 +397,7 @@ def starts_with(
         for sign in signs:
             for share in (small, middling) if i == 0 else (small,):
                 for shape in from_first if i == 0 else [{}]:
-                    theta = np.array([shape.get(p.name, p.typical) for p in effect.coordinates])
+                    theta = np.array([shape.get(p.name, p.first) for p in effect.coordinates])
                     for j, scale in zip(effect.sizes, expected.tolist(), strict=True):
                         theta[j] = (effect.coordinates[j].null or 0.0) + sign * share * scale
                     out.append(np.concatenate([base, effect.within_bounds(theta)]))

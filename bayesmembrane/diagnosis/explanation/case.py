@@ -20,7 +20,7 @@ from bayesmembrane.diagnosis.detection.detect import Detection, detect
 from bayesmembrane.diagnosis.detection.scores import Signature
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside
 from bayesmembrane.diagnosis.explanation.limit import log_evidence_alone
-from bayesmembrane.diagnosis.explanation.twins import Pairs, twins, twins_in_time
+from bayesmembrane.diagnosis.explanation.twins import Pairs, twins, twins_in_time, twins_one_way
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.noise import Whitened, orthonormal, whitened
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
@@ -159,7 +159,8 @@ class OpenCase(DiagnosisCase):
         return renewed(search, self.smooth, best)
 
     def twins(self) -> Pairs:
-        return twins(self.effects, self.signatures) | twins_in_time(self.effects, self.measurement)
+        of_motion = twins_in_time(self.effects, self.measurement) | twins_one_way(self.effects, self.measurement)
+        return twins(self.effects, self.signatures) | of_motion
 
     def foreign(self, search: Weighing, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
         assert isinstance(search, Search)

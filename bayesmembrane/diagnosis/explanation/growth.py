@@ -12,6 +12,7 @@ from bayesmembrane.diagnosis.candidates.sampled import checked
 from bayesmembrane.diagnosis.candidates.weighing import Sought, Weighing, starts_with
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
+from bayesmembrane.diagnosis.explanation.events import with_second_events
 from bayesmembrane.diagnosis.explanation.foreign import Foreign
 from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pairs
 from bayesmembrane.diagnosis.explanation.twins import swapped
@@ -211,12 +212,19 @@ def _grow(out: Grown) -> bool:
         if bases:
             any_new = True
             out.renew()
+            _with_events(out, size)
             _with_other_energies(out, size)
             out.polish(size)
             out.limited = size == 1 and _limited(out)
         if out.limited or not _worth_more(out, size):
             break
     return any_new
+
+
+def _with_events(out: Grown, size: int) -> None:
+    """The best sets of this size with second events of what comes at once."""
+    for c in with_second_events(out.search, out.best_of_each_set(size)[: GROWTH.polished]):
+        out.add(c)
 
 
 def _limited(out: Grown) -> bool:

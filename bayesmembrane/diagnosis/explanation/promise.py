@@ -49,6 +49,13 @@ def promised(search: Weighing, base: Candidate, effect: Effect, counts: float = 
     return best
 
 
+def of_changes(search: Weighing, base: Candidate, changes: Array) -> Array:
+    """(m,) ln K of ``changes`` (N, m) N of its curve, each of the expected size and of this sign, as `first_order`."""
+    m = changes.shape[1]
+    slopes = _Slopes(search.noise.white(changes), np.zeros(m, int), np.ones(m, int))
+    return np.asarray(np.max([_gains(f) - f.cost for f in _freed(search, base, slopes)], axis=0))
+
+
 def gains_of_pairs(search: Weighing, base: Candidate, effects: Sequence[Effect]) -> dict[Pair, float]:
     """ln K of a little of two effects beside ``base``, by their names, at the best of several shapes of each.
 

@@ -1,8 +1,9 @@
 """Effects that a test cannot tell apart: no shape of a law is sure enough to choose between them.
 
 Two effects are twins on a measurement where both change the curve by functions of the deflection alone that nearly
-coincide beside the plain model (`confounded`), where both make loops at any speed, or where one follows time and the
-other the way, and the disc moved at one speed without a hold. Laws of a library are close to what happens, not the
+coincide beside the plain model (`confounded`), where both make loops at any speed, where one follows time and the
+other the way, and the disc moved at one speed without a hold, or where only the way back would tell them apart, and
+there is none. Laws of a library are close to what happens, not the
 same: of two sets that differ by twins, and stand nearly as well, none is told to be more than `BELIEFS.apart` times as
 probable as the other.
 """
@@ -65,6 +66,14 @@ def twins_in_time(effects: Sequence[Effect], measurement: Measurement) -> dict[S
     if not one_speed(measurement):
         return {}
     return {frozenset((e.name, o)): Near(TWINS.alike_in_time) for e in effects for o in e.twins_at_one_speed}
+
+
+def twins_one_way(effects: Sequence[Effect], measurement: Measurement) -> dict[Set, Near]:
+    """Pairs of ``effects`` that only the way back tells apart, where the disc never came back."""
+    if np.any(measurement.leg < 0):
+        return {}
+    known = {e.name for e in effects}
+    return {frozenset((e.name, o)): Near(TWINS.alike) for e in effects for o in e.twins_one_way if o in known}
 
 
 def one_speed(*measurements: Measurement) -> bool:

@@ -18,7 +18,7 @@ from bayesmembrane.diagnosis.detection.lack_of_fit import lack_of_fit
 from bayesmembrane.diagnosis.detection.scores import Signature, score_test
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase, OpenCase, Question, Tell, renewed, seen_elsewhere
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside
-from bayesmembrane.diagnosis.explanation.twins import Near, Pairs, one_speed, twins, twins_in_time
+from bayesmembrane.diagnosis.explanation.twins import Near, Pairs, one_speed, twins, twins_in_time, twins_one_way
 from bayesmembrane.diagnosis.joint.effects import AT, EffectInTests, effects_in_tests
 from bayesmembrane.diagnosis.joint.search import JointSearch, joint_noise
 from bayesmembrane.diagnosis.reference.noise import Whitened, whitened
@@ -61,15 +61,17 @@ class JointCase(DiagnosisCase):
     def twins(self) -> Pairs:
         """Those that no test tells apart, and no two of another speed: of the material in all, of a rig in that one."""
         out: dict[frozenset[str], Near] = dict(twins(self.effects, self.signatures))
-        each = [twins_in_time(c.effects, c.measurement) for c in self.alone]
+        in_time = [twins_in_time(c.effects, c.measurement) for c in self.alone]
+        one_way = [twins_one_way(c.effects, c.measurement) for c in self.alone]
         names = {u.name: u for u in self.effects if isinstance(u, EffectInTests)}
-        for i, pairs in enumerate(each):
-            for pair, near in pairs.items():
-                own = [n for n in names if n.partition(AT)[0] in pair and names[n].within(i) is not None]
-                where = {t for n in own for t in names[n].places}
-                speed = one_speed(*(self.alone[t].measurement for t in where))
-                if len(own) == 2 and speed and all(pair in each[t] for t in where):
-                    out[frozenset(own)] = near
+        for each, any_speed in ((in_time, False), (one_way, True)):
+            for i, pairs in enumerate(each):
+                for pair, near in pairs.items():
+                    own = [n for n in names if n.partition(AT)[0] in pair and names[n].within(i) is not None]
+                    where = {t for n in own for t in names[n].places}
+                    speed = any_speed or one_speed(*(self.alone[t].measurement for t in where))
+                    if len(own) == 2 and speed and all(pair in each[t] for t in where):
+                        out[frozenset(own)] = near
         return out
 
     def log_evidence_of_limit(self, search: Weighing, bases: Sequence[Candidate]) -> float:

@@ -43,9 +43,16 @@ class EffectInTests(Effect):
     @property
     def starts(self) -> list[dict[str, float]]:
         """Those of its first part, in all."""
-        first = self.parts[0][1].starts
+        return self._in_all(self.parts[0][1].starts)
+
+    @property
+    def second_starts(self) -> list[dict[str, float]]:
+        """Those of its first part, in all."""
+        return self._in_all(self.parts[0][1].second_starts)
+
+    def _in_all(self, starts: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
         several = len(self.parts) > 1 and not self.constant
-        return [{(f"{t}.{k}" if several else k): v for t, _ in self.parts for k, v in start.items()} for start in first]
+        return [{(f"{t}.{k}" if several else k): v for t, _ in self.parts for k, v in s.items()} for s in starts]
 
     def within(self, test: int) -> Effect | None:
         """The effect in one test; None if it is not at work there."""

@@ -26,6 +26,9 @@ CREEPS = EffectParameter(
     "creeps", "-", "part of that which grows with time under load, in holds too", Uniform(0.0, 1.0), (0.0, 1.0)
 )
 JUMP = EffectParameter("jump", "-", "part of it that comes at once", Uniform(0.0, 1.0), (0.0, 1.0))
+SECOND = EffectParameter(
+    "second", "-", "part of that which comes in a second event", HalfNormal(0.3), (0.0, 1.0), begin=0.0
+)
 STILL = 1e-7
 """Of the full range: a smaller step is none, and the mean of a power over it the power itself."""
 

@@ -33,10 +33,12 @@ class EffectParameter(Parameter):
 
     null : the value at which the effect vanishes, exactly; None for a shape, which means nothing once it has vanished
     of_the_test : True of a time that is a part of the test's duration, and no time of the film or the rig
+    begin : where searches begin, if not at the `typical` value
     """
 
     null: float | None = None
     of_the_test: bool = False
+    begin: float | None = None
 
     def on(self, reach: Reach) -> Self:
         """The same where a test goes so far: what is a part of that grows with it."""
@@ -70,6 +72,11 @@ class EffectParameter(Parameter):
         """Prior median of a shape; null value plus one scale of a size."""
         return float(self.prior.quantile(0.5)) if self.null is None else self.null + self.scale
 
+    @property
+    def first(self) -> float:
+        """Where searches begin."""
+        return self.typical if self.begin is None else self.begin
+
 
 @cache
 def _scale(prior: Prior, null: float | None) -> float:
@@ -98,6 +105,7 @@ class Effect(ABC):
     constant : True if its parameters are then the same in all of them; those of others belong to what a test reached
     twins_at_one_speed : names of effects that only another speed, or a hold, tells from this one
     twins_at_any_speed : names of effects that only the shape of its law tells from this one, whatever the motion
+    twins_one_way : names of effects that only the way back tells from this one
     begins : the coordinate that says when it comes, in s since the start; "" where it comes with the way
     sudden : True if it may come at any moment, which no test tells from a fall of the force that no effect describes
     odds : how often it is met beside the others, before anything is measured
@@ -125,6 +133,7 @@ class Effect(ABC):
     constant: ClassVar[bool] = False
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ()
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ()
+    twins_one_way: ClassVar[tuple[str, ...]] = ()
     sudden: ClassVar[bool] = False
     begins: ClassVar[str] = ""
     odds: ClassVar[float] = 1.0
@@ -163,6 +172,11 @@ class Effect(ABC):
     @property
     def starts(self) -> list[dict[str, float]]:
         """Shapes by name from which searches for it start, beside the typical ones."""
+        return []
+
+    @property
+    def second_starts(self) -> list[dict[str, float]]:
+        """Shapes by name of a second event, of which searches begin without: one is found from nearby only."""
         return []
 
     @classmethod

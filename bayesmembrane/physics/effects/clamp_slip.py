@@ -2,31 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 from scipy.special import expit
 
 from bayesmembrane.data.motion import Motion
-from bayesmembrane.ground.parameters import Array, HalfNormal, Uniform
-from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, growth
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
+from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, SECOND, growth
 from bayesmembrane.physics.effects.base import EffectParameter, Slack, running_max
 
 PLACE = EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1))
-WIDTH = 0.015
-"""Of the full range, in which a jump comes."""
+SECOND_PLACE = replace(PLACE, name="second_place", meaning="where the second event comes, over the full range")
+WIDTH = EffectParameter(
+    "width", "-", "how long it slides at once, over the full range", LogNormal(0.005, 1.2), (1e-4, 0.3), begin=0.015
+)
 JUMPS = tuple({"jump": 0.6, "place": place} for place in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9))
 """Shapes to begin a search with: a jump is found from nearby only."""
+SECONDS = tuple({"second": 0.3, "second_place": place} for place in np.linspace(0.1, 1.0, 19).tolist())
 
 
 @dataclass(frozen=True)
 class ClampSlip(Slack):
-    """Free length L (1 + slip [(1 - jump) G + jump / (1 + exp((place - m / D) / w))]), w = 0.015.
+    """Free length L (1 + slip [(1 - jump) G + jump ((1 - second) H(place) + second H(second_place))]),
+    H(p) = 1 / (1 + exp((p - m / D) / width)).
 
     G is the growth law of the test (1 after a first loading to its full range D), m the largest deflection so far: a
-    film creeps out of its clamp, and sticks until it slips at once. What has slid out stays out: the film is slack
-    until the longer film is taut.
+    film creeps out of its clamp, and sticks until it slips at once, sticks again, and slips a second time. What has
+    slid out stays out: the film is slack until the longer film is taut.
     On an annulus of 10 and 35 mm a length s that slides out of the outer clamp acts as slip = 0.80 s / L, to a tenth of
     its effect (Yeoh film, 12 to 70 mm, against the exact solution: tests/reference/test_slip.py).
     """
@@ -49,13 +53,22 @@ class ClampSlip(Slack):
         JUMP,
         PLACE,
         CREEPS,
+        SECOND,
+        SECOND_PLACE,
+        WIDTH,
     )
 
     @property
     def starts(self) -> list[dict[str, float]]:
         return [{"jump": 0.05, "place": 0.5}, *JUMPS]
 
+    @property
+    def second_starts(self) -> list[dict[str, float]]:
+        return list(SECONDS)
+
     def excess(self, p: Array, deflection: Array, path: Motion) -> Array:
         slow = growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4], p[:, 6:7])
-        at_once = expit((running_max(deflection) / path.full_range - p[:, 5:6]) / WIDTH)
+        reached = running_max(deflection) / path.full_range
+        first, then = (expit((reached - p[:, i : i + 1]) / p[:, 9:10]) for i in (5, 8))
+        at_once = first + p[:, 7:8] * (then - first)
         return np.asarray(p[:, :1] * ((1 - p[:, 4:5]) * slow + p[:, 4:5] * at_once))

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
-from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, growth
+from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, SECOND, growth
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 from bayesmembrane.physics.reach import SOURCE
 
 PLACES = (0.15, 0.27, 0.39, 0.51, 0.63, 0.75, 0.87)
 """Of the duration: moments to begin a search with, for one is found from nearby only."""
+MOMENT = EffectParameter(
+    "moment", "s", "when a tear runs", Uniform(0.0, SOURCE.duration), (0.0, SOURCE.duration), of_the_test=True
+)
+SECOND_PLACES = tuple(np.linspace(0.02, 0.98, 33).tolist())
+"""Of the duration: moments at which a second one may run."""
 
 
 @dataclass(frozen=True)
 class Tearing(Carried):
-    """F = F0 exp(-loss [(1 - jump) G + jump (1 - exp(-(t - moment) / takes))]), the second part from the moment on.
+    """F = F0 exp(-loss [(1 - jump) G + jump ((1 - second) R(moment) + second R(second_moment))]),
+    R(m) = 1 - exp(-(t - m) / takes) from the moment m on.
 
     G is the growth law of the test (1 after a first loading to its full range), t the time since its start: a film
-    tears little by little as it is stretched, and a tear runs at some moment, be it in a hold, and comes to rest.
-    Without times the clock is the distance travelled at 1 mm/s.
+    tears little by little as it is stretched, and a tear runs at some moment, be it in a hold, comes to rest, and may
+    run once more. Without times the clock is the distance travelled at 1 mm/s.
     """
 
     name: ClassVar[str] = "tearing"
@@ -33,6 +39,7 @@ class Tearing(Carried):
         "nothing comes back."
     )
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("mullins",)  # with damage alone both are less by what was reached
+    twins_one_way: ClassVar[tuple[str, ...]] = ("clamp_slip",)  # both are a force that falls; what slid is slack later
     sudden: ClassVar[bool] = True
     begins: ClassVar[str] = "moment"
     scales_with_modulus: ClassVar[bool] = True
@@ -44,14 +51,7 @@ class Tearing(Carried):
         REPEATED,
         SATURATION,
         JUMP,
-        EffectParameter(
-            "moment",
-            "s",
-            "when a tear runs",
-            Uniform(0.0, SOURCE.duration),
-            (0.0, SOURCE.duration),
-            of_the_test=True,
-        ),
+        MOMENT,
         EffectParameter(
             "takes",
             "s",
@@ -61,6 +61,8 @@ class Tearing(Carried):
             of_the_test=True,
         ),
         CREEPS,
+        SECOND,
+        replace(MOMENT, name="second_moment", meaning="when it runs once more"),
     )
 
     @property
@@ -68,8 +70,13 @@ class Tearing(Carried):
         whole = next(c.bounds[1] for c in self.coordinates if c.name == "moment")
         return [{"jump": 0.05}, *({"jump": 0.6, "moment": part * whole, "takes": 0.03 * whole} for part in PLACES)]
 
+    @property
+    def second_starts(self) -> list[dict[str, float]]:
+        whole = next(c.bounds[1] for c in self.coordinates if c.name == "moment")
+        return [{"second": 0.3, "second_moment": part * whole} for part in SECOND_PLACES]
+
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         slow = growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path, p[:, 3:4], p[:, 7:8])
-        since = np.maximum(state.path.clock - p[:, 5:6], 0.0)
-        ran = -np.expm1(-since / p[:, 6:7])
+        first, then = (-np.expm1(-np.maximum(state.path.clock - p[:, i : i + 1], 0.0) / p[:, 6:7]) for i in (5, 9))
+        ran = first + p[:, 8:9] * (then - first)
         return np.asarray(force * np.exp(-p[:, :1] * ((1 - p[:, 4:5]) * slow + p[:, 4:5] * ran)))

@@ -5,7 +5,7 @@ import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.twins import Near, Stands, levelled, one_speed, swapped, twins
+from bayesmembrane.diagnosis.explanation.twins import Near, Stands, levelled, one_speed, swapped, twins, twins_one_way
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -106,3 +106,11 @@ def test_effects_that_do_not_remember_are_alike_on_every_leg(name: str) -> None:
     legs = force[:31], force[30:61][::-1], force[60:91], force[90:][::-1]
     alike = all(leg == pytest.approx(legs[0], rel=1e-9, abs=1e-12) for leg in legs)
     assert alike is not effect.remembers
+
+
+@pytest.mark.parametrize("way", [UP, LEG])
+def test_what_only_the_way_back_tells_apart_are_twins_where_there_is_none(way: np.ndarray) -> None:
+    effects = [components("effects")[n]() for n in ("tearing", "clamp_slip", "mullins")]
+    found = set(twins_one_way(effects, curve(way, None)))
+    assert found == ({frozenset(("tearing", "clamp_slip"))} if way is UP else set())
+    assert not twins_one_way(effects[:1], curve(way, None))  # the other one cannot be at work

@@ -155,7 +155,7 @@ def test_slopes_are_those_of_the_force(effect: Effect, curve: Measurement) -> No
         numeric = (f(x + step).force - f(x - step).force) / (2 * step[i])
         apart = np.abs(numeric - found.sensitivity[:, :, i])
         # Where the film becomes slack the slope jumps: a few points may lie across.
-        assert np.quantile(apart, 0.97) < 2e-3 * np.max(np.abs(numeric)), p.name
+        assert np.quantile(apart, 0.97) <= 2e-3 * np.max(np.abs(numeric)), p.name
     null = vector(h, "null")
     for p, slope in zip(
         effect.coordinates, np.moveaxis(f(null, sensitivities=True).sensitivity[0], 1, 0)[3:], strict=True

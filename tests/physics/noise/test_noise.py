@@ -295,11 +295,11 @@ def test_chi_square_counts_the_form_error_beside_the_stated_noise() -> None:
 @pytest.mark.parametrize("noise", [Form(), FormAR1()], ids=lambda n: n.name)
 @pytest.mark.parametrize("given", GIVEN)
 def test_what_is_not_steady_is_an_error_of_its_readings_alone(given: str, noise: Noise) -> None:
-    """Sigma + (eta_l F_max)^2 P; the first three of seven readings of one loading, and nothing else."""
+    """Sigma + (eta_l F_max)^2 P; the first three and the last two of seven readings of one loading, no others."""
     bound, x = told(noise, noise.bind(measurement(given)), 0), draws(noise, 1)[0]
     without = np.array([*x[:2], -40.0, *x[3:]])
     expected = np.zeros(N)
-    expected[:3] = (np.exp(x[2]) * np.max(bound.force)) ** 2
+    expected[[0, 1, 2, -2, -1]] = (np.exp(x[2]) * np.max(bound.force)) ** 2
     assert bound.covariance(x) - bound.covariance(without) == pytest.approx(np.diag(expected), abs=1e-15)
     # It is no error of the film: another test has it anew.
     once = (np.full((4000, N), 0.0), np.tile([-20.0, -40.0, x[2], *x[3:]], (4000, 1)), np.random.default_rng(SEED + 8))
