@@ -102,8 +102,19 @@ def swapped(names: Set, pairs: Iterable[Set]) -> Iterator[tuple[str, str, Set]]:
             yield out, new, (names - {out}) | {new}
 
 
+def _beside(names: Set, pairs: Iterable[Set]) -> Iterator[tuple[Set, Set]]:
+    """(a pair of twins, the set after it) for every effect of a set whose twin is not in it: with that twin instead of
+    it, and with both.
+    """
+    for old, new, other in swapped(names, pairs):
+        pair = frozenset((old, new))
+        yield pair, other
+        yield pair, other | {old}
+
+
 def levelled(weights: Mapping[Set, float], stands: Mapping[Set, Stands], pairs: Pairs) -> dict[Set, float]:
-    """By how much ln of a set's probability rises, so that none is `BELIEFS.apart` times less than a twin of it.
+    """By how much ln of a set's probability rises, so that none is `BELIEFS.apart` times less than a twin of it, or
+    than it with a twin of one of its effects, which may be no more than an error of the law of that one.
 
     weights : by set, ln of its probability, whatever the constant
     stands : by set, how well it stands
@@ -113,8 +124,8 @@ def levelled(weights: Mapping[Set, float], stands: Mapping[Set, Stands], pairs: 
         best = max(
             (
                 weights[other]
-                for old, new, other in swapped(names, pairs)
-                if other in weights and _near(stands[names], stands[other], pairs[frozenset((old, new))])
+                for pair, other in _beside(names, pairs)
+                if other in weights and _near(stands[names], stands[other], pairs[pair])
             ),
             default=-np.inf,
         )

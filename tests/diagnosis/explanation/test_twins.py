@@ -33,6 +33,14 @@ def test_a_twin_is_at_most_so_many_times_less_probable() -> None:
     assert (found[A], found[C], found[D]) == (0.0, -2.0, -3.0)  # who is near enough stays
 
 
+@pytest.mark.parametrize(("left", "told"), [(0.02, 0.0 - np.log(BELIEFS.apart)), (0.2, -60.0)])
+def test_a_twin_beside_its_twin_may_be_an_error_of_its_law(left: float, told: float) -> None:
+    both = A | B
+    found = odds({A: -60.0, both: 0.0}, {A: left, both: 0.0})
+    assert found[A] == pytest.approx(told)
+    assert odds({A: 0.0, both: -60.0}, {A: 0.0, both: 0.0})[both] == -60.0  # and not the other way about
+
+
 def test_a_twin_that_leaves_much_more_is_told_apart() -> None:
     found = odds({A: 0.0, B: -60.0}, {A: 0.01, B: 0.07})
     assert found[B] == -60.0
