@@ -25,6 +25,7 @@ from bayesmembrane.ground.symmetric import normal_draws
 from bayesmembrane.ground.threads import one_thread
 from bayesmembrane.physics.form_error import FormFactors, error_at_another_speed, joint_factors
 from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.rigs.base import rig_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,12 +112,18 @@ def _members(found: Diagnosis) -> Iterator[tuple[Candidate, int]]:
 
 
 def _draws(search: Search, c: Candidate, other: Measurement, count: int, rng: np.random.Generator) -> Array | None:
-    """(count, N) N, without noise; None if the film does not get as far."""
+    """(count, N) N, without noise; None if the film does not get as far.
+
+    No error of a form makes a film push: none takes a reading below zero, nor below what the hypothesis says of it.
+    """
     there = _at(search, c, other)
     if there is None:
         return None
     z = normal_draws(there.covariance, count, rng)
-    return np.asarray(there.force + there.moved + z @ there.columns.T)
+    read = there.force + there.moved
+    pulled = rig_of(other).slack_below_rest(other)
+    least = np.minimum(read, 0.0) if pulled else -np.inf
+    return np.asarray(np.maximum(read + z @ there.columns.T, least))
 
 
 def _at(search: Search, c: Candidate, other: Measurement) -> Continued | None:

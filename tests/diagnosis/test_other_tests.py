@@ -1,16 +1,24 @@
 """Tests that no fit saw are predicted with bands that hold, as far as specimens are alike."""
 
+from typing import cast
+
 import numpy as np
 import pytest
 
 import bayesmembrane as bm
 from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis import other_tests
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
+from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.left.continued import Continued
 from bayesmembrane.diagnosis.other_tests import predicted
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.base import Rig
+from bayesmembrane.physics.rigs.compression import Compression
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.diagnosis.curves import measured, triangle
 
@@ -69,6 +77,20 @@ def test_the_door_predicts_one_test_or_several(found: Diagnosis) -> None:
     (one,), several = bm.predict(found, m, scatter=0.05, seed=4), bm.predict(found, [m, m], scatter=0.05, seed=4)
     assert np.array_equal(one.high, predicted(found, m, 0.05, 4).high)
     assert [np.array_equal(o.high, one.high) for o in several] == [True, True]
+
+
+@pytest.mark.parametrize(("rig", "least"), [(Uniaxial(), 0.0), (Compression(), -np.inf)])
+def test_no_error_makes_a_film_push(monkeypatch: pytest.MonkeyPatch, rig: Rig, least: float) -> None:
+    force = np.array([0.5, 0.1, 0.0, -0.2])
+    there = Continued(force, np.zeros(4), 3 * np.eye(4), np.eye(4), True)
+    monkeypatch.setattr(other_tests, "_at", lambda *_: there)
+    side = -1 if rig.presses else 1
+    other = Measurement(side * np.array([4e-3, 3e-3, 2e-3, 1e-3]), side * np.ones(4), rig, Specimen("strip", 1e-3))
+    draws = other_tests._draws(cast(Search, None), cast(Candidate, None), other, 500, np.random.default_rng(1))
+    assert draws is not None
+    lowest = np.min(draws, axis=0)
+    assert lowest == pytest.approx(np.minimum(force, 0.0)) if least == 0.0 else np.all(lowest < -1)
+    assert np.all(np.max(draws, axis=0) > 1)
 
 
 def test_what_cannot_be_predicted_is_said(found: Diagnosis) -> None:
