@@ -9,7 +9,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.joint.effects import AT
 from bayesmembrane.ground.registry import components
-from bayesmembrane.physics.effects.base import Effect
+from bayesmembrane.physics.effects.base import Effect, EffectParameter
 from bayesmembrane.words.language import spoken_parameter
 from bayesmembrane.words.units import SCALES, Units, size_in_words
 
@@ -21,12 +21,19 @@ IMPLAUSIBLE = 5.0
 
 def units_of(names: Iterable[str]) -> dict[str, str]:
     """SI unit of each parameter of an effect: ``machine_compliance.compliance``, ``mullins@strip.softening``."""
-    known, units = components("effects"), {}
-    for name in names:
-        effect, _, own = name.partition(".")
-        declared = known[effect.partition(AT)[0]].coordinates
-        units[name] = next(p.unit for p in declared if p.name == own)
-    return units
+    return {name: _declared(name).unit for name in names}
+
+
+def parameter_in_words(name: str, value: float, shown: Units = SCALES) -> str:
+    """``stretch 1.0123``: a parameter of an effect in SI, in the unit that people read."""
+    p = _declared(name)
+    return f"{p.name} {size_in_words(value, p.unit, shown, p.null)}"
+
+
+def _declared(name: str) -> EffectParameter:
+    effect, _, own = name.partition(".")
+    declared: tuple[EffectParameter, ...] = components("effects")[effect.partition(AT)[0]].coordinates
+    return next(p for p in declared if p.name == own)
 
 
 def usual_size(effect: Effect, measurement: Measurement, shown: Units = SCALES) -> str:
@@ -54,7 +61,7 @@ def flagged_size(effect: Effect, candidate: Candidate, measurement: Measurement)
     if times < LEAST:
         return f"{name} too small to show"
     assumed = " at an assumed 1 mm/s" if measurement.time is None and p.unit.endswith("/s") else ""  # `NOMINAL_SPEED`
-    told = [f"{name} {size_in_words(value, p.unit, shown)}{assumed}"]
+    told = [f"{name} {size_in_words(value, p.unit, shown, p.null)}{assumed}"]
     if times >= IMPLAUSIBLE:
         told.append(f"implausible: usual {usual_size(effect, measurement, shown)}")
     own = [n.partition(".")[2] for n in candidate.at_bound if n.startswith(f"{effect.name}.")]

@@ -22,9 +22,9 @@ def read_as(shown: Units) -> dict[str, dict[str, float | str]]:
     return {unit: {"factor": factor, "unit": name} for unit, (factor, name) in shown.items()}
 
 
-def size_in_words(value: float, unit: str, shown: Units = SCALES) -> str:
-    """A value in SI in the unit that people read."""
+def size_in_words(value: float, unit: str, shown: Units = SCALES, null: float | None = None) -> str:
+    """A value in SI in the unit that people read; near a ``null`` of 1, as a stretch is, with more digits."""
     factor, name = shown.get(unit, (1.0, unit.removeprefix("-")))
     value = 0.0 if abs(value) < NOTHING_LEFT else value
-    digits = 5 if unit == "-" and 0 < value - 1 < WORDS.near_one else 3  # a stretch
+    digits = 5 if null == 1.0 and abs(value - 1) < WORDS.near_one else 3
     return f"{factor * value:.{digits}g} {name}".strip()

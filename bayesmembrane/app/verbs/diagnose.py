@@ -97,7 +97,7 @@ def _row_name(row: dict[str, Any], several: bool) -> str:
 
 def show(document: dict[str, Any], measurement: Measurement) -> None:
     """A diagnosis on the terminal, in the units of the rig."""
-    from bayesmembrane.words.units import size_in_words
+    from bayesmembrane.words.sizes import parameter_in_words
 
     shown = measurement.rig.shown(measurement.specimen.thickness)
     factor, unit = shown["N"]
@@ -109,9 +109,7 @@ def show(document: dict[str, Any], measurement: Measurement) -> None:
             f"{100 * r['probability']:.1f} %",
             f"{r['log_bayes_factor']:.1f}",
             f"{100 * r['unexplained']:.0f} %",
-            ", ".join(
-                f"{k.split('.')[-1]} {size_in_words(v, r['units'][k], shown)}" for k, v in r["parameters"].items()
-            ),
+            ", ".join(parameter_in_words(k, v, shown) for k, v in r["parameters"].items()),
         ]
         for r in document["ranking"][:CANDIDATES]
     ]
