@@ -121,7 +121,8 @@ Effects act in this order, in whatever order they are named, and each is one fil
   + q int (x / D)^a v dt / D], with H = (1 + s) (m / D)^a / (1 + s (m / D)^a) of the largest deflection m so far and v
   the mean speed of the first loading. One first loading to D at one speed ends at G = 1; c is the part that grows on
   when it is repeated, q what of that creeps, in a hold too, and s says how far growth has saturated.
-  A clamp also slips at once where a deflection is reached, and a tear runs at some moment and comes to rest.
+  A clamp also slips at once where a deflection is reached, and a tear runs at some moment and comes to rest; both may
+  do so twice, for clamps stick and slip, and tears run in steps. What comes more often is left to the law's error.
 - One-sided effects have their null value as a bound.
 - Lengths, forces and their rates are parts of what a test reaches: priors and bounds stand here as on OP1 of the source
   (91.5 mm of full range, 2.25 N, 35 s), and grow with the full range D, the largest force and the duration. Where

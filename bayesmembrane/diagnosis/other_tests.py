@@ -114,16 +114,18 @@ def _members(found: Diagnosis) -> Iterator[tuple[Candidate, int]]:
 def _draws(search: Search, c: Candidate, other: Measurement, count: int, rng: np.random.Generator) -> Array | None:
     """(count, N) N, without noise; None if the film does not get as far.
 
-    No error of a form makes a film push: none takes a reading below zero, nor below what the hypothesis says of it.
+    No error of a form makes a film push: none takes a reading below zero, nor below what the hypothesis says of it with
+    the coordinates of the draw.
     """
     there = _at(search, c, other)
     if there is None:
         return None
-    z = normal_draws(there.covariance, count, rng)
-    read = there.force + there.moved
-    pulled = rig_of(other).slack_below_rest(other)
-    least = np.minimum(read, 0.0) if pulled else -np.inf
-    return np.asarray(np.maximum(read + z @ there.columns.T, least))
+    z, k = normal_draws(there.covariance, count, rng), c.x.size
+    read = there.force + there.moved + z @ there.columns.T
+    if rig_of(other).slack_below_rest(other):
+        said = there.force + z[:, :k] @ there.columns[:, :k].T
+        read = np.maximum(read, np.minimum(said, 0.0))
+    return np.asarray(read)
 
 
 def _at(search: Search, c: Candidate, other: Measurement) -> Continued | None:

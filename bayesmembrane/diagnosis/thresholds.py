@@ -246,6 +246,8 @@ class GrowthThresholds:
     """Places of a second event that are searched from, those that promise most."""
     no_event: float = 0.03
     """Part of what came at once, below which there was no second event yet."""
+    second_part: float = 0.3
+    """Part of what came at once that a second event begins with, which is its expected size."""
     with_other_energies: int = 3
     """Sets of each size that are tried with every energy."""
     untried: int = 6

@@ -5,7 +5,7 @@
 
 with t_e the trace of effect e, what it changes of the force, and m what effects may take of the film's own force or
 leave to it: `MIXED` times the size of their traces over that of the force, up to `MOST_MIXED`. A reading is unsteady
-where the test starts, turns, goes slack or stops on its way. Beside the noise S of the readings the covariance is
+where the test starts, turns, goes slack or stops. Beside the noise S of the readings the covariance is
 S + (eta_a^2 + m^2) D_F K_u D_F + sum_e eta_e^2 D_t K_v D_t + (eta_l F_max)^2 P, with D of F and t on their diagonals, P
 with ones at the unsteady readings: but for P of low rank, as K is smooth.
 
@@ -52,11 +52,11 @@ LAW = Parameter(
 """eta_e: half of the prior lies below 5 %, 95 % within 0.7 % to 37 %."""
 
 LOCAL = Parameter(
-    "ln_eta_local", "-", "log of the relative error where a test starts, turns or goes slack",
+    "ln_eta_local", "-", "log of the relative error where a test starts, turns, stops or goes slack",
     Normal(float(np.log(1e-3)), 1.5), (-17.0, 0.0),
 )  # fmt: skip
-"""eta_l, of the largest force: half of the prior lies below 0.1 %, 95 % within 0.005 % to 2 %. No drive starts or turns
-at once, and no film goes slack at once.
+"""eta_l, of the largest force: half of the prior lies below 0.1 %, 95 % within 0.005 % to 2 %. No drive starts, turns
+or stops at once, and no film goes slack at once.
 """
 
 MIXED = 0.2
@@ -93,6 +93,8 @@ KNOTS = 240
 """Points at which the process is taken apart; between them it is interpolated by its own covariance."""
 AFTER = 2
 """Readings after the start or a turn, and that at it, of which a law of a steady motion does not hold to all digits."""
+LAST = 2
+"""Readings before the drive comes to rest, the last one among them, of which it does not either."""
 SLACK = 0.04
 """Of the largest force: below it an unloading film is about to go slack."""
 LEAST = 1e-5
@@ -105,8 +107,8 @@ class FormFactors:
 
     state : (N, r) of an energy's error
     progress : (N, q) of a law's error
-    spots : (m,) numbers of the readings at which a test starts, turns or goes slack, -1 for one that
-        is not among these; None where that is not asked
+    spots : (m,) numbers of the readings at which a test starts, turns, stops or goes slack, -1 for one that is not
+        among these; None where that is not asked
     """
 
     state: Array
@@ -139,13 +141,16 @@ def form_factors(measurement: Measurement) -> FormFactors:
 
 
 def unsteady(measurement: Measurement) -> NDArray[np.int64]:
-    """Numbers of the readings at which the test starts, turns, goes slack, or stops on its way."""
+    """Numbers of the readings at which the test starts, turns, goes slack, or stops without a hold.
+
+    Readings that end before the test did (`Measurement.up_to`) count as a test that stops there.
+    """
     leg, n = measurement.leg, len(measurement)
     moves = np.flatnonzero(leg != 0)
     turns = moves[1:][np.diff(leg[moves]) != 0]
     near = {i + j for i in (0, *turns) for j in range(AFTER + 1)} | {i - 1 for i in turns}
     if measurement.moving[-1]:
-        near |= {n - 1, n - 2}  # the drive comes to rest
+        near |= set(range(n - LAST, n))
     force = np.abs(measurement.force)
     ends = np.flatnonzero((leg < 0) & (force < SLACK * np.max(force)))
     return np.array(sorted(i for i in near | set(ends.tolist()) if 0 <= i < n), dtype=int)
@@ -256,7 +261,7 @@ def unseen_columns(factors: FormFactors, force: Array, effects: Sequence[Effect]
 
 
 def local_size(force: Array) -> Array:
-    """F_max (...) = max |F| of forces F (..., N): to what an error at starts, turns and slack ends is relative."""
+    """F_max (...) = max |F| of forces F (..., N): to what an error where nothing is steady is relative."""
     return np.asarray(np.max(np.abs(force), axis=-1))
 
 

@@ -138,7 +138,7 @@ def _member(member: JointMember, found: JointDiagnosis) -> str:
             full = [f"{own}@{test.label}.{size.name}", f"{own}.{size.name}"]
             value = next(member.parameters[n] for n in full if n in member.parameters)
             m = test.measurement
-            shown = size_in_words(value, size.unit, m.rig.shown(m.specimen.thickness))
+            shown = size_in_words(value, size.unit, m.rig.shown(m.specimen.thickness), size.null)
             told.append(shown if label else f"{shown} in {test.label}")
             if known[own].constant and full[1] in member.parameters:
                 told = [shown]  # of the material, in all tests

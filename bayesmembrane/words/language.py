@@ -88,7 +88,7 @@ def short(name: str) -> str:
     block, _, own = name.partition(".")
     if block == "noise":
         spoken = {"sd": "extra noise", "eta": "form error of the energy", "eta_law": "form error of the laws"}
-        spoken["eta_local"] = "error at starts and turns"
+        spoken["eta_local"] = "error at starts, turns and stops"
         spoken |= {f"ln_{key}": f"ln {text}" for key, text in spoken.items()}
         return spoken.get(own, f"noise {own}")
     return own or block

@@ -33,7 +33,7 @@ def draws(count: int = 4) -> tuple[Posterior, Array]:
 def test_the_likelihood_is_the_normal_density_of_noise_energy_and_laws() -> None:
     """Sigma = tau^2 1 + (eta_a^2 + m^2) D_F K_u D_F + eta_e^2 D_t K_v D_t + (eta_l F_max)^2 P, t that of friction.
 
-    An offset has none; P has ones at starts, turns and slack ends.
+    An offset has none; P has ones at starts, turns, stops and slack ends.
     """
     posterior, x = draws()
     m, k = posterior.measurement, posterior.hypothesis.curve_size

@@ -12,7 +12,7 @@ from bayesmembrane.calibration.objective import Objective, separated
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.remembering import RememberingObjective, together
 from bayesmembrane.diagnosis.candidates.standard import Standard, expected_size, standard
-from bayesmembrane.diagnosis.candidates.weighing import Weighing
+from bayesmembrane.diagnosis.candidates.weighing import Weighing, starts_with
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.thresholds import SEARCH
 from bayesmembrane.ground.lately import Lately
@@ -89,15 +89,21 @@ class Search(Weighing):
         return np.array([expected_size(effect, self.measurement)])
 
     def material_starts(self, hypothesis: Hypothesis) -> list[Array]:
-        """Starts (k,) from draws of the material's prior brought to their best modulus, without any effect.
+        """Starts (k,) from draws of the material's prior brought to their best modulus, without any effect; then, from
+        the first of these, with one after the other of those of the hypothesis.
 
         The plain model bends the material until it imitates what is missing: searches must not only start there.
         """
         plain = replace(hypothesis, effects=())
         objective = Objective(plain, self._few, "euclidean", self.quick)
         pool, _ = objective.pool(np.random.default_rng(self.seed), SEARCH.draws)
-        nothing = np.concatenate([np.empty(0), *(e.null for e in hypothesis.effects)])
-        return [np.concatenate([x, nothing]) for x in separated(pool, objective.spread, SEARCH.material_starts)]
+        found = separated(pool, objective.spread, SEARCH.material_starts)
+        nulls = [e.null for e in hypothesis.effects]
+        out = [np.concatenate([x, *nulls]) for x in found]
+        for i, effect in enumerate(hypothesis.effects):
+            for own in starts_with([np.empty(0)], effect, self.expected_sizes(effect)):
+                out.append(np.concatenate([found[0], *nulls[:i], own, *nulls[i + 1 :]]))
+        return out
 
     @cached_property
     def _few(self) -> Measurement:

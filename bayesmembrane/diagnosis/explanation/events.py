@@ -29,8 +29,8 @@ def with_second_events(search: Weighing, every: Sequence[Candidate]) -> list[Can
 
 def _promising(search: Weighing, c: Candidate) -> Iterator[Array]:
     """Coordinates (k,) with a second event where it promises most, of each effect that has none yet."""
-    for rows in _second_events(c):
-        before, *after = search.misfits(c.hypothesis, np.concatenate([c.x[None, :], rows]))
+    for one, rows in _second_events(c):
+        before, *after = search.misfits(c.hypothesis, np.concatenate([one[None, :], rows]))
         changes = np.array(after) - before
         good = np.all(np.isfinite(changes), axis=1)
         if good.any():
@@ -39,17 +39,18 @@ def _promising(search: Weighing, c: Candidate) -> Iterator[Array]:
             yield from (rows[good][i] for i in first if gains[i] > GROWTH.promise)
 
 
-def _second_events(c: Candidate) -> Iterator[Array]:
-    """(m, k) the coordinates of ``c`` with a second event at one place after the other, for each effect without one."""
+def _second_events(c: Candidate) -> Iterator[tuple[Array, Array]]:
+    """For each effect without a second event, (coordinates (k,) of ``c``, the same with one at each place (m, k))."""
     begin = c.hypothesis.material_size
     for effect in c.hypothesis.effects:
-        names = [p.name for p in effect.coordinates]
-        shapes = effect.second_starts
-        shares = [begin + i for i, p in enumerate(effect.coordinates) if p.begin == 0.0]
-        if shapes and all(c.x[i] < GROWTH.no_event for i in shares):
-            rows = np.tile(c.x, (len(shapes), 1))
-            for row, shape in zip(rows, shapes, strict=True):
-                for name, value in shape.items():
-                    row[begin + names.index(name)] = value
-            yield rows
-        begin += len(names)
+        if effect.second is not None:
+            names = [p.name for p in effect.coordinates]
+            part, place, second = (begin + names.index(name) for name in effect.second)
+            one = c.x.copy()
+            if one[part] > 1 - GROWTH.no_event:  # all of it comes in the second
+                one[part], one[place] = 0.0, one[second]
+            if one[part] < GROWTH.no_event:
+                rows = np.tile(one, (len(effect.second_places), 1))
+                rows[:, part], rows[:, second] = GROWTH.second_part, effect.second_places
+                yield one, rows
+        begin += len(effect.coordinates)

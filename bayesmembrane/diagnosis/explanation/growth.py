@@ -142,7 +142,8 @@ def with_sets(out: Grown, sets: Sequence[frozenset[str]]) -> None:
 
 
 def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
-    """Effects that begin at some moment, from those at which the force falls beside a set; True if any got better.
+    """Effects that begin at some moment, or do so again, from those at which the force falls beside a set; True if any
+    got better.
 
     One is found from nearby only, and a search for a fall looks at every reading. What is best by that is grown from
     once more.
@@ -155,6 +156,7 @@ def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
                 shapes = [{**shape, effect.begins: f.on_clock}]
                 starts = starts_with([f.base.x], effect, out.search.expected_sizes(effect), shapes)
                 sought.append(Sought(with_effects(f.base.hypothesis, [effect]), starts, f.base))
+    sought += [s for f in falls if (s := _begun_again(f)) is not None]
     better = _kept(out, [c for c in out.search.fits(sought) if c is not None])
     first = max(better, key=lambda c: c.log_evidence, default=None)
     if first is not None and len(_own(out, first)) < _most(out):
@@ -162,6 +164,20 @@ def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
         rest.sort(key=lambda e: -first_order(out.search, first, e))
         _kept(out, _fitted(out, [(first, e) for e in rest[: GROWTH.refits]]))
     return bool(better)
+
+
+def _begun_again(f: Foreign) -> Sought | None:
+    """The base of a fall with a second event of one of its effects at that moment; None if none begins so, or all have
+    one.
+    """
+    names, x = list(f.base.hypothesis.names), f.base.x.copy()
+    for e in f.base.hypothesis.effects:
+        if e.second is not None and e.begins == e.second[1]:
+            part, _, place = (names.index(f"{e.name}.{own}") for own in e.second)
+            if x[part] < GROWTH.no_event:
+                x[part], x[place] = GROWTH.second_part, f.on_clock
+                return Sought(f.base.hypothesis, [x], f.base)
+    return None
 
 
 def _kept(out: Grown, fits: Sequence[Candidate]) -> list[Candidate]:
@@ -201,6 +217,8 @@ def _grow(out: Grown) -> bool:
     Growth ends where a larger set has less than `GROWTH.worth` of what the smaller ones have together.
     """
     most, any_new = _most(out), False
+    if out.case.null.names:
+        _with_events(out, 0)
     for size in range(1, most + 1):
         beam = [out.case.best_plain] if size == 1 else _beam(out, size - 1)
         bases = [c for c in beam if frozenset(c.names) not in out.followed]
@@ -222,8 +240,9 @@ def _grow(out: Grown) -> bool:
 
 
 def _with_events(out: Grown, size: int) -> None:
-    """The best sets of this size with second events of what comes at once."""
-    for c in with_second_events(out.search, out.best_of_each_set(size)[: GROWTH.polished]):
+    """The best sets of this size with second events of what comes at once; size 0: every energy with what is given."""
+    some = out.best_of_each_set(size)[: GROWTH.polished] if size else out.of_size(0)
+    for c in with_second_events(out.search, some):
         out.add(c)
 
 

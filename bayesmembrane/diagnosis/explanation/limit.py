@@ -122,7 +122,7 @@ def _beside(search: Search, base: Candidate, at: NDArray[np.bool_]) -> Candidate
 def _part(search: Search, some: NDArray[np.bool_]) -> Search:
     """The search of ``some`` (N,) of the readings."""
     m = search.measurement.select(some)
-    return Search(m, search.noise.part(m, some), search.seed, search.solve)
+    return Search(m, search.noise.part(m, some), search.seed, search.solve, search.factors.of(some))
 
 
 def _with_evidence(

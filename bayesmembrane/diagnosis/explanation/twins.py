@@ -5,7 +5,7 @@ coincide beside the plain model (`confounded`), where both make loops at any spe
 other the way, and the disc moved at one speed without a hold, or where only the way back would tell them apart, and
 there is none. Laws of a library are close to what happens, not the
 same: of two sets that differ by twins, and stand nearly as well, none is told to be more than `BELIEFS.apart` times as
-probable as the other.
+probable as the other, nor one with both twins than one of them alone.
 """
 
 from __future__ import annotations
@@ -102,14 +102,14 @@ def swapped(names: Set, pairs: Iterable[Set]) -> Iterator[tuple[str, str, Set]]:
             yield out, new, (names - {out}) | {new}
 
 
-def _beside(names: Set, pairs: Iterable[Set]) -> Iterator[tuple[Set, Set]]:
-    """(a pair of twins, the set after it) for every effect of a set whose twin is not in it: with that twin instead of
-    it, and with both.
+def _beside(names: Set, pairs: Pairs) -> Iterator[tuple[Set, Near]]:
+    """(a set, how near it must stand) for every effect of a set whose twin is not in it: with that twin instead of it,
+    and with both, which what is no more than an error of a law does not leave far behind.
     """
     for old, new, other in swapped(names, pairs):
-        pair = frozenset((old, new))
-        yield pair, other
-        yield pair, other | {old}
+        near = pairs[frozenset((old, new))]
+        yield other, near
+        yield other | {old}, Near(min(near.left, TWINS.alike), min(near.behind, TWINS.behind))
 
 
 def levelled(weights: Mapping[Set, float], stands: Mapping[Set, Stands], pairs: Pairs) -> dict[Set, float]:
@@ -124,8 +124,8 @@ def levelled(weights: Mapping[Set, float], stands: Mapping[Set, Stands], pairs: 
         best = max(
             (
                 weights[other]
-                for pair, other in _beside(names, pairs)
-                if other in weights and _near(stands[names], stands[other], pairs[pair])
+                for other, near in _beside(names, pairs)
+                if other in weights and _near(stands[names], stands[other], near)
             ),
             default=-np.inf,
         )

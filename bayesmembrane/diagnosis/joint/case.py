@@ -59,12 +59,16 @@ class JointCase(DiagnosisCase):
         return replace(search, parts=tuple(parts), noise=joint_noise([p.noise for p in parts]))
 
     def twins(self) -> Pairs:
-        """Those that no test tells apart, and no two of another speed: of the material in all, of a rig in that one."""
+        """Those that no test tells apart, and no two of another speed: of the material in all, of a rig in that one.
+
+        Of twins of which one is of the material and the other of a rig, in the tests that both are at work in.
+        """
         out: dict[frozenset[str], Near] = dict(twins(self.effects, self.signatures))
+        names = {u.name: u for u in self.effects if isinstance(u, EffectInTests)}
         in_time = [twins_in_time(c.effects, c.measurement) for c in self.alone]
         one_way = [twins_one_way(c.effects, c.measurement) for c in self.alone]
-        names = {u.name: u for u in self.effects if isinstance(u, EffectInTests)}
-        for each, any_speed in ((in_time, False), (one_way, True)):
+        by_nature = [twins(c.effects, ()) for c in self.alone]
+        for each, any_speed in ((in_time, False), (one_way, True), (by_nature, True)):
             for i, pairs in enumerate(each):
                 for pair, near in pairs.items():
                     own = [n for n in names if n.partition(AT)[0] in pair and names[n].within(i) is not None]
@@ -170,7 +174,7 @@ def _starts(search: JointSearch, claim: Hypothesis, alone: Sequence[Candidate]) 
     """The energy as each test alone has it, with the effects as each has its own; then draws of the prior."""
     n, out = claim.material_size, []
     for i, own in enumerate(alone):
-        x = np.concatenate([own.x[:n], *(u.typical for u in claim.effects)])
+        x = np.concatenate([own.x[:n], *([p.first for p in u.coordinates] for u in claim.effects)])
         x[0] -= np.log(search.thicker[i])
         for j, there in sorted(enumerate(alone), key=lambda other: other[0] == i):  # constants are those of this test
             x[search.places(claim, j)[n:]] = there.x[n:]

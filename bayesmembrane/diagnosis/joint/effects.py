@@ -43,16 +43,14 @@ class EffectInTests(Effect):
     @property
     def starts(self) -> list[dict[str, float]]:
         """Those of its first part, in all."""
-        return self._in_all(self.parts[0][1].starts)
+        first = self.parts[0][1].starts
+        several = len(self.parts) > 1 and not self.constant
+        return [{(f"{t}.{k}" if several else k): v for t, _ in self.parts for k, v in start.items()} for start in first]
 
     @property
-    def second_starts(self) -> list[dict[str, float]]:
-        """Those of its first part, in all."""
-        return self._in_all(self.parts[0][1].second_starts)
-
-    def _in_all(self, starts: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
-        several = len(self.parts) > 1 and not self.constant
-        return [{(f"{t}.{k}" if several else k): v for t, _ in self.parts for k, v in s.items()} for s in starts]
+    def second_places(self) -> list[float]:
+        """Those of its first part: what comes in events is of the rig, and in one test."""
+        return self.parts[0][1].second_places
 
     def within(self, test: int) -> Effect | None:
         """The effect in one test; None if it is not at work there."""
@@ -78,6 +76,7 @@ def in_tests(name: str, parts: Sequence[tuple[int, Effect]], one_clock: bool = T
             "signature": first.signature,
             "coordinates": coordinates,
             "exact": first.exact,
+            "second": first.second if len(parts) == 1 else None,
             "odds": first.odds,
             "remembers": first.remembers,
             "of_the_material": first.of_the_material,

@@ -6,7 +6,7 @@ import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
-from bayesmembrane.diagnosis.thresholds import VERDICT
+from bayesmembrane.diagnosis.thresholds import GROWTH, VERDICT
 from bayesmembrane.physics.effects.base import Effect
 
 
@@ -20,6 +20,19 @@ def at_a_turn(candidate: Candidate, measurement: Measurement) -> Effect | None:
     near = VERDICT.at_a_turn * float(np.ptp(path.clock))
     for e in effects:
         others = any(o.remembers for o in effects if o is not e)
-        if e.begins and others and np.any(np.abs(candidate.parameters[f"{e.name}.{e.begins}"] - turns) < near):
+        if others and any(np.any(np.abs(moment - turns) < near) for moment in _moments(e, candidate)):
             return e
     return None
+
+
+def _moments(effect: Effect, candidate: Candidate) -> list[float]:
+    """When it comes, s, as far as that is a good part of it; nothing where it comes with the way."""
+    p = {
+        name: candidate.parameters[f"{effect.name}.{name}"] for name in (effect.begins, *(effect.second or ())) if name
+    }
+    if not effect.begins:
+        return []
+    if effect.second is None:
+        return [p[effect.begins]]
+    part, first, then = (p[name] for name in effect.second)
+    return [t for t, much in ((first, 1 - part), (then, part)) if much > GROWTH.no_event]

@@ -44,8 +44,10 @@ class EffectParameter(Parameter):
         """The same where a test goes so far: what is a part of that grows with it."""
         factor = reach.times_as_long if self.of_the_test else reach.times(self.unit)
         low, high = self.bounds
-        null = None if self.null is None else factor * self.null
-        return replace(self, prior=self.prior.times(factor), bounds=(factor * low, factor * high), null=null)
+        null, begin = (None if v is None else factor * v for v in (self.null, self.begin))
+        return replace(
+            self, prior=self.prior.times(factor), bounds=(factor * low, factor * high), null=null, begin=begin
+        )
 
     @property
     def one_sided(self) -> bool:
@@ -107,6 +109,8 @@ class Effect(ABC):
     twins_at_any_speed : names of effects that only the shape of its law tells from this one, whatever the motion
     twins_one_way : names of effects that only the way back tells from this one
     begins : the coordinate that says when it comes, in s since the start; "" where it comes with the way
+    second : (part, place, second place), the coordinates that say what part of what comes at once comes in a second
+        event, and where the two are; None where there is only one
     sudden : True if it may come at any moment, which no test tells from a fall of the force that no effect describes
     odds : how often it is met beside the others, before anything is measured
     rank : orders effects within a stage; equal ranks go by name
@@ -136,6 +140,7 @@ class Effect(ABC):
     twins_one_way: ClassVar[tuple[str, ...]] = ()
     sudden: ClassVar[bool] = False
     begins: ClassVar[str] = ""
+    second: ClassVar[tuple[str, str, str] | None] = None
     odds: ClassVar[float] = 1.0
     rank: ClassVar[int] = 0
     stage: ClassVar[str]
@@ -151,8 +156,8 @@ class Effect(ABC):
 
     @property
     def null(self) -> Array:
-        """(k,) parameters at which it vanishes, shapes at their prior medians."""
-        return np.array([p.typical if p.null is None else p.null for p in self.coordinates])
+        """(k,) parameters at which it vanishes, shapes where searches begin."""
+        return np.array([p.first if p.null is None else p.null for p in self.coordinates])
 
     @property
     def typical(self) -> Array:
@@ -175,8 +180,8 @@ class Effect(ABC):
         return []
 
     @property
-    def second_starts(self) -> list[dict[str, float]]:
-        """Shapes by name of a second event, of which searches begin without: one is found from nearby only."""
+    def second_places(self) -> list[float]:
+        """Where a second event is looked for, of which searches begin without: one is found from nearby only."""
         return []
 
     @classmethod

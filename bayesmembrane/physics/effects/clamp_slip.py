@@ -20,7 +20,8 @@ WIDTH = EffectParameter(
 )
 JUMPS = tuple({"jump": 0.6, "place": place} for place in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9))
 """Shapes to begin a search with: a jump is found from nearby only."""
-SECONDS = tuple({"second": 0.3, "second_place": place} for place in np.linspace(0.1, 1.0, 19).tolist())
+SECONDS = tuple(np.linspace(0.1, 1.0, 19).tolist())
+"""Of the full range, where a second one is looked for."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class ClampSlip(Slack):
         "below loading, reloading on the unloading curve, and no return to the first curve."
     )
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("permanent_set",)  # both are a film that has become longer
+    second: ClassVar[tuple[str, str, str] | None] = ("second", "place", "second_place")
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "slip", "-", "length slid out on a first loading, over the free length", HalfNormal(0.02), (0.0, 0.5), 0.0
@@ -63,7 +65,7 @@ class ClampSlip(Slack):
         return [{"jump": 0.05, "place": 0.5}, *JUMPS]
 
     @property
-    def second_starts(self) -> list[dict[str, float]]:
+    def second_places(self) -> list[float]:
         return list(SECONDS)
 
     def excess(self, p: Array, deflection: Array, path: Motion) -> Array:

@@ -42,6 +42,7 @@ class Tearing(Carried):
     twins_one_way: ClassVar[tuple[str, ...]] = ("clamp_slip",)  # both are a force that falls; what slid is slack later
     sudden: ClassVar[bool] = True
     begins: ClassVar[str] = "moment"
+    second: ClassVar[tuple[str, str, str] | None] = ("second", "moment", "second_moment")
     scales_with_modulus: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
@@ -71,9 +72,9 @@ class Tearing(Carried):
         return [{"jump": 0.05}, *({"jump": 0.6, "moment": part * whole, "takes": 0.03 * whole} for part in PLACES)]
 
     @property
-    def second_starts(self) -> list[dict[str, float]]:
+    def second_places(self) -> list[float]:
         whole = next(c.bounds[1] for c in self.coordinates if c.name == "moment")
-        return [{"second": 0.3, "second_moment": part * whole} for part in SECOND_PLACES]
+        return [part * whole for part in SECOND_PLACES]
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         slow = growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path, p[:, 3:4], p[:, 7:8])

@@ -39,7 +39,7 @@ TINY = 1e-12
 class Form(Noise):
     """Sigma = Sigma_given + tau^2 I + (eta_a^2 + m^2) D_F K_u D_F + sum_e eta_e^2 D_te K_v D_te + (eta_l F_max)^2 P.
 
-    One eta_e for all e; P has ones where the test starts, turns or goes slack.
+    One eta_e for all e; P has ones where the test starts, turns, stops or goes slack.
 
     laws : whether there are effects whose law may be off; without, eta_e is not inferred
     """
@@ -202,7 +202,7 @@ class FormLikelihood(NoiseLikelihood):
         return (z if self.axes is None else z @ self.axes.T) + self._unsteady(x, rng)
 
     def _unsteady(self, x: Array, rng: np.random.Generator) -> Array:
-        """(B, N) N: a draw of the error where the test starts, turns or goes slack."""
+        """(B, N) N: a draw of the error where the test starts, turns, stops or goes slack."""
         z: Array = rng.standard_normal((len(x), self.own.size)) * self.spots
         return z * self._sizes(x).local[:, None]
 

@@ -8,6 +8,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.candidates.weighing import starts_with
 from bayesmembrane.diagnosis.explanation.events import with_second_events
+from bayesmembrane.diagnosis.thresholds import GROWTH
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.diagnosis.curves import triangle, white_noise
@@ -61,8 +62,34 @@ def test_what_came_in_two_steps_is_found_in_both(effect: str, place: str) -> Non
 @pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
 def test_what_came_at_once_has_no_second_event(effect: str) -> None:
     search, once = fitted(strip(effect, (0.6, 0.06)), effect)
-    again = with_second_events(search, [once])
-    assert all(c.log_evidence < once.log_evidence + 3 for c in again)
+    share = once.hypothesis.names.index(f"{effect}.second")
+    assert once.x[share] < GROWTH.no_event
+    for c in with_second_events(search, [once]):
+        assert c.x[share] < 5 * GROWTH.no_event
+        assert c.log_evidence < once.log_evidence + 3
+
+
+@pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
+def test_all_of_it_in_the_second_event_is_one_event(effect: str) -> None:
+    search, found = fitted(strip(effect, (0.45, 0.03), (0.8, 0.05)), effect)
+    x, names = found.x.copy(), found.hypothesis.names
+    part, place, _ = (names.index(f"{effect}.{own}") for own in found.hypothesis.effects[0].second)
+    x[[part, place]] = 1.0, 0.3 * x[place]
+    one = search.at(found.hypothesis, x)
+    assert one is not None
+    (twice,) = with_second_events(search, [one])
+    assert GROWTH.no_event < twice.x[part] < 1 - GROWTH.no_event
+    assert twice.log_evidence > one.log_evidence + 50
+
+
+@pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
+def test_a_second_event_of_what_is_given_is_found_too(effect: str) -> None:
+    """As well as of the same effect where that is looked for."""
+    search, sought = fitted(strip(effect, (0.45, 0.03), (0.8, 0.05)), effect)
+    h = sought.hypothesis
+    given = search.polished(search.fit(h, search.material_starts(h)))
+    best = max([given, *with_second_events(search, [given])], key=lambda c: c.log_evidence)
+    assert best.log_evidence > sought.log_evidence - 10
 
 
 def test_an_effect_without_events_is_left_as_it_is() -> None:

@@ -170,16 +170,22 @@ def test_a_tear_is_looked_for_where_the_force_is_seen_to_fall(
     )
     grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
     grown.add(base)
-    grown.add(replace(candidate(torn, -7.0), by_draws=5.0))  # -12 by its linear model
+    once = candidate(torn, -7.0)
+    once.x[torn.names.index("tearing.second")] = 0.0
+    grown.add(replace(once, by_draws=5.0))  # -12 by its linear model
     falls = [
         Foreign(SUDDEN, base, 30.0, size=-0.03, on_clock=0.7),
         Foreign(SUDDEN, grown.best, 3.0, size=-0.01, on_clock=0.2),
         Foreign(SUDDEN, candidate(claim("mullins", "friction", "rate"), -9.0), 30.0, size=-0.03, on_clock=0.5),
     ]
     assert with_falls(grown, falls) is better
-    assert [[e.name for e in s.hypothesis.effects] for s in asked] == [["mullins", "tearing"]]
-    place = base.x.size + [c.name for c in tear.coordinates].index("moment")
+    assert [[e.name for e in s.hypothesis.effects] for s in asked] == 2 * [["mullins", "tearing"]]
+    own = [c.name for c in tear.coordinates]
+    place, part, again = (base.x.size + own.index(n) for n in ("moment", "second", "second_moment"))
     assert {float(start[place]) for start in asked[0].starts} == {0.7}
+    assert {float(start[part]) for start in asked[0].starts} == {0.0}
+    (start,) = asked[1].starts  # where it falls beside a tear, that may run once more
+    assert (start[part], start[again]) == (GROWTH.second_part, 0.2)
     assert grown.found["gent", MULLINS | {"tearing"}].log_evidence == (end if better else -7.0)
     assert [e.name for _, e in grew] == (["friction"] if better else [])
 

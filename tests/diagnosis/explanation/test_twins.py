@@ -41,6 +41,15 @@ def test_a_twin_beside_its_twin_may_be_an_error_of_its_law(left: float, told: fl
     assert odds({A: 0.0, both: -60.0}, {A: 0.0, both: 0.0})[both] == -60.0  # and not the other way about
 
 
+@pytest.mark.parametrize(("behind", "told"), [(11.0, 0.0 - np.log(BELIEFS.apart)), (13.0, -60.0)])
+def test_an_error_of_a_law_is_never_far_behind(behind: float, told: float) -> None:
+    """Not even where twins stand alike however far they are behind each other."""
+    pairs, both = {A | B: Near(0.25)}, A | B
+    stands = {A: Stands(0.02, -100.0 - behind), both: Stands(0.0, -100.0)}
+    weights = {A: -60.0, both: 0.0}
+    assert weights[A] + levelled(weights, stands, pairs)[A] == pytest.approx(told)
+
+
 def test_a_twin_that_leaves_much_more_is_told_apart() -> None:
     found = odds({A: 0.0, B: -60.0}, {A: 0.01, B: 0.07})
     assert found[B] == -60.0

@@ -60,6 +60,7 @@ def test_parameters_are_declared(effect: Effect) -> None:
         assert np.isfinite([low, high, p.scale, p.typical]).all()
         assert p.scale > 0
         assert low <= p.typical <= high
+        assert low <= p.first <= high
         assert p.meaning
         assert p.unit
         # The search covers what is believed in.
@@ -146,6 +147,8 @@ def test_slopes_are_those_of_the_force(effect: Effect, curve: Measurement) -> No
     """Against central differences over a larger step, and on the admissible side of each bound."""
     h = hypothesis("yeoh", [effect.name])
     f, x = Forward(h, curve, curve.deflection), vector(h)
+    if effect.second is not None:  # two events at one place are one
+        x[h.names.index(f"{effect.name}.{effect.second[2]}")] *= 0.6
     found = f(x, sensitivities=True)
     assert found.sensitivity is not None
     assert found.force == pytest.approx(f(x).force, rel=1e-12)
@@ -155,7 +158,7 @@ def test_slopes_are_those_of_the_force(effect: Effect, curve: Measurement) -> No
         numeric = (f(x + step).force - f(x - step).force) / (2 * step[i])
         apart = np.abs(numeric - found.sensitivity[:, :, i])
         # Where the film becomes slack the slope jumps: a few points may lie across.
-        assert np.quantile(apart, 0.97) <= 2e-3 * np.max(np.abs(numeric)), p.name
+        assert np.quantile(apart, 0.97) < 2e-3 * np.max(np.abs(numeric)), p.name
     null = vector(h, "null")
     for p, slope in zip(
         effect.coordinates, np.moveaxis(f(null, sensitivities=True).sensitivity[0], 1, 0)[3:], strict=True
