@@ -82,6 +82,12 @@ class Search(Weighing):
     def forms(self, force: Array, effects: Sequence[Effect], traces: Array) -> list[tuple[Parameter | None, Array]]:
         return form_columns(self.factors, force, effects, traces)
 
+    def event_steps(self, hypothesis: Hypothesis) -> dict[int, float]:
+        path, n = self.measurement.path, hypothesis.material_size
+        step = {"way": path.stride / path.full_range, "clock": path.tick}
+        own = [p for e in hypothesis.effects for p in e.coordinates]
+        return {n + i: step[p.event] for i, p in enumerate(own) if p.event}
+
     def axes(self, hypothesis: Hypothesis) -> Standard:
         return standard(hypothesis, self.measurement)
 

@@ -86,6 +86,10 @@ class Weighing(ABC):
         """What a form error could look like, `form_columns`."""
 
     @abstractmethod
+    def event_steps(self, hypothesis: Hypothesis) -> dict[int, float]:
+        """{number of a coordinate that says where or when something sudden comes: from one reading to the next}."""
+
+    @abstractmethod
     def axes(self, hypothesis: Hypothesis) -> Standard:
         """The coordinates that are stepped in."""
 
@@ -333,7 +337,33 @@ class Weighing(ABC):
         nothing, out = np.zeros(self.force.size), []
         for (h, axes, u), v, (r, j), trace in zip(points, x, found, traces, strict=True):
             slopes, bounds = np.where(np.isfinite(j[0]), j[0], 0.0), _at_bound(h, axes, u)
+            slopes = self._over_readings(h, v, r[0], slopes)
             out.append(Candidate(h, v, -r[0], slopes, -np.inf, bounds, trace, np.empty(0), nothing))
+        return out
+
+    def _over_readings(self, hypothesis: Hypothesis, x: Array, r: Array, slopes: Array) -> Array:
+        """Slopes (N, k) at x (k,) with the residual r (N,), by where something sudden comes from reading to reading.
+
+        Between two readings it leaves no trace: by infinitely small steps it would seem that it may have come anywhere,
+        which costs nothing. So a film that relaxes was named as one that slips, with 98 % (47 % by these). Searches go
+        by infinitely small ones, for those lead to the best place. Of the two sides that one counts along which the
+        residual lies least: that a single reading would be better met is no gain that goes on.
+        """
+        steps = self.event_steps(hypothesis)
+        if not steps:
+            return slopes
+        signed = np.array([(i, side * step) for i, step in steps.items() for side in (1, -1)])
+        rows = np.tile(x, (len(signed), 1))
+        rows[np.arange(len(rows)), signed[:, 0].astype(int)] += signed[:, 1]
+        changes, out = self.misfits(hypothesis, rows) - r, slopes.copy()
+        white = self.noise.white(np.column_stack([r, *changes]))
+        sizes = np.linalg.norm(white[:, 1:], axis=0)
+        along = np.abs(white[:, 0] @ white[:, 1:]) / np.maximum(sizes, TINY)
+        for k, (i, low, high) in enumerate((i, *hypothesis.parameters[i].bounds) for i in steps):
+            both = [j for j in (2 * k, 2 * k + 1) if low <= rows[j, i] <= high and 0 < sizes[j] < np.inf]
+            if both:
+                side = min(both, key=lambda j: float(along[j]))
+                out[:, i] = changes[side] / signed[side, 1]
         return out
 
     def _weighed(self, found: Candidate, axes: Standard, u: Array) -> Candidate:

@@ -181,6 +181,13 @@ class JointSearch(Weighing):
             *([(LOCAL, self._diagonal(local))] if local else []),
         ]
 
+    def event_steps(self, hypothesis: Hypothesis) -> dict[int, float]:
+        out: dict[int, float] = {}
+        for i, part in enumerate(self.parts):
+            places = self.places(hypothesis, i)
+            out |= {int(places[k]): step for k, step in part.event_steps(self.of(hypothesis, i)).items()}
+        return out
+
     def axes(self, hypothesis: Hypothesis) -> Standard:
         out: dict[int, Size | Shape] = {}
         for i in reversed(range(len(self.parts))):  # the energy's are those of the first test

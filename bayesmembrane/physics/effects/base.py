@@ -34,11 +34,13 @@ class EffectParameter(Parameter):
     null : the value at which the effect vanishes, exactly; None for a shape, which means nothing once it has vanished
     of_the_test : True of a time that is a part of the test's duration, and no time of the film or the rig
     begin : where searches begin, if not at the `typical` value
+    event : "way" of where, in parts of the full range, and "clock" of when, in s, something comes that may be sudden
     """
 
     null: float | None = None
     of_the_test: bool = False
     begin: float | None = None
+    event: str = ""
 
     def on(self, reach: Reach) -> Self:
         """The same where a test goes so far: what is a part of that grows with it."""

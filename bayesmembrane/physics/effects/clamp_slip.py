@@ -13,7 +13,7 @@ from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Unifor
 from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, SECOND, growth
 from bayesmembrane.physics.effects.base import EffectParameter, Slack, running_max
 
-PLACE = EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1))
+PLACE = EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1), event="way")
 SECOND_PLACE = replace(PLACE, name="second_place", meaning="where the second event comes, over the full range")
 WIDTH = EffectParameter(
     "width", "-", "how long it slides at once, over the full range", LogNormal(0.005, 1.2), (1e-4, 0.3), begin=0.015

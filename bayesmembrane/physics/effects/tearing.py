@@ -15,7 +15,13 @@ from bayesmembrane.physics.reach import SOURCE
 PLACES = (0.15, 0.27, 0.39, 0.51, 0.63, 0.75, 0.87)
 """Of the duration: moments to begin a search with, for one is found from nearby only."""
 MOMENT = EffectParameter(
-    "moment", "s", "when a tear runs", Uniform(0.0, SOURCE.duration), (0.0, SOURCE.duration), of_the_test=True
+    "moment",
+    "s",
+    "when a tear runs",
+    Uniform(0.0, SOURCE.duration),
+    (0.0, SOURCE.duration),
+    of_the_test=True,
+    event="clock",
 )
 SECOND_PLACES = tuple(np.linspace(0.02, 0.98, 33).tolist())
 """Of the duration: moments at which a second one may run."""

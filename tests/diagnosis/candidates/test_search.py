@@ -117,7 +117,9 @@ def test_evidence_equals_importance_sampling(cyclic, name) -> None:
     weights = np.full(4000, -np.inf)
     weights[kept] = log_likelihood + log_prior - law.logpdf(draws[kept])
     drawn = logsumexp(weights) - np.log(4000) + prior_of_sizes
-    assert linear == pytest.approx(drawn, abs=0.8)
+    # Of what is sudden few draws count: places that are a reading apart are no line.
+    sudden = bool(search.event_steps(found.hypothesis))
+    assert linear == pytest.approx(drawn, abs=1.5 if sudden else 0.8)
 
     # What the diagnosis draws itself, of fewer draws, adapted: within five standard errors of both.
     own = sampled(search, found, np.random.default_rng(9))

@@ -95,3 +95,22 @@ def test_a_second_event_of_what_is_given_is_found_too(effect: str) -> None:
 def test_an_effect_without_events_is_left_as_it_is() -> None:
     search, once = fitted(strip("tearing", (0.6, 0.06)), "zero_offset")
     assert with_second_events(search, [once]) == []
+
+
+@pytest.mark.parametrize(
+    ("effect", "place", "sharp"), [("clamp_slip", "place", "width"), ("tearing", "moment", "takes")]
+)
+def test_wherever_between_two_readings_it_came_its_place_is_known(effect: str, place: str, sharp: str) -> None:
+    """By infinitely small steps it would not be: then ln Z hung on where between them a search ended."""
+    search, found = fitted(strip(effect, (0.6, 0.06)), effect)
+    names, step = found.hypothesis.names, search.event_steps(found.hypothesis)
+    at = names.index(f"{effect}.{place}")
+    (low, high), told = found.hypothesis.parameters[at].bounds, []
+    for part in np.linspace(0.0, 1.0, 5):
+        x = found.x.copy()
+        x[names.index(f"{effect}.{sharp}")] = found.hypothesis.parameters[names.index(f"{effect}.{sharp}")].bounds[0]
+        x[at] += part * step[at]
+        c = search.at(found.hypothesis, x)
+        assert c is not None
+        told.append(float(np.sqrt(search.covariance(c)[at, at])))
+    assert max(told) < 0.1 * (high - low)
