@@ -210,10 +210,10 @@ def test_what_is_at_a_bound_is_asked_of_the_fit_and_not_of_the_energy_inside(fil
 @pytest.mark.parametrize("all_of_them", [False, True])
 def test_what_the_starts_cost_is_bounded_however_many_effects_there_are(monkeypatch, all_of_them: bool) -> None:  # type: ignore[no-untyped-def]
     """Each step from a start is worth a curve for each coordinate."""
-    up = np.linspace(0.002, 0.06, 30)
+    up = np.linspace(0.002, 0.06, 40)
     d = np.concatenate([up, up[::-1]])
     rig = Annulus(0.01, 0.035)
-    curve = Measurement(d, d * (1 + 50 * d), rig, Specimen("many", 50e-6), time=np.linspace(0, 59, 60))
+    curve = Measurement(d, d * (1 + 50 * d), rig, Specimen("many", 50e-6), time=np.linspace(0, 79, 80))
     occur = [n for n, e in components("effects").items() if e().unavailable(rig, curve.path) == ""]
     effects = tuple(occur) if all_of_them else ("force_offset",)
     looked_at: list[int] = []
