@@ -21,7 +21,6 @@ standard deviations (two extremes of 200 000 readings lie nine apart), but by no
 HELD, STILL = 12, 0.1
 """Readings of a hold, at least, and the part of the speed before it at which the disc counts as standing still."""
 MOST_HELD = 4000
-MOST_TOLD = 700  # points of a test that anything is told from: longer files are thinned
 """In a longer record holds are looked for in means of neighbours, half as many as this."""
 CONTRADICTED = 0.1
 """Of all readings: where legs turn, as many may be counted to the other one."""
@@ -92,16 +91,6 @@ class Motion:
         if self.time.size > 1 and self.steps[1] > 0:
             start = self.steps[0] * (self.time[1] - self.time[0]) / self.steps[1]
         return np.asarray(self.time - self.time[0] + min(start, float(self.time[-1] - self.time[0])))
-
-    @cached_property
-    def tick(self) -> float:
-        """s: time from one point to the next, as a rule; no less than the whole over `MOST_TOLD`."""
-        return _usual(np.diff(self.clock), float(np.ptp(self.clock)))
-
-    @cached_property
-    def stride(self) -> float:
-        """m: way from one moving point to the next, as a rule; no less than the full range over `MOST_TOLD`."""
-        return _usual(self.steps[1:], self.full_range)
 
     @cached_property
     def pace(self) -> float:
@@ -196,12 +185,6 @@ def _leaves(deflection: Array, start: int, tolerance: float) -> int:
             return low + int(away[0])
         low, step = low + step, 2 * step
     return int(deflection.size)
-
-
-def _usual(steps: Array, whole: float) -> float:
-    """The median of those ``steps`` that are none, no less than the ``whole`` over `MOST_TOLD`."""
-    there = steps[steps > 0]
-    return max(float(np.median(there)) if there.size else 0.0, whole / MOST_TOLD)
 
 
 def holds(deflection: Array) -> list[NDArray[np.intp]]:

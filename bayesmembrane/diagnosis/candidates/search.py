@@ -83,8 +83,8 @@ class Search(Weighing):
         return form_columns(self.factors, force, effects, traces)
 
     def event_steps(self, hypothesis: Hypothesis) -> dict[int, float]:
-        path, n = self.measurement.path, hypothesis.material_size
-        step = {"way": path.stride / path.full_range, "clock": path.tick}
+        m, n = self.measurement, hypothesis.material_size
+        step = {"way": _usual(np.diff(m.deflection)) / m.full_range, "clock": _usual(np.diff(m.path.clock[m.on_path]))}
         own = [p for e in hypothesis.effects for p in e.coordinates]
         return {n + i: step[p.event] for i, p in enumerate(own) if p.event}
 
@@ -131,3 +131,9 @@ class Search(Weighing):
                 RememberingObjective(Objective(hypothesis, self.measurement, "euclidean", self.quick)),
             ),
         )[1]
+
+
+def _usual(steps: Array) -> float:
+    """The median size of the ``steps`` between readings that lead anywhere; 0 where none does."""
+    there = np.abs(steps[steps != 0])
+    return float(np.median(there)) if there.size else 0.0

@@ -20,7 +20,7 @@ WIDTH = EffectParameter(
 )
 JUMPS = tuple({"jump": 0.6, "place": place} for place in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9))
 """Shapes to begin a search with: a jump is found from nearby only."""
-SECONDS = tuple(np.linspace(0.1, 1.0, 19).tolist())
+SECOND_PLACES = tuple(np.linspace(0.1, 1.0, 19).tolist())
 """Of the full range, where a second one is looked for."""
 
 
@@ -66,7 +66,7 @@ class ClampSlip(Slack):
 
     @property
     def second_places(self) -> list[float]:
-        return list(SECONDS)
+        return list(SECOND_PLACES)
 
     def excess(self, p: Array, deflection: Array, path: Motion) -> Array:
         slow = growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4], p[:, 6:7])

@@ -74,13 +74,17 @@ class Tearing(Carried):
 
     @property
     def starts(self) -> list[dict[str, float]]:
-        whole = next(c.bounds[1] for c in self.coordinates if c.name == "moment")
+        whole = self._whole
         return [{"jump": 0.05}, *({"jump": 0.6, "moment": part * whole, "takes": 0.03 * whole} for part in PLACES)]
 
     @property
     def second_places(self) -> list[float]:
-        whole = next(c.bounds[1] for c in self.coordinates if c.name == "moment")
-        return [part * whole for part in SECOND_PLACES]
+        return [part * self._whole for part in SECOND_PLACES]
+
+    @property
+    def _whole(self) -> float:
+        """s: how long the test takes."""
+        return next(c.bounds[1] for c in self.coordinates if c.name == "moment")
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         slow = growth(p[:, 1:2], p[:, 2:3], state.deflection, state.path, p[:, 3:4], p[:, 7:8])

@@ -114,3 +114,11 @@ def test_wherever_between_two_readings_it_came_its_place_is_known(effect: str, p
         assert c is not None
         told.append(float(np.sqrt(search.covariance(c)[at, at])))
     assert max(told) < 0.1 * (high - low)
+
+
+def test_readings_of_a_thinned_file_are_farther_apart_than_its_path() -> None:
+    m = strip("tearing", (0.6, 0.06))
+    h = hypothesis("neo_hookean", effects=["tearing"]).on(m)
+    at = h.names.index("tearing.moment")
+    every, few = (Search(part, white_noise(part)).event_steps(h)[at] for part in (m, m.select(np.arange(0, POINTS, 3))))
+    assert (every, few) == (pytest.approx(1.0), pytest.approx(3.0))

@@ -1,11 +1,16 @@
 """Effects that a test cannot tell apart: which they are, and that no shape of a law chooses between them."""
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.twins import Near, Stands, levelled, one_speed, swapped, twins, twins_one_way
+from bayesmembrane.diagnosis.joint.case import JointCase
+from bayesmembrane.diagnosis.joint.effects import effects_in_tests
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -131,3 +136,16 @@ def test_what_only_the_way_back_tells_apart_are_twins_where_there_is_none(way: n
     found = set(twins_one_way(effects, curve(way, None)))
     assert found == ({frozenset(("tearing", "clamp_slip"))} if way is UP else set())
     assert not twins_one_way(effects[:1], curve(way, None))  # the other one cannot be at work
+
+
+def test_twins_by_nature_are_twins_in_joint_answers_where_both_are_at_work() -> None:
+    """Of the material in all tests and of a rig in one: with the tests' names."""
+    known = components("effects")
+    each = [{n: known[n]() for n in own} for own in (("friction", "hysteresis", "mullins", "tearing"),) * 2]
+    alone = [SimpleNamespace(effects=tuple(own.values()), measurement=curve(LEG, None)) for own in each]
+    every = effects_in_tests(each, ("a", "b"))
+    case = SimpleNamespace(effects=every, signatures=(), alone=alone)
+    found = {tuple(sorted(pair)) for pair in JointCase.twins(cast(JointCase, case))}
+    rig = {u.name for u in every if "@" in u.name}
+    assert {("friction@a", "hysteresis"), ("friction@b", "hysteresis")} <= found
+    assert {p for p in found if p[0] in rig and p[1] in rig and p[0][-1] != p[1][-1]} == set()
