@@ -47,13 +47,16 @@ class FewPosterior(Posterior):
         if np.any(ok):
             curves[ok] = found.force[ok] @ self._factor[:, :-1].T
             with np.errstate(over="ignore", invalid="ignore"):
-                value = self._told.log_likelihood(curves[ok], x[ok])
+                value = self._told.likelihood_given(curves[ok], x[ok])
             log_likelihood[ok] = np.where(np.isnan(value), -np.inf, value)
         log_prior = np.where(inside, self.prior.log_density(x), -np.inf)
         return Evaluation(log_prior, log_likelihood, outcome_of(found.status, inside), curves)
 
     def given(self, curves: Array, x: Array) -> Array:
         return self._told.given(curves, x)
+
+    def likelihood_given(self, curves: Array, x: Array) -> Array:
+        return self._told.likelihood_given(curves, x)
 
     def along(self, axes: Array) -> Along:
         """`given` for curves in the span of orthonormal ``axes`` (R, n + 1) of coordinates."""

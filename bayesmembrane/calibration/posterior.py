@@ -95,6 +95,13 @@ class Evaluates(Protocol):
         """Prior, likelihood, force and outcome of x (B, k), from one batched solution."""
 
 
+class Given(Protocol):
+    """A posterior that is told the curves."""
+
+    def given(self, curves: Array, x: Array, /) -> Array:
+        """(B,) ln prior + ln likelihood of x (B, k) if theirs were ``curves`` (B, N), as an `Evaluation` has them."""
+
+
 @runtime_checkable
 class Marginalised(Evaluates, Protocol):
     """A posterior of some of the coordinates of another: the rest is integrated out."""
@@ -181,6 +188,11 @@ class Posterior:
         return len(self.hypothesis.parameters)
 
     @property
+    def curve_size(self) -> int:
+        """How many of them shape the curve; those of the noise come last."""
+        return self.hypothesis.curve_size
+
+    @property
     def readings(self) -> int:
         """N"""
         return len(self.measurement)
@@ -238,9 +250,13 @@ class Posterior:
 
     def given(self, curves: Array, x: Array) -> Array:
         """(B,) ln p0(x) + ln p(y | x) if x (B, k) had the ``curves`` of an `Evaluation`: what an emulator asks."""
+        return self.prior.log_density(x) + self.likelihood_given(curves, x)
+
+    def likelihood_given(self, curves: Array, x: Array) -> Array:
+        """ln p(y | x), (B,), of the same: of x nothing but the coordinates of the noise is looked at."""
         n = len(self.measurement)
         traces = curves[:, n:].reshape(len(curves), -1, n) if self.noise.traced else None
-        return self.prior.log_density(x) + self._likelihood(curves[:, :n], traces, x)
+        return self._likelihood(curves[:, :n], traces, x)
 
     def along(self, axes: Array) -> Along | None:
         """`given` for curves in the span of orthonormal ``axes`` (R, N), which hold the measured one, too.
@@ -275,12 +291,17 @@ class Along:
     force: Array
     noise: NoiseLikelihood
 
+    @property
+    def curve_size(self) -> int:
+        """As `Posterior.curve_size`."""
+        return self.posterior.curve_size
+
     def given(self, curves: Array, x: Array) -> Array:
         """As `Posterior.given` of the curves with the coordinates ``curves`` (B, R)."""
-        return self.posterior.prior.log_density(x) + self.log_likelihood(curves, x)
+        return self.posterior.prior.log_density(x) + self.likelihood_given(curves, x)
 
-    def log_likelihood(self, curves: Array, x: Array) -> Array:
-        """ln p(y | x), (B,), of the same."""
+    def likelihood_given(self, curves: Array, x: Array) -> Array:
+        """ln p(y | x), (B,), of the same, as `Posterior.likelihood_given`."""
         return self.noise.log_likelihood(self.force - curves, self.posterior.hypothesis.noise_coordinates(x))
 
 

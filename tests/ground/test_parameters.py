@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.special import ndtri
 
 from bayesmembrane.ground.parameters import HalfNormal, LogNormal, Lomax, Normal, Prior, Uniform
 
@@ -46,3 +47,20 @@ def test_a_multiple_has_the_multiple_of_every_quantile(prior: Prior) -> None:
     x = prior.quantile(u)
     assert prior.times(30.0).log_density(30.0 * x) == pytest.approx(prior.log_density(x) - np.log(30.0), rel=1e-9)
     assert prior.times(1.0) == prior
+
+
+@pytest.mark.parametrize("prior", PRIORS, ids=str)
+def test_scores_are_normal(prior: Prior) -> None:
+    """And are told back, also far out where probabilities have no digits on one side."""
+    u = np.linspace(0.01, 0.99, 99)
+    assert prior.scores(prior.quantile(u)) == pytest.approx(ndtri(u), abs=1e-9)
+    low, high = prior.TOLD
+    z = np.linspace(max(low, -7.0), min(high, 30.0), 80)
+    if isinstance(prior, HalfNormal) and prior.origin:
+        z = z[z > -5.0]  # a double does not tell sizes apart that are 1 and next to nothing
+    assert prior.from_scores(0.0) == pytest.approx(prior.quantile(0.5))
+    assert prior.scores(prior.from_scores(z)) == pytest.approx(
+        z, rel=1e-6, abs=0.02 if prior.support[1] < np.inf else 1e-4
+    )
+    x = prior.from_scores(z)
+    assert np.all(np.diff(x) >= 0)

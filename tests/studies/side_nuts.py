@@ -15,7 +15,8 @@ from numpyro.infer import MCMC, NUTS
 
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.convergence import autocorrelation_times
-from bayesmembrane.calibration.sampling.proposals.emulator import emulate, monomials
+from bayesmembrane.calibration.sampling.proposals.emulator import emulate
+from bayesmembrane.calibration.sampling.proposals.polynomials import monomials
 from tests.studies.side_samplers import Asked, Found, kish, normalised, walked
 
 PILOT_STEPS = 200

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +10,10 @@ import numpy as np
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.growing import picked
+from bayesmembrane.calibration.sampling.proposals.bend import bent
 from bayesmembrane.calibration.sampling.proposals.filling import NEAR, around_largest, joined
 from bayesmembrane.calibration.sampling.proposals.generator import generator_of
-from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
+from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture, widened
 from bayesmembrane.calibration.sampling.proposals.proposing import Proposing, proposing
 from bayesmembrane.calibration.sampling.weights import Worth, worth
 from bayesmembrane.ground.parameters import Array
@@ -22,6 +23,9 @@ BLOCK = 32
 MANY, LOOKED_AT, MENDING = 2**18, 2000, 0.2
 """States of a long walk among which distinct ones are sought, those that are looked at for where a mixture holds
 walkers up, and the weight of what is added there."""
+FITTED_TO, SMEARED, WIDE, HEAVY = 4000, 0.15, 0.2, 5.0
+"""States that a new mixture is fitted to, by how much of their spread each is moved, the weight of the wide component
+beside that, and the degrees of freedom at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,19 +75,41 @@ def offers(chains: Chains) -> Worth:
 
 
 def mended(posterior: Posterior, chains: Chains) -> Mixture | None:
-    """The mixture with more components where walkers are held up; None where what they walked fills no volume.
+    """A better mixture, from what was walked; None where that fills no volume.
 
-    A walker stands where w = p / g is large, which a few thousand weights of offers do not show where that is a small
-    place; the walkers do, for they are distributed as the posterior, nearly.
+    In turn one that is fitted anew to all that was walked but its first quarter, along the bend of that, and the same
+    one with more components where it holds walkers up. Each is for what the other cannot do: a new fit follows the
+    bulk of a bent valley, which walkers fill better from one to the next, and leaves out what is rare.
     """
     assert chains.mixture is not None
-    first, each = chains.learned, chains.log_posterior[:, 0].size
-    steps = np.arange(first, chains.steps, -(-(chains.steps - first) * each // MANY))
-    flat = picked(chains.x, steps).reshape(-1, chains.x.shape[-1])
-    lp = picked(chains.log_posterior, steps).ravel()
+    if len(chains.lessons) % 2 == 0:
+        return _fitted_anew(posterior, chains, chains.mixture)
+    return _with_more(posterior, chains, chains.mixture)
+
+
+def _fitted_anew(posterior: Posterior, chains: Chains, old: Mixture) -> Mixture | None:
+    rng = np.random.default_rng(chains.steps)
+    x, _ = _walked(chains, chains.steps // 4)
+    places = proposing(posterior, replace(old, bend=None)).places(x[rng.permutation(len(x))[:FITTED_TO]])
+    try:
+        way = bent(places)
+        u = places if way is None else way.of(places)
+        # Where walkers were held up they are one place many times.
+        u = u + SMEARED * np.std(u, axis=0) * rng.standard_normal(u.shape)
+        found = widened(replace(fit_mixture(u, rng), bend=way), u, WIDE)
+    except np.linalg.LinAlgError:
+        return None
+    return replace(found, degrees=min(found.degrees, HEAVY))
+
+
+def _with_more(posterior: Posterior, chains: Chains, old: Mixture) -> Mixture | None:
+    """A walker stands where w = p / g is large, which a few thousand weights of offers do not show where that is a
+    small place; the walkers do, for they are distributed as the posterior, nearly.
+    """
+    flat, lp = _walked(chains, chains.learned)
     _, at = np.unique(flat, axis=0, return_index=True)
     at = np.random.default_rng(chains.steps).permutation(at)[:LOOKED_AT]
-    proposal = proposing(posterior, chains.mixture)
+    proposal = proposing(posterior, old)
     w = proposal.log_weights(flat[at], lp[at])
     places = proposal.places(flat[at])
     w = np.where(np.isfinite(w), np.exp(w - np.max(w)), 0.0)
@@ -93,7 +119,14 @@ def mended(posterior: Posterior, chains: Chains) -> Mixture | None:
         more = around_largest(places, w, np.atleast_2d(np.cov(places.T)))
     except np.linalg.LinAlgError:
         return None
-    return joined([(chains.mixture, 1 - MENDING), (more, MENDING)])
+    return joined([(old, 1 - MENDING), (more, MENDING)])
+
+
+def _walked(chains: Chains, first: int) -> tuple[Array, Array]:
+    """x (n, k) and ln p (n,) from the step ``first`` on, of a long walk every second step and so on."""
+    each = chains.log_posterior[:, 0].size
+    steps = np.arange(first, chains.steps, -(-(chains.steps - first) * each // MANY))
+    return picked(chains.x, steps).reshape(-1, chains.x.shape[-1]), picked(chains.log_posterior, steps).ravel()
 
 
 def _drawn(proposal: Proposing, state: Any, count: int) -> tuple[Array, Array, Any]:

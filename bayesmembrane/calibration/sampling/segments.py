@@ -22,6 +22,7 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import Outcomes
 from bayesmembrane.calibration.sampling.chains import Chains, joined
+from bayesmembrane.calibration.sampling.proposals.bend import Bend
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.files import remove_parts, write_whole
@@ -165,6 +166,9 @@ def _packed(part: Chains) -> bytes:
         g = part.mixture
         about["degrees"] = g.degrees
         states |= {"offered": part.offered, "log_weights": g.log_weights, "means": g.means, "roots": g.roots}
+        if (b := g.bend) is not None:
+            about["bend"] = b.degree
+            states |= {"centre": b.centre, "root": b.root, "inverse": b.inverse, "coefficients": b.coefficients}
     file = io.BytesIO()
     np.savez(file, x=part.x, log_posterior=part.log_posterior, about=np.array(json.dumps(about)), **states)
     return file.getvalue()
@@ -184,7 +188,10 @@ def _unpacked(payload: bytes) -> Chains:
         chains = Chains(x, f["log_posterior"], states, counts, seconds, lessons, look, leapt=int(about.get("leapt", 0)))
         if "degrees" not in about:
             return chains
-        mixture = Mixture(f["log_weights"], f["means"], f["roots"], float(about["degrees"]))
+        bend = None
+        if "bend" in about:
+            bend = Bend(f["centre"], f["root"], f["inverse"], f["coefficients"], int(about["bend"]))
+        mixture = Mixture(f["log_weights"], f["means"], f["roots"], float(about["degrees"]), bend)
         return replace(chains, mixture=mixture, offered=f["offered"])
 
 

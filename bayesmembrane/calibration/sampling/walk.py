@@ -39,7 +39,7 @@ they have to walk along a narrow valley."""
 DOUBTED = 5000  # draws of a mixture after which it is looked at for the first time
 GIVEN_UP = 2 * DOUBTED
 """Draws from which on a mixture whose weights are not good is given up; until then no draw of it counts."""
-MOST_MENDINGS = 8
+MOST_MENDINGS = 24
 """Times that a mixture is mended before ensembles walk instead."""
 GROWTH = 1.25  # a look costs little, but nothing is learned from looking at every step
 

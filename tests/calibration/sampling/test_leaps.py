@@ -224,3 +224,48 @@ def test_mixture_equals_emcee(material: str) -> None:
     error = a.std(axis=0) * np.sqrt(sum(1 / r.status["ess_bulk"] for r in runs))
     assert np.all(np.abs(a.mean(axis=0) - b.mean(axis=0)) < 6 * error)
     assert np.all(np.abs(np.log(a.std(axis=0) / b.std(axis=0))) < 0.3)
+
+
+class Sheet:
+    """Three coordinates are N(0, 1), and two more are next to polynomials of those."""
+
+    size = readings = 5
+
+    def evaluate(self, x: np.ndarray) -> Evaluation:
+        return Evaluation(np.zeros(len(x)), self.given(x, x), np.full(len(x), Outcome.OK), x)
+
+    def given(self, force: np.ndarray, x: np.ndarray) -> np.ndarray:
+        return np.asarray(np.sum(norm.logpdf(self.straight(force)), axis=1) - 2 * np.log(0.02))
+
+    def straight(self, x: np.ndarray) -> np.ndarray:
+        """All N(0, 1)."""
+        a, b, c = x[:, :3].T
+        bent = np.stack([0.3 * a * a - 0.1 * b * c, 0.3 * c * c + 0.05 * a**3], axis=1)
+        return np.concatenate([x[:, :3], (x[:, 3:] - bent) / 0.02], axis=1)
+
+
+def test_a_bent_valley_is_followed(tmp_path: Path) -> None:
+    """Mixtures that are fitted to what walkers fill follow it along its bend, and are stored with that."""
+    rng = np.random.default_rng(71)
+    x = 0.2 * rng.standard_normal((2, 32, 5))
+    g = Mixture(np.zeros(1), np.zeros((1, 5)), 0.7 * np.eye(5)[None], 5.0)
+    lp = np.stack([Sheet().evaluate(e).log_posterior for e in x])
+    states = tuple(np.random.RandomState(np.random.MT19937([71, e])).get_state() for e in range(2))
+    offered = np.full((2, 1, 32), np.nan)
+    begun = Chains(x[:, None], lp[:, None], states, Outcomes(), 0.0, mixture=g, offered=offered, look=10 * BLOCK)
+    segments = Segments(tmp_path)
+    segments.folder.mkdir()
+    segments.write(begun)
+    found = run_ensembles(Sheet(), Settings(ess=1000), 0, chains=begun, beside=Meanwhile(segments.write))  # type: ignore[arg-type]
+    assert found.status == "converged"
+    assert found.chains.mixture is not None
+    assert found.chains.mixture.bend is not None
+    every = int(3 * np.max(found.convergence.tau))
+    z = Sheet().straight(found.chains.x[:, found.convergence.burn :: every].reshape(-1, 5))
+    assert all(kstest(column, norm.cdf).pvalue > 1e-6 for column in z.T)
+    stored = segments.read()
+    assert stored is not None
+    assert stored.mixture is not None
+    u = rng.standard_normal((9, 5))
+    assert np.array_equal(stored.mixture.bend.back(u), found.chains.mixture.bend.back(u))  # type: ignore[union-attr]
+    assert np.array_equal(stored.mixture.bend.of(u), found.chains.mixture.bend.of(u))  # type: ignore[union-attr]

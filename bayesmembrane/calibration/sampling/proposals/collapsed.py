@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesmembrane.calibration.posterior import Evaluation, Posterior
+from bayesmembrane.calibration.sampling.proposals.bend import Bend
 from bayesmembrane.calibration.sampling.proposals.conditional import Residuals
+from bayesmembrane.calibration.sampling.proposals.scores import Scores
 from bayesmembrane.ground.parameters import Array, Normal
 from bayesmembrane.physics.noise.base import NoiseSpectrum
 
@@ -22,12 +24,13 @@ with 60 Gent took 1.2 s of a processor instead of 0.8, with 10 and 2 coordinates
 class Collapsed:
     """p(s | y) = int int p(ln_gd, s, ln_sd | y) d ln_gd d ln_sd of the coordinates s (k - 2,) between the two.
 
-    Forces are proportional to the modulus, F = Gd f(s), with effects that leave them so, too, and whether a film is
-    convex does not hang on it.
+    They are told by normal scores (`Scores`), with a ``bend`` by those straightened. Forces are proportional to the
+    modulus, F = Gd f(s), with effects that leave them so, too, and whether a film is convex does not hang on it.
     """
 
     posterior: Posterior
     spectrum: NoiseSpectrum
+    bend: Bend | None = None
 
     @property
     def size(self) -> int:
@@ -59,18 +62,26 @@ class Collapsed:
 
     def log_prior(self, s: Array) -> Array:
         """ln p0(s), (B,)."""
-        own = np.log(2 * np.pi * self.modulus.sd * self.noise.sd)
-        return np.asarray(self.posterior.prior.log_density(self.whole(s)) + own)
+        return self.scores.log_prior(s)
 
     def part(self, x: Array) -> Array:
-        """(B, k - 2) the shapes of x (B, k)."""
-        return x[:, 1:-1]
+        """(B, k - 2) the shapes s of x (B, k)."""
+        return self.scores.of(x[:, 1:-1])
 
     def whole(self, s: Array) -> Array:
         """(B, k) all coordinates of shapes s (B, k - 2), modulus and noise at the medians of their priors."""
         x = np.empty((len(s), self.posterior.size))
-        x[:, 0], x[:, 1:-1], x[:, -1] = self.modulus.mean, s, self.noise.mean
+        x[:, 0], x[:, 1:-1], x[:, -1] = self.modulus.mean, self.scores.back(s), self.noise.mean
         return x
+
+    @cached_property
+    def scores(self) -> Scores:
+        """Of the coordinates between modulus and noise."""
+        return Scores(tuple(p.prior for p in self.posterior.hypothesis.parameters[1:-1]), self.bend)
+
+    def bent(self, bend: Bend | None) -> Collapsed:
+        """The same in the coordinates of a bend of the scores."""
+        return replace(self, bend=bend)
 
     def residuals(self, curves: Array) -> Residuals:
         """Of ``curves`` (B, N) for Gd = 1."""

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from bayesmembrane.calibration.posterior import Evaluates, Posterior, solved_in_parts
-from bayesmembrane.ground.compiling import compiled
+from bayesmembrane.calibration.posterior import Evaluates, Given, Posterior, solved_in_parts
+from bayesmembrane.calibration.sampling.proposals.polynomials import monomials, terms_of
+from bayesmembrane.calibration.sampling.proposals.scored import Scored, ScoredAlong
 from bayesmembrane.ground.parameters import Array
 
 LEARN_FROM, LEARN_FORCES, LEAST_DRAWS, HELD_OUT = 4000, 6_000_000, 60, 0.25
@@ -27,13 +27,6 @@ INNER = 100  # steps of a walk on the emulator
 FAR = 0.1  # part of them that jump the whole difference between two draws
 ROUND_OFF = 1e-6  # of ln q: less than what would be accepted by more than this is surely refused
 SHORT, FAINT = 0.5, 1e-8  # axes that must do for so many readings, and directions of curves that are left out
-
-
-class Given(Protocol):
-    """A posterior that is told the curves."""
-
-    def given(self, curves: Array, x: Array, /) -> Array:
-        """(B,) ln prior + ln likelihood of x (B, k) if theirs were ``curves`` (B, N), as an `Evaluation` has them."""
 
 
 class Emulated(Given, Evaluates, Protocol):
@@ -181,39 +174,16 @@ def _shortened(posterior: Emulated, coefficients: Array) -> tuple[Given, Array]:
     All curves are sums of T; where noise weighs every reading alike, nothing but their T + 1 products with each other
     and with the data counts, however many readings there are.
     """
-    if not isinstance(posterior, Posterior) or posterior.noise.traced:  # traces stand behind the forces
+    own = posterior.posterior if isinstance(posterior, Scored) else posterior
+    if not isinstance(own, Posterior) or own.noise.traced:  # traces stand behind the forces
         return posterior, coefficients
-    _, size, axes = np.linalg.svd(np.vstack([coefficients, posterior.measured]), full_matrices=False)
+    _, size, axes = np.linalg.svd(np.vstack([coefficients, own.measured]), full_matrices=False)
     axes = axes[size > FAINT * size[0]]
-    along = posterior.along(axes) if len(axes) <= SHORT * coefficients.shape[1] else None
-    return (posterior, coefficients) if along is None else (along, coefficients @ axes.T)
-
-
-def monomials(z: Array, terms: NDArray[np.intp]) -> Array:
-    """Products of the columns of z (B, k) named in ``terms`` (T, degree), shape (B, T)."""
-    factors = np.ones((z.shape[1] + 1, len(z)))
-    factors[:-1] = z.T
-    return np.asarray(_products(factors, terms).T)
-
-
-@compiled()
-def _products(factors: Array, terms: NDArray[np.intp]) -> Array:
-    """(T, B) products of those rows of ``factors`` (k + 1, B) that are named in ``terms`` (T, degree).
-
-    A walk on an emulator does little else; draws lie side by side so that one instruction takes several.
-    """
-    count, degree = terms.shape
-    draws = factors.shape[1]
-    out = np.empty((count, draws))
-    for t in range(count):
-        first = terms[t, 0]
-        for b in range(draws):
-            out[t, b] = factors[first, b]
-        for d in range(1, degree):
-            row = terms[t, d]
-            for b in range(draws):
-                out[t, b] *= factors[row, b]
-    return out
+    along = own.along(axes) if len(axes) <= SHORT * coefficients.shape[1] else None
+    if along is None:
+        return posterior, coefficients
+    short = ScoredAlong(along, posterior.scores) if isinstance(posterior, Scored) else along
+    return short, coefficients @ axes.T
 
 
 def _best(z: Array, force: Array, score: Callable[[Array, NDArray[np.bool_]], float]) -> tuple[NDArray[np.intp], Array]:
@@ -221,23 +191,18 @@ def _best(z: Array, force: Array, score: Callable[[Array, NDArray[np.bool_]], fl
     held = np.arange(len(z)) < HELD_OUT * len(z)
     choices = []
     for degree in DEGREES:
-        terms = _terms(z.shape[1], degree)
+        terms = terms_of(z.shape[1], degree)
         if degree > 1 and PER_TERM * len(terms) > np.count_nonzero(~held):
             break
         fit = _fitted(monomials(z[~held], terms), force[~held])
         choices.append((score(monomials(z[held], terms) @ fit, held), degree))
-    terms = _terms(z.shape[1], min(choices)[1])
+    terms = terms_of(z.shape[1], min(choices)[1])
     return terms, _fitted(monomials(z, terms), force)
 
 
 def _misfit(emulated: Array, truth: Array) -> float:
     """Mean absolute error of ln p, each cut at 5: a few wild draws do not choose the degree."""
     return float(np.mean(np.minimum(np.nan_to_num(np.abs(emulated - truth), nan=5.0), 5.0)))
-
-
-def _terms(k: int, degree: int) -> NDArray[np.intp]:
-    """(T, degree) all monomials up to ``degree`` in k variables; index k stands for one."""
-    return np.array(list(combinations_with_replacement(range(k + 1), degree)), dtype=np.intp)
 
 
 def _fitted(a: Array, force: Array) -> Array:

@@ -56,13 +56,14 @@ def filled(g: Mixture, log_density: LogDensity, rng: np.random.Generator) -> Fil
 
 
 def joined(parts: list[tuple[Mixture, int]] | list[tuple[Mixture, float]]) -> Mixture:
-    """One mixture of several, each with its weight; the tails are the heaviest of all."""
+    """One mixture of several of the same coordinates, each with its weight; the tails are the heaviest of all."""
     whole = np.log(sum(weight for _, weight in parts))
     return Mixture(
         np.concatenate([g.log_weights + np.log(weight) - whole for g, weight in parts]),
         np.concatenate([g.means for g, _ in parts]),
         np.concatenate([g.roots for g, _ in parts]),
         min(g.degrees for g, _ in parts),
+        parts[0][0].bend,
     )
 
 

@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesmembrane.calibration.posterior import Outcomes, Posterior, weighed
+from bayesmembrane.calibration.sampling.proposals.bend import Bend, bent
 from bayesmembrane.calibration.sampling.proposals.collapsed import Collapsed, collapsed
 from bayesmembrane.calibration.sampling.proposals.emulator import Allowed, Emulator, Solved, emulate
 from bayesmembrane.calibration.sampling.proposals.filling import Filled, filled, joined
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture, widened
 from bayesmembrane.calibration.sampling.proposals.proposing import ShapeFirst
+from bayesmembrane.calibration.sampling.proposals.scored import Scored, scores_of
+from bayesmembrane.calibration.sampling.proposals.scores import Scores
 from bayesmembrane.calibration.sampling.weights import Worth, worth
 from bayesmembrane.calibration.starts import Tried, tempered
 from bayesmembrane.ground.parameters import Array
@@ -23,10 +26,11 @@ ROUNDS, EACH = 3, 400
 """Rounds at most, and draws of the mixture that are solved in each."""
 ENOUGH, ENOUGH_SHAPE, ENOUGH_FILLED = 0.5, 0.75, 0.25
 """A proposal of this efficiency is good enough; one of shapes of the second, and of the third once it is filled."""
-LEAST, LEAST_FILLED, LEAST_SHAPE = 0.25, 0.08, 0.02
+LEAST, LEAST_FILLED = 0.25, 0.08
 """A chain of less than the first is stuck for so long that ensembles are as fast; a mixture that has been filled may be
-worth less, for its weights have no long tail: what holds it up is short, and many films are solved at once. Where one
-of shapes fails, ensembles have to walk along a narrow valley: they take a thousand times as many films as this."""
+worth less, for its weights have no long tail: what holds it up is short, and many films are solved at once. One of
+shapes may be worth anything: it is fitted anew to what is walked by it, and ensembles would have to walk along a narrow
+valley, which takes a hundred times as many films."""
 FILLINGS, HOPELESS = 2, 0.02
 """A mixture of all coordinates is filled so often at most, and not at all if it is worth less than this."""
 FITTED = 0.6  # weight of what is fitted to draws beside the mixture that is filled
@@ -46,7 +50,10 @@ STATES = 256  # of those that walks may begin at
 
 @dataclass(frozen=True, eq=False)
 class Independent:
-    """A mixture to draw proposals from, some states (S, k) distributed as the posterior, nearly, and how good it is."""
+    """A mixture to draw proposals from, some states (S, k) distributed as the posterior, nearly, and how good it is.
+
+    The states are told without the bend of the mixture.
+    """
 
     mixture: Mixture
     states: Array
@@ -63,13 +70,21 @@ def independent(posterior: Posterior, tried: Tried, rng: np.random.Generator, co
     """
     shape = collapsed(posterior)
     if shape is None:
-        return _of_all_coordinates(_Learning(posterior, rng, counts), tried)
+        scores = scores_of(posterior)
+        found = _of_all_coordinates(_Learning(Scored(posterior, scores), rng, counts), _scored(tried, scores))
+        return None if found is None else replace(found, states=scores.back(found.states))
     close = _of_shapes(_Learning(shape, rng, counts), _shapes(tried, shape))
     if close is None:
         return None
     states = close.states[:STATES]
     numbers = np.concatenate([states, rng.random((len(states), 2))], axis=1)
-    return replace(close, states=ShapeFirst(shape, close.mixture).solved(numbers).x)
+    return replace(close, states=ShapeFirst(shape, replace(close.mixture, bend=None)).solved(numbers).x)
+
+
+def _scored(tried: Tried, scores: Scores) -> Tried:
+    """What was tried in normal scores, with ln p of those."""
+    z = scores.of(tried.x)
+    return replace(tried, x=z, log_posterior=tried.log_posterior + scores.log_stretch(z))
 
 
 def _shapes(tried: Tried, shape: Collapsed) -> Tried:
@@ -87,8 +102,8 @@ def _of_all_coordinates(search: _Learning, tried: Tried) -> Independent | None:
     """What `independent` finds of all coordinates: what is best of `ROUNDS` is filled, if it has to be."""
     found: list[Independent] = []
     with suppress(np.linalg.LinAlgError):  # what was tried fills no volume
-        for _ in range(ROUNDS):
-            now, tried = search.round(tried)
+        for turn in range(ROUNDS):
+            now, tried = search.round(tried, SNAPSHOTS, turn > 0)
             if now is not None:
                 found.append(now)
                 if _rank(now) >= (True, ENOUGH):
@@ -112,7 +127,7 @@ def _of_shapes(search: _Learning, tried: Tried) -> Independent | None:
     found: list[Independent] = []
     with suppress(np.linalg.LinAlgError):
         for turn in range(ROUNDS):
-            now, tried = search.round(tried, SNAPSHOTS * (MORE if turn else 1))
+            now, tried = search.round(tried, SNAPSHOTS * (MORE if turn else 1), turn > 0)
             if now is None:
                 continue
             if _rank(now) >= (True, ENOUGH_SHAPE):
@@ -122,8 +137,7 @@ def _of_shapes(search: _Learning, tried: Tried) -> Independent | None:
                 found.append(more)
                 if _rank(more) >= (True, ENOUGH_FILLED):
                     return more
-    best = max(found, key=_rank, default=None)
-    return best if best is not None and _rank(best) >= (True, LEAST_SHAPE) else None
+    return max(found, key=_rank, default=None)
 
 
 def _rank(found: Independent) -> tuple[bool, float]:
@@ -134,7 +148,7 @@ def _rank(found: Independent) -> tuple[bool, float]:
 class _Learning:
     """What mixtures are learned for."""
 
-    posterior: Posterior | Collapsed
+    posterior: Scored | Collapsed
     rng: np.random.Generator
     counts: Outcomes
 
@@ -143,30 +157,42 @@ class _Learning:
         """On the emulator."""
         return SHAPES if isinstance(self.posterior, Collapsed) else WALKERS * self.posterior.size
 
-    def round(self, tried: Tried, snapshots: int = SNAPSHOTS) -> tuple[Independent | None, Tried]:
-        """A mixture learned from what was tried, and what `EACH` draws say of it."""
+    def round(self, tried: Tried, snapshots: int, bend: bool) -> tuple[Independent | None, Tried]:
+        """A mixture learned from what was tried, and what `EACH` draws say of it; with ``bend`` one along a bend."""
         # Not the last round's draws by their weights: of a bad mixture one of them may outweigh all others.
         good = tried.possible
         states = good.x[tempered(good.log_posterior, self.walkers / 2, self.walkers, self.rng)]
-        return self.judged(widened(*self.learned(tried, states, LEARN_FROM, snapshots)), tried, EACH)
+        draws = self.learned(tried, states, LEARN_MORE if bend else LEARN_FROM, snapshots)
+        way = bent(draws) if bend else None
+        mixture = replace(fit_mixture(_told(way, draws), self.rng), bend=way)
+        return self.judged(widened(mixture, _told(way, draws)), tried, EACH)
 
     def judged(self, mixture: Mixture, tried: Tried, count: int) -> tuple[Independent | None, Tried]:
         """What ``count`` draws say of a mixture, None if none is possible, and they with what was tried."""
-        x = mixture.draw(self.rng, count)
-        more = Tried.of(self.posterior, x, self.counts)
-        weights = more.log_posterior - mixture.log_density(x)
+        u = mixture.draw(self.rng, count)
+        lp, more = self._solved(mixture.bend, u)
+        weights = lp - mixture.log_density(u)
         found = worth(weights)
         tried = tried.joined(more)
         if found.efficiency <= 0:
             return None, tried
-        return Independent(mixture, _resampled(x, weights, self.walkers, self.rng), found), tried
+        return Independent(mixture, _resampled(more.x, weights, self.walkers, self.rng), found), tried
+
+    def _solved(self, bend: Bend | None, u: Array) -> tuple[Array, Tried]:
+        """ln p of the straightened coordinates u (B, k), and the same points without a bend."""
+        there = Tried.of(self.posterior.bent(bend), u, self.counts)
+        if bend is None:
+            return there.log_posterior, there
+        plain = replace(there, x=bend.back(u), log_posterior=there.log_posterior - bend.log_stretch)
+        return there.log_posterior, plain
 
     def relearned(self, best: Independent) -> Independent | None:
         """The mixture with what it lacks, beside one that is learned from all that this took to find."""
         whole, tried = self._filling(best)
-        states = _resampled(whole.x, whole.log_weights, self.walkers, self.rng)
-        fitted, _ = self.learned(tried, states, LEARN_MORE)
-        mixture = joined([(fitted, FITTED), (whole.mixture, 1 - FITTED)])
+        states = _resampled(tried.x, whole.log_weights, self.walkers, self.rng)
+        way = best.mixture.bend
+        fitted = fit_mixture(_told(way, self.learned(tried, states, LEARN_MORE, SNAPSHOTS)), self.rng)
+        mixture = joined([(whole.mixture, 1 - FITTED), (fitted, FITTED)])
         return self.judged(mixture, tried, CHECKED)[0]
 
     def completed(self, best: Independent, tried: Tried) -> tuple[Independent | None, Tried]:
@@ -177,22 +203,28 @@ class _Learning:
     def _filling(self, best: Independent) -> tuple[Filled, Tried]:
         solved: list[Tried] = []
 
-        def log_density(x: Array) -> Array:
-            solved.append(Tried.of(self.posterior, x, self.counts))
-            return solved[-1].log_posterior
+        def log_density(u: Array) -> Array:
+            lp, more = self._solved(best.mixture.bend, u)
+            solved.append(more)
+            return lp
 
         return filled(best.mixture, log_density, self.rng), reduce(Tried.joined, solved)
 
-    def learned(self, tried: Tried, states: Array, most: int, snapshots: int = SNAPSHOTS) -> tuple[Mixture, Array]:
-        """A mixture for the draws of an emulator, or for the ``states`` where there is none, and those draws."""
+    def learned(self, tried: Tried, states: Array, most: int, snapshots: int) -> Array:
+        """Draws of an emulator, or the ``states`` where there is none, none of them twice."""
         draws = states
         with suppress(np.linalg.LinAlgError):
             near = tried.those(_near(tried, most, self.rng))
             seen = Allowed.of(tried.x, tried.log_posterior > -np.inf)
-            emulator = emulate(self.posterior, near.x, self.rng, seen, _solved(near))
+            emulator = emulate(self.posterior, near.x, self.rng, seen, _known(near))
             if emulator is not None:
                 draws = _walked(emulator, states, self.rng, snapshots)
-        return fit_mixture(_parted(draws, self.rng), self.rng), draws
+        return _parted(draws, self.rng)
+
+
+def _told(bend: Bend | None, x: Array) -> Array:
+    """x (B, k) in the coordinates of a bend, if there is one."""
+    return x if bend is None else bend.of(x)
 
 
 def _resampled(x: Array, log_weights: Array, count: int, rng: np.random.Generator) -> Array:
@@ -201,7 +233,7 @@ def _resampled(x: Array, log_weights: Array, count: int, rng: np.random.Generato
     return np.asarray(x[rng.choice(len(x), size=count, p=share / np.sum(share))])
 
 
-def _solved(tried: Tried) -> Solved | None:
+def _known(tried: Tried) -> Solved | None:
     """What is known of these points; None if their curves were not kept."""
     return None if tried.curves is None else Solved(tried.log_posterior, tried.curves)
 

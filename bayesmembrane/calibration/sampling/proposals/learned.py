@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,13 @@ import numpy as np
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.growing import picked
+from bayesmembrane.calibration.sampling.proposals.bend import bent
 from bayesmembrane.calibration.sampling.proposals.emulator import Emulator, emulate
 from bayesmembrane.calibration.sampling.proposals.ensemble import ensemble_moves
 from bayesmembrane.calibration.sampling.proposals.jumping import jumping
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture
+from bayesmembrane.calibration.sampling.proposals.scored import Scored, scores_of
+from bayesmembrane.calibration.sampling.proposals.scores import Scores
 from bayesmembrane.calibration.sampling.proposals.walking import walking
 from bayesmembrane.ground.jobs import give_back
 
@@ -32,20 +35,24 @@ WALK_SHARE, JUMP_SHARE, LEARN_FROM = 0.4, 0.3, 2000
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """What proposals are made from; None where there is nothing to learn from."""
+    """What proposals of the normal ``scores`` are made from; None where there is nothing to learn from."""
 
+    scores: Scores
     emulator: Emulator | None = None
     mixture: Mixture | None = None
 
     def moves(self) -> list[tuple[Any, float]]:
         """emcee's moves with their weights, which add up to one."""
+        from bayesmembrane.calibration.sampling.proposals.scoring import among_scores
+
         moves: list[tuple[Any, float]] = []
         if self.emulator is not None:
-            moves.append((walking(self.emulator), WALK_SHARE))
+            moves.append((among_scores(walking(self.emulator), self.scores), WALK_SHARE))
+        straight = self.scores.bent(None if self.mixture is None else self.mixture.bend)
         if self.mixture is not None:
-            moves.append((jumping(self.mixture), JUMP_SHARE))
+            moves.append((among_scores(jumping(self.mixture), straight), JUMP_SHARE))
         share = 1 - sum(weight for _, weight in moves)
-        return moves + ensemble_moves(share)
+        return moves + [(among_scores(move, straight), weight) for move, weight in ensemble_moves(share)]
 
 
 def learn(posterior: Posterior, chains: Chains) -> Learned:
@@ -55,21 +62,24 @@ def learn(posterior: Posterior, chains: Chains) -> Learned:
     parameters, the other where they are not but the posterior is compact. Both follow from the chains alone, so that a
     run that was interrupted learns the same again.
     """
+    scores = scores_of(posterior)
     if not chains.lessons or chains.mixture is not None:
-        return Learned()
+        return Learned(scores)
     give_back()  # what a walk holds is no use to an emulator
     end = chains.lessons[-1]
     every = -(-(end - end // 4) * chains.log_posterior[:, 0].size // SEEN)
     some, rng = picked(chains.x, np.arange(end // 4, end, every)), np.random.default_rng(end)
-    x = some.reshape(-1, some.shape[-1])
+    z = scores.of(some.reshape(-1, some.shape[-1]))
     emulator: Emulator | None = None
     mixture: Mixture | None = None
     # Draws that fill no volume teach nothing: then the walkers do without.
     with suppress(np.linalg.LinAlgError):
-        emulator = emulate(posterior, x, rng)
+        emulator = emulate(Scored(posterior, scores), z, rng)
     with suppress(np.linalg.LinAlgError):
-        mixture = fit_mixture(x[rng.permutation(len(x))[:LEARN_FROM]], rng)
-    return Learned(emulator, mixture)
+        some = z[rng.permutation(len(z))[:LEARN_FROM]]
+        way = bent(some)
+        mixture = replace(fit_mixture(some if way is None else way.of(some), rng), bend=way)
+    return Learned(scores, emulator, mixture)
 
 
 def next_lesson(chains: Chains) -> int:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from scipy.special import gammaln
 
+from bayesmembrane.calibration.sampling.proposals.bend import Bend
 from bayesmembrane.calibration.sampling.proposals.maximising import maximised
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.symmetric import eigh
@@ -27,12 +28,14 @@ class Mixture:
     """g(x) = sum_j w_j t(x; m_j, R_j R_j^T, nu).
 
     log_weights (K,), means (K, k), roots (K, k, k) lower triangular, degrees nu of freedom
+    bend : x are coordinates u of this one; None if they are none such. Nothing else is done with it here
     """
 
     log_weights: Array
     means: Array
     roots: Array
     degrees: float
+    bend: Bend | None = None
 
     def log_density(self, x: Array) -> Array:
         """ln g of x (B, k), shape (B,)."""
@@ -100,7 +103,7 @@ def reweighted(g: Mixture, x: Array, weights: Array) -> Mixture:
     share, _ = _summed(g.parts(x).T)
     w = share @ weights / np.sum(weights)
     w = np.maximum(w, 0.01 * np.exp(g.log_weights))
-    return Mixture(np.log(w / np.sum(w)), g.means, g.roots, g.degrees)
+    return replace(g, log_weights=np.log(w / np.sum(w)))
 
 
 def widened(g: Mixture, x: Array, share: float = 0.1, factor: float = 2.0) -> Mixture:
@@ -109,7 +112,7 @@ def widened(g: Mixture, x: Array, share: float = 0.1, factor: float = 2.0) -> Mi
     scatter = np.linalg.cholesky(root @ root.T)
     weights = np.append(g.log_weights + np.log1p(-share), np.log(share))
     roots = np.concatenate([g.roots, factor * scatter[None]])
-    return Mixture(weights, np.vstack([g.means, centre]), roots, min(g.degrees, 10.0))
+    return Mixture(weights, np.vstack([g.means, centre]), roots, min(g.degrees, 10.0), g.bend)
 
 
 def around(x: Array, rng: np.random.Generator) -> Mixture:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -12,6 +13,8 @@ from bayesmembrane.calibration.posterior import Evaluates, Posterior, weighed
 from bayesmembrane.calibration.sampling.proposals.collapsed import Collapsed, collapsed
 from bayesmembrane.calibration.sampling.proposals.conditional import GivenShape
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
+from bayesmembrane.calibration.sampling.proposals.scored import scores_of
+from bayesmembrane.calibration.sampling.proposals.scores import Scores
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.forward import AT_ONCE
 
@@ -44,7 +47,7 @@ class Proposing(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Whole:
-    """x ~ g, the mixture."""
+    """z ~ g, the mixture, of the normal scores of x."""
 
     posterior: Evaluates
     mixture: Mixture
@@ -53,22 +56,31 @@ class Whole:
         return self.mixture.draw(rng, count)
 
     def solved(self, numbers: Array) -> Proposed:
-        found = weighed(self.posterior, numbers)
+        x = self.scores.back(numbers)
+        found = weighed(self.posterior, x)
         lp = found.log_posterior
-        return Proposed(numbers, lp, self.log_weights(numbers, lp), found.outcome)
+        return Proposed(x, lp, self._weights(numbers, lp), found.outcome)
 
     def log_weights(self, x: Array, log_posterior: Array) -> Array:
-        return log_posterior - self.mixture.log_density(x)
+        return self._weights(self.places(x), log_posterior)
 
     def places(self, x: Array) -> Array:
-        return x
+        return self.scores.of(x)
+
+    @cached_property
+    def scores(self) -> Scores:
+        """Of the coordinates."""
+        return scores_of(self.posterior).bent(self.mixture.bend)
+
+    def _weights(self, z: Array, log_posterior: Array) -> Array:
+        return np.asarray(log_posterior + self.scores.log_stretch(z) - self.mixture.log_density(z))
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeFirst:
     """s ~ g, the mixture, of the shape of the curve, then (ln_gd, ln_sd) ~ q given the curve of that shape.
 
-    The density of a proposal is g(s) q(ln_gd, ln_sd | f(s)), known for any x once its curve is.
+    The density of a proposal is g(s) |ds / dx| q(ln_gd, ln_sd | f(s)), known for any x once its curve is.
     """
 
     collapsed: Collapsed
@@ -103,15 +115,16 @@ class ShapeFirst:
 
     def _weighed(self, both: Array) -> Array:
         x, lp = both[:, :-1], both[:, -1]
-        e = self.collapsed.evaluate(x[:, 1:-1])
+        e = self.collapsed.evaluate(self.places(x))
         ok, weights = np.isfinite(e.log_prior), np.full(len(x), -np.inf)
         if np.any(ok):
             weights[ok] = self._weights(x[ok], lp[ok], self.collapsed.residuals(e.force[ok]).given())
         return weights
 
     def _weights(self, x: Array, log_posterior: Array, given: GivenShape) -> Array:
-        density = self.mixture.log_density(x[:, 1:-1]) + given.log_density(x[:, 0], x[:, -1])
-        return np.asarray(log_posterior - density)
+        shapes = self.places(x)
+        density = self.mixture.log_density(shapes) - self.collapsed.scores.log_stretch(shapes)
+        return np.asarray(log_posterior - density - given.log_density(x[:, 0], x[:, -1]))
 
 
 def proposing(posterior: Posterior, mixture: Mixture) -> Proposing:
@@ -120,7 +133,7 @@ def proposing(posterior: Posterior, mixture: Mixture) -> Proposing:
         return Whole(posterior, mixture)
     found = collapsed(posterior)
     assert found is not None
-    return ShapeFirst(found, mixture)
+    return ShapeFirst(found.bent(mixture.bend), mixture)
 
 
 def _parts(rows: Array, readings: int) -> list[Array]:

@@ -1,0 +1,162 @@
+"""Normal scores and bends: other coordinates of the same density, in which moves leave it as it is."""
+
+from typing import Any
+
+import emcee
+import numpy as np
+import pytest
+from scipy.stats import kstest, norm
+
+from bayesmembrane.calibration.posterior import Posterior
+from bayesmembrane.calibration.sampling.proposals.bend import FARTHEST, Bend, bent
+from bayesmembrane.calibration.sampling.proposals.ensemble import ensemble_moves
+from bayesmembrane.calibration.sampling.proposals.jumping import jumping
+from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture
+from bayesmembrane.calibration.sampling.proposals.scored import Scored, scores_of
+from bayesmembrane.calibration.sampling.proposals.scores import Scores
+from bayesmembrane.calibration.sampling.proposals.scoring import among_scores
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.ground.parameters import HalfNormal, LogNormal, Lomax, Normal, Uniform
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+
+PRIORS = (Normal(1.0, 2.0), Uniform(0.0, 1.0), HalfNormal(0.3), LogNormal(30.0, 1.5), Lomax(0.4))
+
+
+def sheet(rng: np.random.Generator, count: int, k: int = 5) -> np.ndarray:
+    """Draws of a bent valley: two coordinates are next to polynomials of the three that are long."""
+    z = rng.standard_normal((count, k))
+    t, far = z[:, : min(3, k - 2)], min(3, k - 2)
+    z[:, far] = 0.3 * t[:, 0] ** 2 - 0.1 * t[:, 0] * t[:, -1] + 0.01 * z[:, far]
+    z[:, far + 1] = 0.3 * t[:, -1] ** 2 + 0.05 * t[:, 0] ** 3 + 0.01 * z[:, far + 1]
+    z[:, :far] *= 3.0
+    return z
+
+
+def bend(k: int) -> Bend:
+    found = bent(sheet(np.random.default_rng(1), 3000, k))
+    assert found is not None
+    return found
+
+
+def each() -> list[Scores]:
+    return [Scores(PRIORS), Scores(PRIORS, bend(len(PRIORS)))]
+
+
+@pytest.mark.parametrize("scores", each(), ids=["plain", "bent"])
+def test_there_and_back_again(scores: Scores) -> None:
+    x = np.stack([p.draw(np.random.default_rng(2), 500) for p in PRIORS], axis=1)
+    z = scores.of(x)
+    assert scores.back(z) == pytest.approx(x, rel=1e-9, abs=1e-9)
+    assert scores.of(scores.back(z)) == pytest.approx(z, rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.parametrize("scores", each(), ids=["plain", "bent"])
+def test_volumes_are_stretched_as_told(scores: Scores) -> None:
+    """By differences, where polynomials are no constants yet."""
+    x = np.stack([p.quantile(np.random.default_rng(3).uniform(0.1, 0.9, 20)) for p in PRIORS], axis=1)
+    z, k, h = scores.of(x), len(PRIORS), 1e-5
+    for row, told in zip(z, scores.log_stretch(z), strict=True):
+        moved = row + h * np.concatenate([np.eye(k), -np.eye(k)])
+        slopes = (scores.back(moved)[:k] - scores.back(moved)[k:]) / (2 * h)
+        assert np.linalg.slogdet(slopes)[1] == pytest.approx(told, abs=1e-5)
+
+
+@pytest.mark.parametrize("scores", each(), ids=["plain", "bent"])
+def test_the_prior_of_scores_is_that_of_coordinates_stretched(scores: Scores) -> None:
+    x = np.stack([p.draw(np.random.default_rng(4), 300) for p in PRIORS], axis=1)
+    z = scores.of(x)
+    own = np.sum([p.log_density(x[:, i]) for i, p in enumerate(PRIORS)], axis=0)
+    assert scores.log_prior(z) == pytest.approx(own + scores.log_stretch(z), abs=1e-6)
+
+
+def test_an_end_of_the_support_is_as_far_as_a_double_tells() -> None:
+    scores = Scores((Uniform(0.0, 1.0), HalfNormal(0.3)))
+    z = scores.of(np.array([[0.0, 0.0], [1.0, 10.0]]))
+    assert z[0].tolist() == [-7.5, -7.5]
+    assert z[1, 0] == 7.5
+    assert z[1, 1] == pytest.approx(33.3, abs=0.1)
+    assert scores.log_prior(np.array([[8.0, 0.0], [0.0, 36.0]])).tolist() == [-np.inf, -np.inf]
+    assert scores.log_stretch(np.array([[8.0, 0.0], [0.0, 36.0]])).tolist() == [-np.inf, -np.inf]
+
+
+def test_normal_priors_alone_leave_coordinates_as_they_are() -> None:
+    x = np.ones((2, 2))
+    scores = Scores((Normal(0.0, 1.0), Normal(2.0, 3.0)))
+    assert scores.plain
+    assert scores.of(x) is x
+    assert among_scores(move := emcee.moves.DEMove(), scores) is move
+
+
+def test_a_bent_valley_is_straightened() -> None:
+    """Densities follow it more closely."""
+    rng = np.random.default_rng(5)
+    z, held = sheet(rng, 4000), sheet(rng, 4000)
+    found = bent(z)
+    assert found is not None
+    of_straight = fit_mixture(found.of(z), rng).log_density(found.of(held)) - found.log_stretch
+    assert np.mean(of_straight) > np.mean(fit_mixture(z, rng).log_density(held)) + 0.5
+
+
+def test_draws_that_are_not_bent_get_no_bend() -> None:
+    rng = np.random.default_rng(6)
+    assert bent(rng.standard_normal((3000, 4)) @ rng.standard_normal((4, 4))) is None
+    assert bent(rng.standard_normal((3000, 1))) is None
+    assert bent(rng.standard_normal((15, 3))) is None
+    with pytest.raises(np.linalg.LinAlgError):
+        bent(np.ones((100, 1)) * np.arange(3))
+
+
+def test_a_bend_goes_on_as_it_is_beyond_the_draws() -> None:
+    found = bend(5)
+    far = found.back(np.outer([2 * FARTHEST, 3 * FARTHEST], [1.0, 0.0, 0.0, 0.0, 0.0]))
+    step = FARTHEST * found.root[:, 0]
+    assert far[1] - far[0] == pytest.approx(step, abs=1e-9)
+    assert np.all(np.isfinite(found.back(np.full((1, 5), 1e6))))
+
+
+def test_a_posterior_of_scores_is_that_of_coordinates_stretched() -> None:
+    """Also what an emulator asks, which takes a shorter way where the noise allows for it."""
+    stretch = np.linspace(1.1, 2.5, 12)
+    force = 0.15 * (stretch - stretch**-2) + 2e-3 * np.random.default_rng(7).standard_normal(12)
+    m = Measurement(0.05 * (stretch - 1), force, Uniaxial(0.05, 0.01), Specimen("band", 5e-4))
+    for noise in ("white", "ar1", "form"):
+        p = Posterior(hypothesis("gent", ["permanent_set", "machine_compliance"], noise), m)
+        x = p.prior.draw(np.random.default_rng(8), 200)
+        found = p.evaluate(x)
+        x, curves = (v[np.isfinite(found.log_posterior)] for v in (x, found.curves))
+        assert len(x) > 20
+        for scores in (scores_of(p), scores_of(p).bent(bend(p.size))):
+            scored, z = Scored(p, scores), scores.of(x)
+            wanted = p.evaluate(x).log_posterior + scores.log_stretch(z)
+            assert scored.evaluate(z).log_posterior == pytest.approx(wanted, rel=1e-6, abs=1e-6)
+            assert scored.given(curves, z) == pytest.approx(wanted, rel=1e-6, abs=1e-6)
+
+
+WALKERS, STEPS = 4000, 40
+
+
+@pytest.mark.parametrize("move", [*ensemble_moves(1.0), "jump"], ids=["de", "de_far", "snooker", "stretch", "jump"])
+@pytest.mark.parametrize("scores", each(), ids=["plain", "bent"])
+def test_moves_among_scores_leave_coordinates_as_they_are_distributed(scores: Scores, move: Any) -> None:
+    """Walkers begin as independent draws, and are independent draws of the same when they have moved.
+
+    Walkers of one ensemble are not quite independent, so that the smallest of 50 p-values is judged at 1e-8.
+    """
+    if move == "jump":
+        wide = Mixture(np.zeros(1), np.zeros((1, 5)), 1.5 * np.eye(5)[None], 5.0)
+        move = (jumping(wide), 1.0)
+
+    def log_density(x: np.ndarray) -> np.ndarray:
+        with np.errstate(invalid="ignore"):
+            return np.sum([p.log_density(x[:, i]) for i, p in enumerate(PRIORS)], axis=0)
+
+    rng = np.random.default_rng([9, scores.bend is not None])
+    x = np.stack([p.draw(rng, WALKERS) for p in PRIORS], axis=1)
+    sampler = emcee.EnsembleSampler(WALKERS, 5, log_density, moves=among_scores(move[0], scores), vectorize=True)
+    start = emcee.State(x, random_state=np.random.RandomState(int(rng.integers(2**31))).get_state())
+    for state in sampler.sample(start, iterations=STEPS, store=False):
+        end = state.coords
+    assert np.mean(np.any(end != x, axis=1)) > 0.3
+    for i, p in enumerate(PRIORS):
+        assert kstest(norm.cdf(p.scores(end[:, i])), "uniform").pvalue > 1e-8
