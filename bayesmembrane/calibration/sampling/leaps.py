@@ -78,13 +78,16 @@ def mended(posterior: Posterior, chains: Chains) -> Mixture | None:
     """A better mixture, from what was walked; None where that fills no volume.
 
     In turn one that is fitted anew to all that was walked but its first quarter, along the bend of that, and the same
-    one with more components where it holds walkers up. Each is for what the other cannot do: a new fit follows the
-    bulk of a bent valley, which walkers fill better from one to the next, and leaves out what is rare.
+    one with more components where it holds walkers up; the other way where one gives none. Each is for what the other
+    cannot do: a new fit follows the bulk of a bent valley, which walkers fill better from one to the next, and leaves
+    out what is rare.
     """
     assert chains.mixture is not None
-    if len(chains.lessons) % 2 == 0:
-        return _fitted_anew(posterior, chains, chains.mixture)
-    return _with_more(posterior, chains, chains.mixture)
+    ways = [_fitted_anew, _with_more]
+    for way in ways if len(chains.lessons) % 2 == 0 else reversed(ways):
+        if (found := way(posterior, chains, chains.mixture)) is not None:
+            return found
+    return None
 
 
 def _fitted_anew(posterior: Posterior, chains: Chains, old: Mixture) -> Mixture | None:
@@ -94,8 +97,8 @@ def _fitted_anew(posterior: Posterior, chains: Chains, old: Mixture) -> Mixture 
     try:
         way = bent(places)
         u = places if way is None else way.of(places)
-        # Where walkers were held up they are one place many times.
-        u = u + SMEARED * np.std(u, axis=0) * rng.standard_normal(u.shape)
+        # Where walkers were held up they are one place many times; moved along what they spread over, not across it.
+        u = u + SMEARED * rng.standard_normal(u.shape) @ np.linalg.cholesky(np.atleast_2d(np.cov(u.T))).T
         found = widened(replace(fit_mixture(u, rng), bend=way), u, WIDE)
     except np.linalg.LinAlgError:
         return None

@@ -210,7 +210,7 @@ def _next_look(chains: Chains, found: Convergence, settings: Settings) -> int:
     guess = int(np.ceil(needed * 1.02)) + found.burn
     if chains.mixture is not None:
         judged, twice = offers(chains), 2 * steps - chains.learned
-        if not judged.good:
+        if not _good(chains):
             return blocks(twice)
         for_z = chains.learned + _proposals_for_z(judged) / chains.log_posterior[:, 0].size
         return blocks(min(max(guess, for_z, steps + BLOCK), twice))
@@ -338,7 +338,7 @@ class _Walk:
         self.known = learn(self.posterior, self.chains)
 
     def mend(self) -> bool:
-        """Have a mixture propose from now on where it held walkers up, too; False if it was mended often enough."""
+        """Have a better mixture propose from now on; False if it was mended often enough, or cannot be."""
         if self.chains.mixture is None or len(self.chains.lessons) >= MOST_MENDINGS:
             return False
         mixture = mended(self.posterior, self.chains)

@@ -12,7 +12,7 @@ from bayesmembrane.calibration.posterior import Evaluation, Outcome, Outcomes, P
 from bayesmembrane.calibration.run import RunSettings, sample
 from bayesmembrane.calibration.sampling import walk
 from bayesmembrane.calibration.sampling.chains import Chains
-from bayesmembrane.calibration.sampling.leaps import BLOCK, blocks, leap, offers
+from bayesmembrane.calibration.sampling.leaps import BLOCK, blocks, leap, mended, offers
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture
 from bayesmembrane.calibration.sampling.segments import Segments
 from bayesmembrane.calibration.sampling.walk import Meanwhile, Sampled, Settings, run_ensembles
@@ -269,3 +269,24 @@ def test_a_bent_valley_is_followed(tmp_path: Path) -> None:
     u = rng.standard_normal((9, 5))
     assert np.array_equal(stored.mixture.bend.back(u), found.chains.mixture.bend.back(u))  # type: ignore[union-attr]
     assert np.array_equal(stored.mixture.bend.of(u), found.chains.mixture.bend.of(u))  # type: ignore[union-attr]
+
+
+class Straight(Sheet):
+    """What is only asked for its size."""
+
+    size = 3
+
+
+def test_a_narrow_straight_valley_is_fitted_as_it_is() -> None:
+    """States that are moved a little, lest one place many times were a component, are moved along it."""
+    rng = np.random.default_rng(72)
+    root = np.linalg.cholesky(0.0001 * np.eye(3) + np.ones((3, 3)))
+    x = rng.standard_normal((2, 100, 16, 3)) @ root.T
+    wide = Mixture(np.zeros(1), np.zeros((1, 3)), np.eye(3)[None], 5.0)
+    chains = Chains(x, np.zeros(x.shape[:3]), (), Outcomes(), 0.0, mixture=wide)
+    found = mended(Straight(), chains)  # type: ignore[arg-type]
+    assert found is not None
+    assert found.bend is None
+    z = rng.standard_normal((2000, 3)) @ root.T
+    exact = Mixture(np.zeros(1), np.zeros((1, 3)), root[None], 1e6)
+    assert np.mean(found.log_density(z)) > np.mean(exact.log_density(z)) - 0.4

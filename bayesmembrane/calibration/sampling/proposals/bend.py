@@ -15,7 +15,7 @@ from bayesmembrane.ground.symmetric import eigh
 LONG = 4
 """Directions at most that a valley may bend along."""
 DEGREES = (2, 3, 4)
-PER_TERM = 5  # draws for each coefficient
+PER_TERM = 5  # distinct draws for each coefficient
 FARTHEST = 3.5  # standard deviations of the draws beyond which a valley is taken to go on as it is there
 WORTH = 0.3  # ln of the held-out volume by which draws must lie closer, for a bend to be worth it
 RIDGE, FLAT = 1e-8, 1e-12
@@ -73,28 +73,34 @@ class Bend:
 
 
 def bent(z: Array) -> Bend | None:
-    """The bend of the valley of draws z (n, k): of the degree that held-out draws ask for; None if they ask for none.
+    """The bend of the valley of draws z (n, k): of the degree that held-out places ask for; None if they ask for none.
 
-    Raises `LinAlgError` where the draws fill no volume.
+    Draws may be the same place many times: all of those are held out, or none. None, too, where they fill no volume, or
+    next to none in some direction.
     """
     k = z.shape[1]
-    if k < 2 or len(z) < 4 * PER_TERM:
+    # By one coordinate: places differ in all of them.
+    place = np.unique(z[:, 0], return_inverse=True)[1]
+    if k < 2 or np.max(place) < 4 * PER_TERM:
         return None
-    centre, scale = np.mean(z, axis=0), np.std(z, axis=0)
+    centre = np.mean(z, axis=0)
     values, vectors = eigh(np.atleast_2d(np.cov(z.T)))
-    if not np.all(values > FLAT * np.max(values)) or not np.all(scale > 0):
-        raise np.linalg.LinAlgError("the draws fill no volume")
+    if not np.all(values > FLAT * np.max(values)):
+        return None
     root: Array = np.ascontiguousarray((vectors * np.sqrt(values))[:, ::-1], dtype=float)
     inverse: Array = np.asarray(np.linalg.inv(root), dtype=float)
     w = (z - centre) @ inverse.T
-    held = np.arange(len(w)) % 3 == 2
+    held = np.random.default_rng(0).permutation(np.max(place) + 1)[place] % 3 == 2
+    distinct = len(np.unique(place[~held]))
     choices = [(_volume(w[held]) - WORTH, 0)]
     for degree in DEGREES:
-        if PER_TERM * len(terms_of(_long(k), degree)) > np.count_nonzero(~held):
+        if PER_TERM * len(terms_of(_long(k), degree)) > distinct:
             break
         tried = Bend(np.zeros(k), np.eye(k), np.eye(k), _coefficients(w[~held], degree), degree)
         choices.append((_volume(tried.of(w[held])), degree))
-    degree = min(choices)[1]
+    volume, degree = min(choices)
+    if not np.isfinite(volume):  # nine tenths of all are one place
+        return None
     return Bend(centre, root, inverse, _coefficients(w, degree), degree) if degree else None
 
 
@@ -105,7 +111,7 @@ def _long(k: int) -> int:
 def _volume(w: Array) -> float:
     """ln of it, of draws (n, k): by the spread of each coordinate, the middle nine tenths."""
     low, high = np.quantile(w, [0.05, 0.95], axis=0)
-    return float(np.sum(np.log(high - low)))
+    return float(np.sum(np.log(high - low))) if np.all(high > low) else -np.inf
 
 
 def _coefficients(w: Array, degree: int) -> Array:

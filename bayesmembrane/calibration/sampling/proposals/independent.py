@@ -52,7 +52,7 @@ STATES = 256  # of those that walks may begin at
 class Independent:
     """A mixture to draw proposals from, some states (S, k) distributed as the posterior, nearly, and how good it is.
 
-    The states are told without the bend of the mixture.
+    The states are x; while it is learned they are scores, without the bend of the mixture.
     """
 
     mixture: Mixture

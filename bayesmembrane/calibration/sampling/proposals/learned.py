@@ -35,7 +35,7 @@ WALK_SHARE, JUMP_SHARE, LEARN_FROM = 0.4, 0.3, 2000
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """What proposals of the normal ``scores`` are made from; None where there is nothing to learn from."""
+    """What proposals are made from, of normal ``scores``; what is None had nothing to learn from."""
 
     scores: Scores
     emulator: Emulator | None = None

@@ -10,6 +10,8 @@ import numpy as np
 from bayesmembrane.calibration.sampling.proposals.bend import Bend
 from bayesmembrane.ground.parameters import Array, Normal, Prior
 
+ROUND_OFF = 1e-9  # of a score that was bent and is told back
+
 
 @dataclass(frozen=True, eq=False)
 class Scores:
@@ -62,7 +64,7 @@ class Scores:
             low, high = prior.TOLD
             value = prior.log_density(prior.from_scores(np.clip(z[:, i], low, high)))
             total -= 0.5 * (z[:, i] ** 2 + np.log(2 * np.pi)) + value
-            total[(z[:, i] < low) | (z[:, i] > high)] = -np.inf
+            total[(z[:, i] < low - ROUND_OFF) | (z[:, i] > high + ROUND_OFF)] = -np.inf
         return total
 
     def log_prior(self, z: Array) -> Array:
@@ -73,7 +75,7 @@ class Scores:
             z, level = self.bend.back(z), level + self.bend.log_stretch
         d = (z - mean) / sd
         value = level - 0.5 * np.einsum("bi,bi->b", d, d)
-        return np.where(np.all((z >= low) & (z <= high), axis=1), value, -np.inf)
+        return np.where(np.all((z >= low - ROUND_OFF) & (z <= high + ROUND_OFF), axis=1), value, -np.inf)
 
     @cached_property
     def _told(self) -> list[tuple[int, Prior]]:
@@ -82,6 +84,6 @@ class Scores:
     @cached_property
     def _normals(self) -> tuple[Array, Array, Array, Array]:
         """Mean, deviation, least and largest value of every score, (k,) each."""
-        of = [(p.mean, p.sd, -np.inf, np.inf) if isinstance(p, Normal) else (0.0, 1.0, *p.TOLD) for p in self.priors]
+        of = [(p.mean, p.sd, -np.inf, np.inf) if type(p) is Normal else (0.0, 1.0, *p.TOLD) for p in self.priors]
         mean, sd, low, high = np.array(of, dtype=float).reshape(-1, 4).T
         return mean, sd, low, high

@@ -1,5 +1,6 @@
 """Normal scores and bends: other coordinates of the same density, in which moves leave it as it is."""
 
+from dataclasses import replace
 from typing import Any
 
 import emcee
@@ -9,12 +10,15 @@ from scipy.stats import kstest, norm
 
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.proposals.bend import FARTHEST, Bend, bent
+from bayesmembrane.calibration.sampling.proposals.collapsed import collapsed
 from bayesmembrane.calibration.sampling.proposals.ensemble import ensemble_moves
 from bayesmembrane.calibration.sampling.proposals.jumping import jumping
-from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture
+from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture, widened
+from bayesmembrane.calibration.sampling.proposals.proposing import proposing
 from bayesmembrane.calibration.sampling.proposals.scored import Scored, scores_of
 from bayesmembrane.calibration.sampling.proposals.scores import Scores
 from bayesmembrane.calibration.sampling.proposals.scoring import among_scores
+from bayesmembrane.calibration.sampling.weights import worth
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.parameters import HalfNormal, LogNormal, Lomax, Normal, Uniform
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -103,8 +107,26 @@ def test_draws_that_are_not_bent_get_no_bend() -> None:
     assert bent(rng.standard_normal((3000, 4)) @ rng.standard_normal((4, 4))) is None
     assert bent(rng.standard_normal((3000, 1))) is None
     assert bent(rng.standard_normal((15, 3))) is None
-    with pytest.raises(np.linalg.LinAlgError):
-        bent(np.ones((100, 1)) * np.arange(3))
+    assert bent(np.ones((100, 1)) * np.arange(3)) is None
+    assert bent(np.repeat(rng.standard_normal((60, 3)), [4000] + [1] * 59, axis=0)) is None
+
+
+@pytest.mark.parametrize("distinct", [60, 300])
+def test_places_that_were_stood_at_many_times_are_no_bend(distinct: int) -> None:
+    rng = np.random.default_rng(10)
+    often = rng.choice(distinct, 4000, p=rng.dirichlet(np.full(distinct, 0.5)))
+    assert bent(rng.standard_normal((distinct, 5))[often]) is None
+
+
+def test_a_place_at_an_end_of_the_support_stays_possible() -> None:
+    """Whatever round-off a bend adds to its score."""
+    scores = Scores(PRIORS, bend(len(PRIORS)))
+    rng = np.random.default_rng(11)
+    x = np.stack([p.draw(rng, 300) for p in PRIORS], axis=1)
+    x[:100, 1], x[100:200, 1], x[200:, 2] = 0.0, 1.0, 0.0
+    z = scores.of(x)
+    assert np.all(np.isfinite(scores.log_stretch(z)))
+    assert np.all(np.isfinite(scores.log_prior(z)))
 
 
 def test_a_bend_goes_on_as_it_is_beyond_the_draws() -> None:
@@ -160,3 +182,32 @@ def test_moves_among_scores_leave_coordinates_as_they_are_distributed(scores: Sc
     assert np.mean(np.any(end != x, axis=1)) > 0.3
     for i, p in enumerate(PRIORS):
         assert kstest(norm.cdf(p.scores(end[:, i])), "uniform").pvalue > 1e-8
+
+
+def test_proposals_of_effects_have_the_integral_of_prior_draws() -> None:
+    """Of all coordinates or of shapes alone, straight or bent: weights are right where priors are not normal, too."""
+    stretch = np.linspace(1.1, 2.5, 12)
+    force = 0.15 * (stretch - stretch**-2) + 1e-2 * np.random.default_rng(12).standard_normal(12)
+    m = Measurement(0.05 * (stretch - 1), force, Uniaxial(0.05, 0.01), Specimen("band", 5e-4))
+    p, rng = Posterior(hypothesis("neo_hookean", ["permanent_set"]), m), np.random.default_rng(13)
+    shape = collapsed(p)
+    assert shape is not None
+    s = shape.part(p.prior.draw(rng, 40_000))
+    told = shape.evaluate(s).log_likelihood
+    w = np.exp(told - np.max(told))
+    wanted = np.log(np.mean(w)) + np.max(told)
+    x = p.prior.draw(rng, 3000)
+    x[:, 1:-1] = shape.whole(s[rng.choice(len(s), 3000, p=w / np.sum(w))])[:, 1:-1]
+    given = shape.residuals(shape.evaluate(shape.part(x)).force).given()
+    x[:, 0], x[:, -1] = given.drawn(rng.random((3000, 2)))
+    for of, places in ((scores_of(p), x), (shape.scores, x[:, 1:-1])):
+        z = of.of(places) + 0.05 * rng.standard_normal(places.shape)
+        for way in (None, bend(z.shape[1])):
+            u = z if way is None else way.of(z)
+            proposal = proposing(p, replace(widened(fit_mixture(u, rng), u), bend=way))
+            made = proposal.solved(proposal.drawn(rng, 20_000))
+            found, ok = worth(made.log_weights), made.log_weights > np.max(made.log_weights) - 50
+            assert found.good
+            assert found.log_mean == pytest.approx(wanted, abs=6 * found.log_mean_sd + 2e-3)
+            again = proposal.log_weights(made.x[ok], made.log_posterior[ok])
+            assert again == pytest.approx(made.log_weights[ok], abs=1e-3)
