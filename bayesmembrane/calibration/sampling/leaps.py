@@ -10,7 +10,7 @@ import numpy as np
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.growing import picked
-from bayesmembrane.calibration.sampling.proposals.bend import bent
+from bayesmembrane.calibration.sampling.proposals.bend import bend_of, straight
 from bayesmembrane.calibration.sampling.proposals.filling import NEAR, around_largest, joined
 from bayesmembrane.calibration.sampling.proposals.generator import generator_of
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture, widened
@@ -91,12 +91,13 @@ def mended(posterior: Posterior, chains: Chains) -> Mixture | None:
 
 
 def _fitted_anew(posterior: Posterior, chains: Chains, old: Mixture) -> Mixture | None:
+    """One for states of the walk, with heavier tails than it would have by itself."""
     rng = np.random.default_rng(chains.steps)
     x, _ = _walked(chains, chains.steps // 4)
     places = proposing(posterior, replace(old, bend=None)).places(x[rng.permutation(len(x))[:FITTED_TO]])
     try:
-        way = bent(places)
-        u = places if way is None else way.of(places)
+        way = bend_of(places)
+        u = straight(way, places)
         # Where walkers were held up they are one place many times; moved along what they spread over, not across it.
         u = u + SMEARED * rng.standard_normal(u.shape) @ np.linalg.cholesky(np.atleast_2d(np.cov(u.T))).T
         found = widened(replace(fit_mixture(u, rng), bend=way), u, WIDE)
@@ -106,7 +107,9 @@ def _fitted_anew(posterior: Posterior, chains: Chains, old: Mixture) -> Mixture 
 
 
 def _with_more(posterior: Posterior, chains: Chains, old: Mixture) -> Mixture | None:
-    """A walker stands where w = p / g is large, which a few thousand weights of offers do not show where that is a
+    """The same with components where walkers are held up.
+
+    A walker stands where w = p / g is large, which a few thousand weights of offers do not show where that is a
     small place; the walkers do, for they are distributed as the posterior, nearly.
     """
     flat, lp = _walked(chains, chains.learned)

@@ -39,7 +39,7 @@ they have to walk along a narrow valley."""
 DOUBTED = 5000  # draws of a mixture after which it is looked at for the first time
 GIVEN_UP = 2 * DOUBTED
 """Draws from which on a mixture whose weights are not good is given up; until then no draw of it counts."""
-MOST_MENDINGS, STRICTLY, K_HAT_MENDED = 40, 24, 0.5
+MOST_MENDINGS, STRICT_MENDINGS, K_HAT_MENDED = 40, 24, 0.5
 """Times that a mixture is mended before ensembles walk instead; and k-hat that is asked of one that was mended, as long
 as that has been done no more often than the second of these: what needed to be mended once may still lack a place that
 few proposals have met, and what is asked of others would not show it. (Mooney-Rivlin with relaxation, replicate 10 of
@@ -185,7 +185,7 @@ def _good(chains: Chains) -> bool:
     if chains.mixture is None:
         return True
     found = offers(chains)
-    mending = 0 < len(chains.lessons) < STRICTLY
+    mending = 0 < len(chains.lessons) < STRICT_MENDINGS
     return found.good and (not mending or found.k_hat < K_HAT_MENDED)
 
 

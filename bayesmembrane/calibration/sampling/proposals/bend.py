@@ -72,7 +72,12 @@ class Bend:
         return monomials(np.clip(w[:, : self.long], -FARTHEST, FARTHEST), self._terms)
 
 
-def bent(z: Array) -> Bend | None:
+def straight(bend: Bend | None, z: Array) -> Array:
+    """z (n, k) as it is told along a bend; as it is if there is none."""
+    return z if bend is None else bend.of(z)
+
+
+def bend_of(z: Array) -> Bend | None:
     """The bend of the valley of draws z (n, k): of the degree that held-out places ask for; None if they ask for none.
 
     Draws may be the same place many times: all of those are held out, or none. None, too, where they fill no volume, or

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesmembrane.calibration.posterior import Outcomes, Posterior, weighed
-from bayesmembrane.calibration.sampling.proposals.bend import Bend, bent
+from bayesmembrane.calibration.sampling.proposals.bend import Bend, bend_of, straight
 from bayesmembrane.calibration.sampling.proposals.collapsed import Collapsed, collapsed
 from bayesmembrane.calibration.sampling.proposals.emulator import Allowed, Emulator, Solved, emulate
 from bayesmembrane.calibration.sampling.proposals.filling import Filled, filled, joined
@@ -163,9 +163,10 @@ class _Learning:
         good = tried.possible
         states = good.x[tempered(good.log_posterior, self.walkers / 2, self.walkers, self.rng)]
         draws = self.learned(tried, states, LEARN_MORE if bend else LEARN_FROM, snapshots)
-        way = bent(draws) if bend else None
-        mixture = replace(fit_mixture(_told(way, draws), self.rng), bend=way)
-        return self.judged(widened(mixture, _told(way, draws)), tried, EACH)
+        way = bend_of(draws) if bend else None
+        u = straight(way, draws)
+        mixture = replace(fit_mixture(u, self.rng), bend=way)
+        return self.judged(widened(mixture, u), tried, EACH)
 
     def judged(self, mixture: Mixture, tried: Tried, count: int) -> tuple[Independent | None, Tried]:
         """What ``count`` draws say of a mixture, None if none is possible, and they with what was tried."""
@@ -190,8 +191,8 @@ class _Learning:
         """The mixture with what it lacks, beside one that is learned from all that this took to find."""
         whole, tried = self._filling(best)
         states = _resampled(tried.x, whole.log_weights, self.walkers, self.rng)
-        way = best.mixture.bend
-        fitted = fit_mixture(_told(way, self.learned(tried, states, LEARN_MORE, SNAPSHOTS)), self.rng)
+        draws = self.learned(tried, states, LEARN_MORE, SNAPSHOTS)
+        fitted = fit_mixture(straight(best.mixture.bend, draws), self.rng)
         mixture = joined([(whole.mixture, 1 - FITTED), (fitted, FITTED)])
         return self.judged(mixture, tried, CHECKED)[0]
 
@@ -220,11 +221,6 @@ class _Learning:
             if emulator is not None:
                 draws = _walked(emulator, states, self.rng, snapshots)
         return _parted(draws, self.rng)
-
-
-def _told(bend: Bend | None, x: Array) -> Array:
-    """x (B, k) in the coordinates of a bend, if there is one."""
-    return x if bend is None else bend.of(x)
 
 
 def _resampled(x: Array, log_weights: Array, count: int, rng: np.random.Generator) -> Array:

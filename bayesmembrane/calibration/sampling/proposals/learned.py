@@ -12,7 +12,7 @@ import numpy as np
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.growing import picked
-from bayesmembrane.calibration.sampling.proposals.bend import bent
+from bayesmembrane.calibration.sampling.proposals.bend import bend_of, straight
 from bayesmembrane.calibration.sampling.proposals.emulator import Emulator, emulate
 from bayesmembrane.calibration.sampling.proposals.ensemble import ensemble_moves
 from bayesmembrane.calibration.sampling.proposals.jumping import jumping
@@ -43,6 +43,7 @@ class Learned:
 
     def moves(self) -> list[tuple[Any, float]]:
         """emcee's moves with their weights, which add up to one."""
+        # On demand, as emcee is.
         from bayesmembrane.calibration.sampling.proposals.scoring import among_scores
 
         moves: list[tuple[Any, float]] = []
@@ -77,8 +78,8 @@ def learn(posterior: Posterior, chains: Chains) -> Learned:
         emulator = emulate(Scored(posterior, scores), z, rng)
     with suppress(np.linalg.LinAlgError):
         some = z[rng.permutation(len(z))[:LEARN_FROM]]
-        way = bent(some)
-        mixture = replace(fit_mixture(some if way is None else way.of(some), rng), bend=way)
+        way = bend_of(some)
+        mixture = replace(fit_mixture(straight(way, some), rng), bend=way)
     return Learned(scores, emulator, mixture)
 
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bayesmembrane.calibration.sampling.proposals.bend import Bend
+from bayesmembrane.calibration.sampling.proposals.bend import Bend, straight
 from bayesmembrane.ground.parameters import Array, Normal, Prior
 
 ROUND_OFF = 1e-9  # of a score that was bent and is told back
@@ -44,7 +44,7 @@ class Scores:
             z = x.copy()
             for i, prior in self._told:
                 z[:, i] = np.clip(prior.scores(x[:, i]), *prior.TOLD)
-        return z if self.bend is None else self.bend.of(z)
+        return straight(self.bend, z)
 
     def back(self, z: Array) -> Array:
         """x (B, k) of z (B, k)."""

@@ -9,7 +9,6 @@ import pytest
 from scipy.stats import kstest, norm
 
 from bayesmembrane.calibration.posterior import Posterior
-from bayesmembrane.calibration.sampling.proposals.bend import FARTHEST, Bend, bent
 from bayesmembrane.calibration.sampling.proposals.collapsed import collapsed
 from bayesmembrane.calibration.sampling.proposals.ensemble import ensemble_moves
 from bayesmembrane.calibration.sampling.proposals.jumping import jumping
@@ -23,24 +22,9 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.parameters import HalfNormal, LogNormal, Lomax, Normal, Uniform
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from tests.calibration.sampling.proposals.test_bend import bend
 
 PRIORS = (Normal(1.0, 2.0), Uniform(0.0, 1.0), HalfNormal(0.3), LogNormal(30.0, 1.5), Lomax(0.4))
-
-
-def sheet(rng: np.random.Generator, count: int, k: int = 5) -> np.ndarray:
-    """Draws of a bent valley: two coordinates are next to polynomials of the three that are long."""
-    z = rng.standard_normal((count, k))
-    t, far = z[:, : min(3, k - 2)], min(3, k - 2)
-    z[:, far] = 0.3 * t[:, 0] ** 2 - 0.1 * t[:, 0] * t[:, -1] + 0.01 * z[:, far]
-    z[:, far + 1] = 0.3 * t[:, -1] ** 2 + 0.05 * t[:, 0] ** 3 + 0.01 * z[:, far + 1]
-    z[:, :far] *= 3.0
-    return z
-
-
-def bend(k: int) -> Bend:
-    found = bent(sheet(np.random.default_rng(1), 3000, k))
-    assert found is not None
-    return found
 
 
 def each() -> list[Scores]:
@@ -92,32 +76,6 @@ def test_normal_priors_alone_leave_coordinates_as_they_are() -> None:
     assert among_scores(move := emcee.moves.DEMove(), scores) is move
 
 
-def test_a_bent_valley_is_straightened() -> None:
-    """Densities follow it more closely."""
-    rng = np.random.default_rng(5)
-    z, held = sheet(rng, 4000), sheet(rng, 4000)
-    found = bent(z)
-    assert found is not None
-    of_straight = fit_mixture(found.of(z), rng).log_density(found.of(held)) - found.log_stretch
-    assert np.mean(of_straight) > np.mean(fit_mixture(z, rng).log_density(held)) + 0.5
-
-
-def test_draws_that_are_not_bent_get_no_bend() -> None:
-    rng = np.random.default_rng(6)
-    assert bent(rng.standard_normal((3000, 4)) @ rng.standard_normal((4, 4))) is None
-    assert bent(rng.standard_normal((3000, 1))) is None
-    assert bent(rng.standard_normal((15, 3))) is None
-    assert bent(np.ones((100, 1)) * np.arange(3)) is None
-    assert bent(np.repeat(rng.standard_normal((60, 3)), [4000] + [1] * 59, axis=0)) is None
-
-
-@pytest.mark.parametrize("distinct", [60, 300])
-def test_places_that_were_stood_at_many_times_are_no_bend(distinct: int) -> None:
-    rng = np.random.default_rng(10)
-    often = rng.choice(distinct, 4000, p=rng.dirichlet(np.full(distinct, 0.5)))
-    assert bent(rng.standard_normal((distinct, 5))[often]) is None
-
-
 def test_a_place_at_an_end_of_the_support_stays_possible() -> None:
     """Whatever round-off a bend adds to its score."""
     scores = Scores(PRIORS, bend(len(PRIORS)))
@@ -127,14 +85,6 @@ def test_a_place_at_an_end_of_the_support_stays_possible() -> None:
     z = scores.of(x)
     assert np.all(np.isfinite(scores.log_stretch(z)))
     assert np.all(np.isfinite(scores.log_prior(z)))
-
-
-def test_a_bend_goes_on_as_it_is_beyond_the_draws() -> None:
-    found = bend(5)
-    far = found.back(np.outer([2 * FARTHEST, 3 * FARTHEST], [1.0, 0.0, 0.0, 0.0, 0.0]))
-    step = FARTHEST * found.root[:, 0]
-    assert far[1] - far[0] == pytest.approx(step, abs=1e-9)
-    assert np.all(np.isfinite(found.back(np.full((1, 5), 1e6))))
 
 
 def test_a_posterior_of_scores_is_that_of_coordinates_stretched() -> None:
