@@ -29,6 +29,7 @@ from bayesmembrane.physics.effects.base import (
 )
 from bayesmembrane.physics.frame import in_series
 from bayesmembrane.physics.mechanics.solution import Status
+from bayesmembrane.physics.shared import Change, Shared
 
 Law = Any
 """(deflection (B, N), excess (B, N) or None) -> (force (B, N), slope (B, N)), and ``status`` (B,) where it is nan."""
@@ -53,14 +54,14 @@ class Composition:
     path: Motion
 
     @cached_property
-    def _places(self) -> list[tuple[Effect, slice]]:
+    def placed(self) -> list[tuple[Effect, slice]]:
         """Effects in the order in which they act, with their places in the vector of all effect parameters."""
         ends = np.cumsum([0, *(len(e.coordinates) for e in self.effects)])
         where = {e.name: slice(int(a), int(b)) for e, a, b in zip(self.effects, ends[:-1], ends[1:], strict=True)}
         return [(e, where[e.name]) for e in ordered(self.effects)]
 
     def _acting(self, stage: type[Any], x: Array) -> list[tuple[Any, Array]]:
-        return [(e, e.within_bounds(x[:, at])) for e, at in self._places if isinstance(e, stage)]
+        return [(e, e.within_bounds(x[:, at])) for e, at in self.placed if isinstance(e, stage)]
 
     @property
     def yields(self) -> bool:
@@ -164,35 +165,32 @@ def differences(
     Differences on the admissible side, in one batch; a material coordinate varies the law to first order. What only the
     load cell adds needs no other film.
     """
-    changes = [_Change(x, MATERIAL_STEP, law.varied(MATERIAL_STEP * rate)) for rate in np.moveaxis(jacobian, 2, 0)]
+    changes = [Change(x, MATERIAL_STEP, law.varied(MATERIAL_STEP * rate)) for rate in np.moveaxis(jacobian, 2, 0)]
     others = iter(mounted)
     for i, effect in enumerate(e for e in composition.effects for _ in e.coordinates):
         moved, step = _moved(composition, x, i)
-        film = None if isinstance(effect, Sensor) else next(others) if isinstance(effect, Geometry) else law
-        changes.append(_Change(moved, step[:, None], film))
-    laws = [c.law for c in changes if c.law is not None]
-    points = np.concatenate([c.x for c in changes if c.law is not None])
+        changes.append(Change(moved, step[:, None], next(others) if isinstance(effect, Geometry) else law, effect))
     if composition.yields:
-        _, plain, why = composition.closed(law, x)
-        beside = composition.closed(type(law).stack(laws), points, np.tile(plain, (len(laws), 1)))[1]
+        forces, why = _yielding(composition, law, x, changes)
     else:
-        _, force, why = composition.closed(type(law).stack([law, *laws]), np.concatenate([x, points]))
-        plain, beside = np.split(force, [len(x)])
-    each = iter(np.split(beside, len(laws)))
-    forces = [plain, *(plain if c.law is None else next(each) for c in changes)]
+        forces, why = Shared(composition.placed, composition.path, law, x, changes).forces(), law.status
     at = np.concatenate([x, *(c.x for c in changes)])
-    reading, status = composition.read(at, np.concatenate(forces), np.tile(why[: len(x)], len(forces)))
+    reading, status = composition.read(at, np.concatenate(forces), np.tile(why, len(forces)))
     first, *rest = np.split(reading, len(forces))
     slopes = [(r - first) / c.step for r, c in zip(rest, changes, strict=True)]
     return first, status[: len(x)], np.stack(slopes, axis=2)
 
 
-@dataclass(frozen=True)
-class _Change:
-    """Another point x (B, k) for a difference, ``step`` away, a number or (B, 1), and the law of its films; None where
-    these are as before and only the reading changes.
-    """
+def _yielding(
+    composition: Composition, law: Law, x: Array, changes: Sequence[Change]
+) -> tuple[list[Array], NDArray[np.int8]]:
+    """Forces (B, N) of films with effect parameters x (B, k), and of each change; and `Status` (B,) where they are nan.
 
-    x: Array
-    step: float | Array
-    law: Law | None
+    Each film lies elsewhere, so that nothing is shared but with what only the load cell adds.
+    """
+    _, plain, why = composition.closed(law, x)
+    moved = [c for c in changes if not isinstance(c.effect, Sensor)]
+    laws, points = [c.law for c in moved], np.concatenate([c.x for c in moved])
+    beside = composition.closed(type(law).stack(laws), points, np.tile(plain, (len(laws), 1)))[1]
+    each = iter(np.split(beside, len(laws)))
+    return [plain, *(plain if isinstance(c.effect, Sensor) else next(each) for c in changes)], why

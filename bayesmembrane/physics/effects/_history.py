@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from bayesmembrane.data.motion import Motion
-from bayesmembrane.ground.compiling import compiled
+from bayesmembrane.ground.compiling import compiled, for_kernel
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
-from bayesmembrane.physics.effects.base import EffectParameter, running_max
+from bayesmembrane.physics.effects.base import EffectParameter
 
 EXPONENT = EffectParameter(
     "exponent", "-", "power of the deflection with which it grows", LogNormal(2.0, 0.5), (0.4, 12.0)
@@ -29,6 +29,8 @@ JUMP = EffectParameter("jump", "-", "part of it that comes at once", Uniform(0.0
 SECOND = EffectParameter(
     "second", "-", "part of that which comes in a second event", HalfNormal(0.3), (0.0, 1.0), begin=0.0
 )
+TOGETHER = 8
+"""Films that are relaxed side by side."""
 STILL = 1e-7
 """Of the full range: a smaller step is none, and the mean of a power over it the power itself."""
 
@@ -50,20 +52,31 @@ def growth(
     growing when it is repeated, and the last one while the film is stretched, be it held.
     """
     x = np.maximum(deflection, 0.0) / path.full_range
-    load = x**exponent
-    power = running_max(load)
-    first = (1 + saturation) * power / (1 + saturation * power)
-    if not np.any(repeated > 0):
-        return first
-    step = np.diff(x * load, axis=-1, prepend=0.0)
-    again = np.maximum(step, 0.0)
-    if np.any(np.asarray(creeps) > 0):
-        moved = np.diff(x, axis=-1, prepend=0.0)
-        still = np.abs(moved) < STILL
-        mean = np.where(still, (exponent + 1) * load, step / np.where(still, 1.0, moved))
-        held = mean * np.diff(path.clock, prepend=0.0) * (path.pace / path.full_range)
-        again = (1 - creeps) * again + creeps * held
-    return np.asarray((1 - repeated) * first + repeated * np.cumsum(again, axis=-1))
+    load = for_kernel(x**exponent)
+    x = for_kernel(x if x.shape == load.shape else np.broadcast_to(x, load.shape))
+    each = [for_kernel(np.broadcast_to(v, (len(load), 1))[:, 0]) for v in (exponent, repeated, saturation, creeps)]
+    gap, pace, out = np.diff(path.clock, prepend=0.0), path.pace / path.full_range, np.empty(load.shape)
+    _grown(x, load, *each, gap, pace, out)
+    return out
+
+
+@compiled(error_model="numpy")
+def _grown(x, load, exponent, repeated, saturation, creeps, gap, pace, out):  # type: ignore[no-untyped-def]
+    """`growth` of x and load = x^exponent (B, N), with shapes (B,), ``gap`` (N,) of the clock and the pace over D."""
+    for b in range(x.shape[0]):
+        power, total, whole, at = 0.0, 0.0, 0.0, 0.0
+        s, c, q = saturation[b], repeated[b], creeps[b]
+        for n in range(x.shape[1]):
+            power = max(power, load[b, n])
+            first = (1.0 + s) * power / (1.0 + s * power)
+            before, whole = whole, x[b, n] * load[b, n]
+            step, moved, at = whole - before, x[b, n] - at, x[b, n]
+            again = max(step, 0.0)
+            if q > 0.0:
+                mean = (exponent[b] + 1.0) * load[b, n] if abs(moved) < STILL else step / moved
+                again = (1.0 - q) * again + q * (mean * gap[n] * pace)
+            total += again
+            out[b, n] = (1.0 - c) * first + c * total
 
 
 def relaxing(values: Array, gap: Array, times: Array, shares: Array | None = None) -> Array:
@@ -74,7 +87,7 @@ def relaxing(values: Array, gap: Array, times: Array, shares: Array | None = Non
     and s = (1 - e) / g. The values come from zero to the first one over its own gap. What relaxes with the way has
     gaps and lengths of that instead.
     """
-    out = np.zeros_like(values)
+    out = np.empty(values.shape)
     shares = np.full(times.shape, 1 / times.shape[1]) if shares is None else np.ascontiguousarray(shares, dtype=float)
     _relax(values, np.ascontiguousarray(gap, dtype=float), np.ascontiguousarray(times, dtype=float), shares, out)
     return out
@@ -82,19 +95,37 @@ def relaxing(values: Array, gap: Array, times: Array, shares: Array | None = Non
 
 @compiled(error_model="numpy")
 def _relax(values, gap, times, shares, out):  # type: ignore[no-untyped-def]
-    for b in range(values.shape[0]):
+    """Films side by side, for what relaxes waits for itself; `TOGETHER` of them, which a processor's cache holds."""
+    rows, points = values.shape
+    steps, total = np.empty((points, TOGETHER)), np.empty((points, TOGETHER))
+    e, s, h, share = np.empty(TOGETHER), np.empty(TOGETHER), np.empty(TOGETHER), np.empty(TOGETHER)
+    for first in range(0, rows, TOGETHER):
+        many = min(TOGETHER, rows - first)
+        for w in range(TOGETHER):
+            b, before = min(first + w, rows - 1), 0.0
+            for n in range(points):
+                steps[n, w] = values[b, n] - before
+                before = values[b, n]
+        total[:] = 0.0
         for t in range(times.shape[1]):
-            h, before, last, e, s = 0.0, 0.0, -1.0, 1.0, 1.0
-            for n in range(values.shape[1]):
+            last = -1.0
+            for w in range(TOGETHER):
+                e[w], s[w], h[w], share[w] = 1.0, 1.0, 0.0, shares[min(first + w, rows - 1), t]
+            for n in range(points):
                 if gap[n] != last:  # of an even clock one exponential is enough
                     last = gap[n]
-                    g = last / times[b, t]
-                    if g > 1e-6:
-                        e = np.exp(-g)
-                        s = (1.0 - e) / g
-                    else:
-                        e = 1.0 - g
-                        s = 1.0 - 0.5 * g
-                h = e * h + s * (values[b, n] - before)
-                before = values[b, n]
-                out[b, n] += shares[b, t] * h
+                    for w in range(many):
+                        g = last / times[first + w, t]
+                        if g > 1e-6:
+                            e[w] = np.exp(-g)
+                            s[w] = (1.0 - e[w]) / g
+                        else:
+                            e[w] = 1.0 - g
+                            s[w] = 1.0 - 0.5 * g
+                step, whole = steps[n], total[n]
+                for w in range(TOGETHER):
+                    h[w] = e[w] * h[w] + s[w] * step[w]
+                    whole[w] += share[w] * h[w]
+        for w in range(many):
+            for n in range(points):
+                out[first + w, n] = total[n, w]

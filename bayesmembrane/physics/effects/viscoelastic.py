@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.data.motion import Motion
+from bayesmembrane.ground.compiling import compiled, for_kernel
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Uniform
 from bayesmembrane.physics.effects._history import relaxing
 from bayesmembrane.physics.effects.base import EffectParameter, Memory
@@ -78,7 +79,18 @@ class Viscoelastic(Memory):
         spread = 10.0 ** (places * p[:, 2:3])
         share = spread ** -p[:, 5:6]
         share /= np.sum(share, axis=1, keepdims=True)
-        kept = weight * relaxing(force / weight, gap, p[:, 1:2] * spread, share)
-        relaxed = force - p[:, :1] * (force - kept)
-        least = np.minimum(force, 0.0)
-        return np.asarray(np.maximum(relaxed, least) + p[:, 3:4] * np.minimum(relaxed - least, 0.0))
+        kept = relaxing(force / weight, gap, p[:, 1:2] * spread, share)
+        out = np.empty(kept.shape)
+        _remembered(for_kernel(force), weight, kept, for_kernel(p[:, 0]), for_kernel(p[:, 3]), out)
+        return out
+
+
+@compiled(error_model="numpy")
+def _remembered(force, weight, kept, strength, withstood, out):  # type: ignore[no-untyped-def]
+    """F - strength (F - w kept) of F, w, kept (B, N), what of it pushes counting as ``withstood`` (B,)."""
+    for b in range(out.shape[0]):
+        for n in range(out.shape[1]):
+            f = force[b, n]
+            relaxed, least = f - strength[b] * (f - weight[b, n] * kept[b, n]), min(f, 0.0)
+            push = relaxed - least
+            out[b, n] = relaxed if push >= 0.0 else least + withstood[b] * push
