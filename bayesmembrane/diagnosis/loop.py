@@ -128,10 +128,11 @@ def loop(
 ) -> Loop:
     """Diagnose, sample, add what is named, and again.
 
-    A `Question` may leave the energy open: the most probable one is sampled first. Named effects or a better energy
-    make the next hypothesis; `adequate`, `ambiguous` and `unknown` end the loop, and so does a hypothesis that was
-    there before. Of an ambiguous answer as many are sampled as the settings say. More readings than `thinning.MOST`
-    are thinned and single outliers set aside, for all of it. Raises what `sample` and `diagnose` raise.
+    A `Question` may leave the energy open: the most probable one is sampled first. Named effects, what is in all
+    that is probable where sets of effects cannot be told apart, or a better energy make the next hypothesis;
+    `adequate`, `unknown` and an `ambiguous` answer without anything sure end the loop, and so does a hypothesis that
+    was there before. Of an ambiguous answer that ends it as many are sampled as the settings say. More readings than
+    `thinning.MOST` are thinned and single outliers set aside, for all of it. Raises what `sample` and `diagnose` raise.
     """
     how = settings or LoopSettings()
     for other in how.predict:
@@ -147,10 +148,10 @@ def loop(
     stage = closing.sampled(replace(found.null.hypothesis, noise=noise))
     seen, rounds = {stage.run.hypothesis.label()}, list[Round]()
     while True:
-        following = replace(found.hypothesis, noise=noise)
-        goes_on = found.explains and following.label() not in seen
+        following = replace(_following(found), noise=noise)
+        goes_on = following.label() not in seen
         after = closing.sampled(following) if goes_on else stage
-        first = found.members[: closing.settings.leaders] if found.verdict == "ambiguous" else ()
+        first = found.members[: closing.settings.leaders] if found.verdict == "ambiguous" and not goes_on else ()
         rivals = [closing.sampled(replace(j.candidate.hypothesis, noise=noise)) for j in first]
         # The readings that are left have no outliers: what was set aside at the start is told of every round.
         rounds.append(Round(replace(found, set_aside=aside), stage, after, tuple(rivals)))
@@ -160,6 +161,13 @@ def loop(
         again = partial(closing.diagnosed, replace(question, hypothesis=following, declared=True))
         stage, found = after, piece(f"diagnosis-{len(rounds)}", again)
     return Loop(tuple(rounds), closing.left(rounds[-1].diagnosis), thinning(measurement, part), others)
+
+
+def _following(found: Diagnosis) -> Hypothesis:
+    """The next model: with what is named, or what is sure of an ambiguous answer; the given one where nothing is."""
+    given, best = found.null.hypothesis, found.best.hypothesis
+    added = tuple(e for e in best.effects if e.name in found.sure)
+    return replace(best, effects=(*given.effects, *added)) if added else found.hypothesis
 
 
 @dataclass(frozen=True, eq=False)

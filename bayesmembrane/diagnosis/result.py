@@ -17,6 +17,7 @@ from bayesmembrane.diagnosis.left.shape import ResidualShape
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.reference.outliers import SetAside
 from bayesmembrane.diagnosis.separation import Experiment
+from bayesmembrane.diagnosis.thresholds import VERDICT
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.hypothesis import Hypothesis
 
@@ -90,6 +91,18 @@ class Diagnosis(Showable):
     thinned: Thinned | None = None
     set_aside: SetAside | None = None
     unsought: tuple[str, ...] = ()
+
+    @property
+    def sure(self) -> tuple[str, ...]:
+        """Effects beyond the given ones that are together in all that is probable, by name: of an ambiguous answer what
+        is known none the less; none of any other.
+        """
+        if self.verdict != "ambiguous":
+            return ()
+        names = sorted(self.probabilities.sure(), key=self.probabilities.of_effect, reverse=True)
+        while names and self.probabilities.of_effect(*names) < VERDICT.sure:
+            names.pop()
+        return tuple(sorted(names))
 
     @property
     def hypothesis(self) -> Hypothesis:

@@ -115,7 +115,7 @@ class Brief:
 
 @dataclass(frozen=True)
 class Course:
-    """The diagnoses that a first screen is about: the ``first``, those that ``named`` something, and the ``last``.
+    """The diagnoses that a first screen is about: the ``first``, those by which something was added, and the ``last``.
 
     detail : what is told of them
     sampled : the posterior of the last model, if there is one: its means are the sizes that are told
@@ -130,7 +130,8 @@ class Course:
     @property
     def telling(self) -> Diagnosis:
         """The one that the verdict rests on."""
-        return self.named[-1] if self.named and self.last.verdict == "adequate" else self.last
+        ended = self.named and self.named[-1].explains and self.last.verdict == "adequate"
+        return self.named[-1] if ended else self.last
 
 
 def of_diagnosis(d: Diagnosis) -> Brief:
@@ -153,7 +154,7 @@ def of_loop(found: Loop, *, sized: bool = True) -> Brief:
 def course_of(found: Loop) -> Course:
     """The diagnoses of a loop."""
     every = [r.diagnosis for r in found.rounds]
-    return Course(every[0], tuple(d for d in every if d.explains), every[-1])
+    return Course(every[0], tuple(r.diagnosis for r in found.rounds if r.changed or r.diagnosis.explains), every[-1])
 
 
 def _brief(course: Course, following: str, sized: bool = True) -> Brief:
@@ -191,7 +192,7 @@ def _probabilities(course: Course) -> tuple[str, ...]:
     """``98 % friction in the guide (level 12 mN)``, ``1 % no effect``: what each round named, then the last answer."""
     d = course.telling
     named, sized = (x for x in course.named if x is not d), course.detail.sized > 0
-    earlier = [_probable_set(x, set_name(x.best, x.null.names), course, sized) for x in named]
+    earlier = [_probable_set(x, "+".join(x.sure) or set_name(x.best, x.null.names), course, sized) for x in named]
     first, *others = _every(course)
     return *earlier, f"then {first}" if earlier else first, *others
 
@@ -214,8 +215,9 @@ def _every(course: Course) -> list[str]:
 
 def _probable_set(d: Diagnosis, name: str, course: Course, sized: bool) -> str:
     """A set of effects with its probability; where the answer rests on it with the sizes, as they were fitted last."""
-    p = percent(d.probabilities.effects.get(name, 0.0))
-    of = next((j.candidate for j in d.members if set_name(j.candidate, d.null.names) == name), None)
+    sure = name == "+".join(d.sure)
+    p = percent(d.probabilities.of_effect(*d.sure) if sure else d.probabilities.effects.get(name, 0.0))
+    of = next((j.candidate for j in d.members if set_name(j.candidate, d.null.names) == name), d.best if sure else None)
     if of is None or name == NOTHING or not sized:
         return f"{p} {set_title(name)}"
     if course.last is not d and set(name.split("+")) <= set(course.last.null.names):

@@ -11,7 +11,7 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import WORDS
 from bayesmembrane.words.candidates import bounds, validation_sentence
 from bayesmembrane.words.diagnosis import finding_sentence
-from bayesmembrane.words.hypothesis import spoken
+from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.moved import modulus_fitted, modulus_of, moved_sentences, settled
 from bayesmembrane.words.seen import seen
@@ -19,7 +19,7 @@ from bayesmembrane.words.seen import seen
 
 def answer(found: Loop) -> list[str]:
     """What was found and added, with the size, and how it ended."""
-    told = [finding_sentence(_settled(r)) for r in found.rounds]
+    told = [finding_sentence(_settled(r)) + _sure(r) for r in found.rounds]
     told = [told[0], *(f"With that: {s}" for s in told[1:])]
     last = found.rounds[-1]
     if last.changed:
@@ -30,10 +30,17 @@ def answer(found: Loop) -> list[str]:
     return told
 
 
+def _sure(r: Round) -> str:
+    """What is added although the answer is ambiguous."""
+    if not r.changed or r.diagnosis.explains:
+        return ""
+    return f" What is in all of them is added: {listed(map(effect_title, r.diagnosis.sure))}."
+
+
 def _settled(r: Round) -> Diagnosis:
     """The diagnosis of a round with the size of what was then added as it was sampled."""
     d = r.diagnosis
-    if not (r.changed and d.members):
+    if not (r.changed and d.explains):
         return d
     first, *others = d.members
     return replace(d, members=(replace(first, candidate=settled(first.candidate, r.after.run)), *others))

@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.weighing import Weighing, beyond_noise
+from bayesmembrane.diagnosis.reference.noise import orthonormal
 from bayesmembrane.diagnosis.thresholds import VERDICT
 
 
@@ -18,6 +19,8 @@ class Remaining:
 
     share : part of the squares beyond noise that the plain model leaves; 1 where it is the plain model's own, 0 where
         that leaves no more than noise does by chance
+    of_laws : the same part of what the effects of the model change that its energy could not; inf where they change
+        nothing
     reduced_chi2, dof : of what is left, by the measurement's own noise; the degrees of freedom of that
     carried : part of what is left beyond noise that the form error takes: smooth, and no effect
     rms : N, root mean square of the form error
@@ -26,6 +29,7 @@ class Remaining:
     """
 
     share: float
+    of_laws: float
     reduced_chi2: float
     carried: float
     rms: float
@@ -40,10 +44,11 @@ class Remaining:
 
     @property
     def strange(self) -> bool:
-        """True if it is more than noise, and more than a small error of the forms that carries it."""
+        """True if it is more than noise, more than laws are usually off, and no small error of the forms carries it."""
         by_chance = VERDICT.chance * float(np.sqrt(2.0 / self.dof))
         forms = self.carried >= VERDICT.form_carries and all(e <= VERDICT.law_small for e in self.law_errors.values())
-        return self.reduced_chi2 >= max(VERDICT.noise_chi2, 1.0 + by_chance) and not forms
+        noise = self.reduced_chi2 < max(VERDICT.noise_chi2, 1.0 + by_chance)
+        return not (noise or forms or min(self.share, self.of_laws) < VERDICT.trifle)
 
 
 def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining:
@@ -52,8 +57,10 @@ def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining
     left, before = search.excess(model), search.excess(plain)
     rest = beyond_noise(search.noise.white(model.residual - model.form), model)
     beyond = before > VERDICT.chance * float(np.sqrt(2.0 * dof))
+    changed = _changed(search, model)
     return Remaining(
         share=float(np.clip(left / before, 0.0, 1.0)) if beyond else 0.0,
+        of_laws=max(left, 0.0) / changed if changed > 0 else np.inf,
         reduced_chi2=float(np.sum(search.noise.white(search.adapted(model)) ** 2)) / dof,
         carried=1 - min(rest / left, 1.0) if left > 0 else 0.0,
         rms=float(np.sqrt(np.mean(model.form**2))),
@@ -61,3 +68,11 @@ def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining
         law_errors=model.law_errors,
         dof=dof,
     )
+
+
+def _changed(search: Weighing, model: Candidate) -> float:
+    """Squares, freed of noise, of what the effects of a model change of the force, and its energy could not."""
+    trace = search.noise.white(np.sum(model.traces, axis=0))
+    energy = orthonormal(search.noise.white(model.slopes[:, : model.hypothesis.material_size]))
+    own = trace - energy @ (energy.T @ trace)
+    return float(own @ own)

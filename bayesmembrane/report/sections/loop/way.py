@@ -41,12 +41,12 @@ def waypoints(loop: Loop) -> list[Waypoint]:
     out = [_waypoint(d, d.null, d.before, first.before, before=True)]
     for r, following in zip(loop.rounds, [*loop.rounds[1:], None], strict=True):
         d = r.diagnosis
-        if d.verdict == "ambiguous":
-            out += _undecided(r)
-        elif r.changed and following is not None and len(following.diagnosis.measurement) == len(d.measurement):
+        if r.changed and following is not None and len(following.diagnosis.measurement) == len(d.measurement):
             # The next diagnosis fits it again: one model has one error.
             again = following.diagnosis
             out.append(_waypoint(again, again.null, again.before, r.after, before=True))
+        elif d.verdict == "ambiguous":
+            out += _undecided(r)
         elif d.explains:
             stage = r.after if r.changed else None
             out.append(replace(_waypoint(d, d.best, d.after, stage, before=False), added=stage is not None))
