@@ -263,7 +263,8 @@ def _ambiguous(course: Course) -> str:
         ", yet at a size that is hardly met" if d.members and hardly_met(d.members[0].candidate, d.measurement) else ""
     )
     energy = f"{other}; " if (other := other_energy(d)) else ""
-    return f"{energy}{which}; {first} explains {_explained(d)}{size}{_beside(d)}"
+    rest = " of what is left" if course.named else ""
+    return f"{energy}{which}; {first} explains {_explained(d)}{rest}{size}{_beside(d)}"
 
 
 def _in_all(d: Diagnosis) -> str:

@@ -11,10 +11,12 @@ from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.run import Run, RunSettings, sample
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.diagnosis.loop import LoopSettings, _bridged, _by_weights, _Closing
+from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.explanation.case import Question
+from bayesmembrane.diagnosis.loop import LoopSettings, Stage, _bridged, _by_weights, _Closing, loop
 from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import LOOP
-from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.diagnosis.curves import SD, measured, triangle, white_noise
 
@@ -42,6 +44,31 @@ def test_weights_that_say_little_are_left_to_bridge(found: Run, bad: dict[str, f
 
 def test_ensembles_have_no_weights(found: Run) -> None:
     assert _by_weights(replace(found, status={**found.status, "importance": None})) is None
+
+
+def test_a_loop_goes_on_with_what_is_sure(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An offset that is in all that is probable is in the model of the second round, and in its posterior."""
+    rig, stretch = Uniaxial(), np.concatenate([np.linspace(1.05, 2, 20), np.linspace(2, 1.05, 20)])
+    force = 100 * (stretch - stretch**-2) + 8 + np.random.default_rng(4).standard_normal(40)
+    m = Measurement(rig.length * (stretch - 1), force, rig, Specimen("band", 5e-4))
+    claims, runs = list[Hypothesis](), list[Hypothesis]()
+
+    def diagnosed(self: _Closing, claim: Question) -> Diagnosis:
+        claims.append(claim.hypothesis)
+        found = diagnose(m, claim)
+        p = replace(found.probabilities, effects={"force_offset": 0.6, "force_offset+friction": 0.4})
+        return replace(found, verdict="ambiguous" if len(claims) == 1 else "adequate", probabilities=p)
+
+    def sampled(self: _Closing, claim: Hypothesis) -> Stage:
+        runs.append(claim)
+        return Stage(SimpleNamespace(hypothesis=claim), 0.0, 0.1, 0.0, 1.0, 0.9)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(_Closing, "diagnosed", diagnosed)
+    monkeypatch.setattr(_Closing, "sampled", sampled)
+    found = loop(m, hypothesis("neo_hookean"))
+    assert [[e.name for e in h.effects] for h in claims] == [[], ["force_offset"]]
+    assert [[e.name for e in h.effects] for h in runs] == [[], ["force_offset"]]
+    assert [r.changed for r in found.rounds] == [True, False]
 
 
 @pytest.mark.parametrize(

@@ -57,6 +57,16 @@ def ambiguous(named: Loop) -> Loop:
 
 
 @pytest.fixture(scope="session")
+def going_on(named: Loop) -> Loop:
+    """The same curve, had friction been sure and what is beside it not: with that nothing is missing."""
+    first, second = named.rounds
+    sets = {"friction": 0.6, "friction+mullins": 0.38, "hysteresis": 0.02}
+    p = replace(first.diagnosis.probabilities, effects=sets)
+    d = replace(first.diagnosis, verdict="ambiguous", members=first.diagnosis.ranking[:2], probabilities=p)
+    return Loop((replace(first, diagnosis=d), second), None)
+
+
+@pytest.fixture(scope="session")
 def sampled(ambiguous: Loop, named: Loop) -> Loop:
     """The same, both candidates sampled."""
     r = ambiguous.rounds[0]
