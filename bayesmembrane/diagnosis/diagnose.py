@@ -64,7 +64,9 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
     """The answer, with what was not needed to find it: power, errors on other points, what to measure next."""
     case.tell("checking on points that were set aside")
     validation = _validated(case, search, found)
-    found = _finished(search, _predicting(found, validation), _null(case, found))
+    predicts = _predicting(found, validation)
+    firm = _firm(search, predicts, _null(case, found))
+    found = _finished(search, predicts, _null(case, found), firm)
     known = found.verdict in ("named", "ambiguous", "material")
     answer = found.members[0].candidate if found.members else _nearest(found, _null(case, found))
     left = remaining(search, answer, _null(case, found))
@@ -100,6 +102,7 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
         validation=validation,
         experiments=_experiments(search, found, null),
         unsought=tuple(e.name for e in unsought(case.measurement, null.hypothesis)),
+        firm=firm,
     )
 
 
@@ -128,14 +131,30 @@ def _predicting(found: Verdict, validation: HeldOut | None) -> Verdict:
     return replace(found, verdict="unknown")
 
 
-def _finished(search: Search, found: Verdict, null: Candidate) -> Verdict:
-    """An effect that leaves structure, which no small error of the forms carries, is not the whole of it: no name. Nor
-    has one that comes where the test turns, beside a law of loops.
+def _firm(search: Search, found: Verdict, null: Candidate) -> tuple[str, ...]:
+    """Effects beyond those of ``null`` that are together in all that is probable and explain more than what is left."""
+    if found.verdict not in ("named", "ambiguous"):
+        return ()
+    first, p = found.members[0].candidate, found.probabilities
+    if at_a_turn(first, search.measurement) is not None:
+        return ()
+    names = sorted(remaining(search, first, null).firm(p.sure()), key=p.of_effect, reverse=True)
+    while names and p.of_effect(*names) < VERDICT.sure:
+        names.pop()
+    return tuple(sorted(names))
+
+
+def _finished(search: Search, found: Verdict, null: Candidate, firm: Sequence[str]) -> Verdict:
+    """An effect that leaves structure, which no small error of the forms carries, is not the whole of it: no name,
+    unless laws are usually off by as much and all effects of the name are ``firm``. Nor has one that comes where the
+    test turns, beside a law of loops.
     """
     if found.verdict != "named":
         return found
     first = found.members[0].candidate
-    doubtful = remaining(search, first, null).strange or at_a_turn(first, search.measurement) is not None
+    left, named = remaining(search, first, null), set(first.names) - set(null.names)
+    strange = left.strange and not (left.trifling and named <= set(firm))
+    doubtful = strange or at_a_turn(first, search.measurement) is not None
     return replace(found, verdict="unknown") if doubtful else found
 
 

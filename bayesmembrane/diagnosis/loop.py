@@ -128,11 +128,11 @@ def loop(
 ) -> Loop:
     """Diagnose, sample, add what is named, and again.
 
-    A `Question` may leave the energy open: the most probable one is sampled first. Named effects, what is in all
-    that is probable where sets of effects cannot be told apart, or a better energy make the next hypothesis;
-    `adequate`, `unknown` and an `ambiguous` answer without anything sure end the loop, and so does a hypothesis that
-    was there before. Of an ambiguous answer that ends it as many are sampled as the settings say. More readings than
-    `thinning.MOST` are thinned and single outliers set aside, for all of it. Raises what `sample` and `diagnose` raise.
+    A `Question` may leave the energy open: the most probable one is sampled first. Named effects, a better energy, or
+    what is firm of an answer without a name (`Diagnosis.firm`) make the next hypothesis; an answer without any of
+    these ends the loop, and so does a hypothesis that was there before. Of an ambiguous answer that ends it as many are
+    sampled as the settings say. More readings than `thinning.MOST` are thinned and single outliers set aside, for all
+    of it. Raises what `sample` and `diagnose` raise.
     """
     how = settings or LoopSettings()
     for other in how.predict:
@@ -164,10 +164,11 @@ def loop(
 
 
 def _following(found: Diagnosis) -> Hypothesis:
-    """The next model: with what is named, or what is sure of an ambiguous answer; the given one where nothing is."""
-    given, best = found.null.hypothesis, found.best.hypothesis
-    added = tuple(e for e in best.effects if e.name in found.sure)
-    return replace(best, effects=(*given.effects, *added)) if added else found.hypothesis
+    """The next model: with what is named, or what is firm of an answer without a name; the given one without either."""
+    if found.explains or not found.firm:
+        return found.hypothesis
+    first, given = found.members[0].candidate.hypothesis, found.null.hypothesis
+    return replace(first, effects=(*given.effects, *(e for e in first.effects if e.name in found.firm)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,6 @@ from bayesmembrane.diagnosis.left.shape import ResidualShape
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.reference.outliers import SetAside
 from bayesmembrane.diagnosis.separation import Experiment
-from bayesmembrane.diagnosis.thresholds import VERDICT
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.hypothesis import Hypothesis
 
@@ -62,6 +61,8 @@ class Diagnosis(Showable):
     thinned : what was diagnosed of a measurement with too many readings, and what all of the above is about; else None
     set_aside : single readings that were left out as outliers, of those; else None
     unsought : names of the effects that were not looked for, since a test that only goes one way hides them
+    firm : names of effects beyond the given ones that are together in all that is probable, and explain clearly more
+        than what is left, whatever else is at work: what a loop may go on with, though there is no name
     """
 
     verdict: str
@@ -91,18 +92,7 @@ class Diagnosis(Showable):
     thinned: Thinned | None = None
     set_aside: SetAside | None = None
     unsought: tuple[str, ...] = ()
-
-    @property
-    def sure(self) -> tuple[str, ...]:
-        """Effects beyond the given ones that are together in all that is probable, by name: of an ambiguous answer what
-        is known none the less; none of any other.
-        """
-        if self.verdict != "ambiguous":
-            return ()
-        names = sorted(self.probabilities.sure(), key=self.probabilities.of_effect, reverse=True)
-        while names and self.probabilities.of_effect(*names) < VERDICT.sure:
-            names.pop()
-        return tuple(sorted(names))
+    firm: tuple[str, ...] = ()
 
     @property
     def hypothesis(self) -> Hypothesis:

@@ -192,7 +192,8 @@ def _probabilities(course: Course) -> tuple[str, ...]:
     """``98 % friction in the guide (level 12 mN)``, ``1 % no effect``: what each round named, then the last answer."""
     d = course.telling
     named, sized = (x for x in course.named if x is not d), course.detail.sized > 0
-    earlier = [_probable_set(x, "+".join(x.sure) or set_name(x.best, x.null.names), course, sized) for x in named]
+    added = [(x, set_name(x.best, x.null.names) if x.explains else "+".join(x.firm)) for x in named]
+    earlier = [_probable_set(x, name, course, sized) for x, name in added]
     first, *others = _every(course)
     return *earlier, f"then {first}" if earlier else first, *others
 
@@ -215,9 +216,9 @@ def _every(course: Course) -> list[str]:
 
 def _probable_set(d: Diagnosis, name: str, course: Course, sized: bool) -> str:
     """A set of effects with its probability; where the answer rests on it with the sizes, as they were fitted last."""
-    sure = name == "+".join(d.sure)
-    p = percent(d.probabilities.of_effect(*d.sure) if sure else d.probabilities.effects.get(name, 0.0))
-    of = next((j.candidate for j in d.members if set_name(j.candidate, d.null.names) == name), d.best if sure else None)
+    firm = not d.explains and name == "+".join(d.firm)
+    p = percent(d.probabilities.of_effect(*d.firm) if firm else d.probabilities.effects.get(name, 0.0))
+    of = next((j.candidate for j in d.members if firm or set_name(j.candidate, d.null.names) == name), None)
     if of is None or name == NOTHING or not sized:
         return f"{p} {set_title(name)}"
     if course.last is not d and set(name.split("+")) <= set(course.last.null.names):

@@ -426,7 +426,8 @@ def too_far(found: Diagnosis) -> str:
     first = next((fitted[name] for name in found.probabilities.effects if name in fitted), None)
     if first is None:
         return ""
-    far = laws_off(first.law_errors, VERDICT.law_carried)
+    in_question = {name: error for name, error in first.law_errors.items() if name not in found.null.names}
+    far = laws_off(in_question, VERDICT.law_carried)
     if first.energy_error > VERDICT.carried:
         far.insert(0, f"the energy {100 * first.energy_error:.2g} %")
     return f"it holds only with {listed(far)} off" if far else ""

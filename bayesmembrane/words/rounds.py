@@ -19,7 +19,7 @@ from bayesmembrane.words.seen import seen
 
 def answer(found: Loop) -> list[str]:
     """What was found and added, with the size, and how it ended."""
-    told = [finding_sentence(_settled(r)) + _sure(r) for r in found.rounds]
+    told = [finding_sentence(_settled(r)) + _firm(r) for r in found.rounds]
     told = [told[0], *(f"With that: {s}" for s in told[1:])]
     last = found.rounds[-1]
     if last.changed:
@@ -30,11 +30,15 @@ def answer(found: Loop) -> list[str]:
     return told
 
 
-def _sure(r: Round) -> str:
-    """What is added although the answer is ambiguous."""
+def _firm(r: Round) -> str:
+    """What is added although there is no name."""
     if not r.changed or r.diagnosis.explains:
         return ""
-    return f" What is in all of them is added: {listed(map(effect_title, r.diagnosis.sure))}."
+    firm = r.diagnosis.firm
+    who = "which is" if len(firm) == 1 else "which are"
+    more = "explains" if len(firm) == 1 else "explain"
+    titles = listed(map(effect_title, firm))
+    return f" Added is {titles}, {who} in all that is probable and {more} more than what is left."
 
 
 def _settled(r: Round) -> Diagnosis:

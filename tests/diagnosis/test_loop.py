@@ -46,7 +46,7 @@ def test_ensembles_have_no_weights(found: Run) -> None:
     assert _by_weights(replace(found, status={**found.status, "importance": None})) is None
 
 
-def test_a_loop_goes_on_with_what_is_sure(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_loop_goes_on_with_what_is_firm(monkeypatch: pytest.MonkeyPatch) -> None:
     """An offset that is in all that is probable is in the model of the second round, and in its posterior."""
     rig, stretch = Uniaxial(), np.concatenate([np.linspace(1.05, 2, 20), np.linspace(2, 1.05, 20)])
     force = 100 * (stretch - stretch**-2) + 8 + np.random.default_rng(4).standard_normal(40)
@@ -56,8 +56,9 @@ def test_a_loop_goes_on_with_what_is_sure(monkeypatch: pytest.MonkeyPatch) -> No
     def diagnosed(self: _Closing, claim: Question) -> Diagnosis:
         claims.append(claim.hypothesis)
         found = diagnose(m, claim)
-        p = replace(found.probabilities, effects={"force_offset": 0.6, "force_offset+friction": 0.4})
-        return replace(found, verdict="ambiguous" if len(claims) == 1 else "adequate", probabilities=p)
+        if len(claims) > 1:
+            return replace(found, verdict="adequate", firm=())
+        return replace(found, verdict="unknown", firm=("force_offset",))
 
     def sampled(self: _Closing, claim: Hypothesis) -> Stage:
         runs.append(claim)

@@ -113,7 +113,7 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
         return unknown
     if [set_name(m.candidate, given) for m in members] == [NOTHING]:
         return unknown if p.anything_foreign > 1 - VERDICT.sure else _without_effects(case, total, members)
-    if _carried(first.candidate):
+    if _carried(first.candidate, given):
         return unknown
     return Verdict("named" if len(members) == 1 else "ambiguous", members, total.ranking, p, strange)
 
@@ -135,7 +135,7 @@ def _first_of_each_set(ranking: Sequence[Judged], given: Sequence[str]) -> dict[
         sets.setdefault(set_name(j.candidate, given), []).append(j)
     for name, same in sets.items():
         near = [j for j in same if j.probability * VERDICT.alike >= same[0].probability]
-        good = [j for j in near if not _carried(j.candidate)]
+        good = [j for j in near if not _carried(j.candidate, given)]
         if name != NOTHING and good:
             sets[name] = [min(good, key=lambda j: j.candidate.x.size)]
     return {name: same[0] for name, same in sets.items()}
@@ -168,9 +168,11 @@ def _smallest(probabilities: Mapping[str, float]) -> list[str]:
     return out
 
 
-def _carried(candidate: Candidate) -> bool:
-    """True if it is not the effects that explain the curve, but errors of their laws or of the energy."""
-    law = max(candidate.law_errors.values(), default=0.0)
+def _carried(candidate: Candidate, given: Sequence[str]) -> bool:
+    """True if it is not the effects that explain the curve, but errors of their laws or of the energy: of the laws of
+    those that are in question, not of those ``given``.
+    """
+    law = max((e for name, e in candidate.law_errors.items() if name not in given), default=0.0)
     return candidate.energy_error > VERDICT.carried or law > VERDICT.law_carried
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.weighing import Weighing, beyond_noise
 from bayesmembrane.diagnosis.reference.noise import orthonormal
 from bayesmembrane.diagnosis.thresholds import VERDICT
+from bayesmembrane.ground.parameters import Array
 
 
 @dataclass(frozen=True)
@@ -19,23 +20,26 @@ class Remaining:
 
     share : part of the squares beyond noise that the plain model leaves; 1 where it is the plain model's own, 0 where
         that leaves no more than noise does by chance
-    of_laws : the same part of what the effects of the model change that its energy could not; inf where they change
-        nothing
     reduced_chi2, dof : of what is left, by the measurement's own noise; the degrees of freedom of that
     carried : part of what is left beyond noise that the form error takes: smooth, and no effect
     rms : N, root mean square of the form error
     energy_error : relative error of the energy's form
     law_errors : by effect, relative error of its law
+    excess, changed : squares, freed of noise: what is left beyond noise; what the laws of the effects of the model,
+        given ones among them, change of the force that its energy could not
+    own : by effect, the same of its own trace, less what energy and other effects could take of that
     """
 
     share: float
-    of_laws: float
     reduced_chi2: float
     carried: float
     rms: float
     energy_error: float
     law_errors: Mapping[str, float]
     dof: int
+    excess: float = 0.0
+    changed: float = 0.0
+    own: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def noise(self) -> bool:
@@ -44,11 +48,19 @@ class Remaining:
 
     @property
     def strange(self) -> bool:
-        """True if it is more than noise, more than laws are usually off, and no small error of the forms carries it."""
+        """True if it is more than noise, and more than a small error of the forms that carries it."""
         by_chance = VERDICT.chance * float(np.sqrt(2.0 / self.dof))
         forms = self.carried >= VERDICT.form_carries and all(e <= VERDICT.law_small for e in self.law_errors.values())
-        noise = self.reduced_chi2 < max(VERDICT.noise_chi2, 1.0 + by_chance)
-        return not (noise or forms or min(self.share, self.of_laws) < VERDICT.trifle)
+        return self.reduced_chi2 >= max(VERDICT.noise_chi2, 1.0 + by_chance) and not forms
+
+    @property
+    def trifling(self) -> bool:
+        """True if laws are usually off by as much."""
+        return self.share < VERDICT.trifle or self.excess < VERDICT.trifle * self.changed
+
+    def firm(self, names: Iterable[str]) -> list[str]:
+        """Those of these effects that explain clearly more by themselves than what is left."""
+        return [name for name in names if self.own.get(name, 0.0) > VERDICT.firm * self.excess]
 
 
 def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining:
@@ -57,22 +69,35 @@ def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining
     left, before = search.excess(model), search.excess(plain)
     rest = beyond_noise(search.noise.white(model.residual - model.form), model)
     beyond = before > VERDICT.chance * float(np.sqrt(2.0 * dof))
-    changed = _changed(search, model)
+    white, material = search.noise.white(model.slopes), model.hypothesis.material_size
+    trace = search.noise.white(np.sum(model.traces, axis=0))
     return Remaining(
         share=float(np.clip(left / before, 0.0, 1.0)) if beyond else 0.0,
-        of_laws=max(left, 0.0) / changed if changed > 0 else np.inf,
         reduced_chi2=float(np.sum(search.noise.white(search.adapted(model)) ** 2)) / dof,
         carried=1 - min(rest / left, 1.0) if left > 0 else 0.0,
         rms=float(np.sqrt(np.mean(model.form**2))),
         energy_error=model.energy_error,
         law_errors=model.law_errors,
         dof=dof,
+        excess=max(float(left), 0.0),
+        changed=_own(trace, white[:, :material]),
+        own=dict(_own_traces(model, white)),
     )
 
 
-def _changed(search: Weighing, model: Candidate) -> float:
-    """Squares, freed of noise, of what the effects of a model change of the force, and its energy could not."""
-    trace = search.noise.white(np.sum(model.traces, axis=0))
-    energy = orthonormal(search.noise.white(model.slopes[:, : model.hypothesis.material_size]))
-    own = trace - energy @ (energy.T @ trace)
+def _own_traces(model: Candidate, white: Array) -> Iterator[tuple[str, float]]:
+    """Squares of the trace of each effect by its sizes, to first order, less what all other coordinates could take."""
+    place = model.hypothesis.material_size
+    for effect in model.hypothesis.effects:
+        places = [place + i for i in effect.sizes]
+        null = np.array([effect.coordinates[i].null or 0.0 for i in effect.sizes])
+        others = np.delete(white, range(place, place + len(effect.coordinates)), axis=1)
+        yield effect.name, _own(white[:, places] @ (model.x[places] - null), others)
+        place += len(effect.coordinates)
+
+
+def _own(trace: Array, others: Array) -> float:
+    """Squares of a ``trace`` (N,), less what columns ``others`` (N, p) can take of it."""
+    basis = orthonormal(others)
+    own = trace - basis @ (basis.T @ trace)
     return float(own @ own)

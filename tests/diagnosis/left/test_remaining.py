@@ -28,19 +28,24 @@ def test_what_is_left_is_strange_if_it_is_no_noise_and_no_small_error_carries_it
     reduced_chi2: float, carried: float, law: float, strange: bool
 ) -> None:
     for share in (0.01, 0.5):  # a little of a large misfit is no less strange
-        left = Remaining(share, 2 * share, reduced_chi2, carried, 0.0, 0.0, {"friction": law}, MANY)
-        assert left.strange is strange
-        # But where laws are usually off by as much, of the curve or beside effects that are given, it is told alone.
-        for of_curve, of_laws in ((0.5 * VERDICT.trifle, np.inf), (0.5, 0.5 * VERDICT.trifle)):
-            assert not replace(left, share=of_curve, of_laws=of_laws).strange
+        assert Remaining(share, reduced_chi2, carried, 0.0, 0.0, {"friction": law}, MANY).strange is strange
 
 
 def test_few_readings_scatter_by_chance() -> None:
     few = 20
     within = 1.0 + 0.9 * VERDICT.chance * np.sqrt(2 / few)
     assert within > VERDICT.noise_chi2
-    assert not Remaining(0.3, np.inf, within, 0.0, 0.0, 0.0, {}, few).strange
-    assert Remaining(0.3, np.inf, within, 0.0, 0.0, 0.0, {}, MANY).strange
+    assert not Remaining(0.3, within, 0.0, 0.0, 0.0, {}, few).strange
+    assert Remaining(0.3, within, 0.0, 0.0, 0.0, {}, MANY).strange
+
+
+def test_what_laws_are_usually_off_by_is_a_trifle_and_beside_it_only_what_explains_more_is_firm() -> None:
+    left = Remaining(0.3, A_LOT, 0.1, 0.0, 0.0, {}, MANY, 100.0, 1000.0, {"friction": 1000.0, "rate": 110.0})
+    assert not left.trifling
+    assert replace(left, share=0.5 * VERDICT.trifle).trifling
+    assert replace(left, changed=2 * 100.0 / VERDICT.trifle).trifling
+    assert left.firm(["friction", "rate", "mullins"]) == ["friction"]
+    assert replace(left, excess=0.0).firm(["friction", "rate", "mullins"]) == ["friction", "rate"]
 
 
 @pytest.mark.parametrize(("off", "share"), [(0.0, 0.0), (0.2, 1.0)])

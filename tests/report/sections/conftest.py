@@ -62,7 +62,8 @@ def going_on(named: Loop) -> Loop:
     first, second = named.rounds
     sets = {"friction": 0.6, "friction+mullins": 0.38, "hysteresis": 0.02}
     p = replace(first.diagnosis.probabilities, effects=sets)
-    d = replace(first.diagnosis, verdict="ambiguous", members=first.diagnosis.ranking[:2], probabilities=p)
+    members, firm = first.diagnosis.ranking[:2], ("friction",)
+    d = replace(first.diagnosis, verdict="ambiguous", members=members, probabilities=p, firm=firm)
     return Loop((replace(first, diagnosis=d), second), None)
 
 

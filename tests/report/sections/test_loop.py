@@ -100,33 +100,19 @@ def test_an_effect_with_another_energy_keeps_its_name(named: Loop) -> None:
     assert candidate_title(other, d.null) == f"{effect} and the energy Gent"
 
 
-def test_what_is_sure_of_an_ambiguous_answer_is_added_and_told(going_on: Loop) -> None:
-    d = only(going_on, "ambiguous")
-    assert d.sure == ("friction",)
+def test_what_is_firm_of_an_ambiguous_answer_is_added_and_told(going_on: Loop) -> None:
     first, second = waypoints(going_on)
     assert first.title == "neo-Hookean"
     assert (second.title, second.added) == ("neo-Hookean with friction in the guide", True)
     told, then = answer(going_on)
-    assert told.endswith("What is in all of them is added: friction in the guide.")
+    which = "which is in all that is probable and explains more than what is left."
+    assert told.endswith(f" Added is friction in the guide, {which}")
     assert then.startswith("With that: ")
     brief = of_loop(going_on)
     assert brief.probable[0].startswith("98 % friction in the guide (level ")
     assert brief.probable[1].startswith("then ")
     assert brief.verdict == "neo-Hookean with friction in the guide describes the curve"
     assert brief.following.startswith("Use neo-Hookean with friction in the guide")
-
-
-def test_sets_that_have_nothing_in_common_have_nothing_sure(ambiguous: Loop) -> None:
-    d = only(ambiguous, "ambiguous")
-    for sets, sure in (
-        ({"friction": 0.5, "hysteresis": 0.5}, ()),
-        ({"friction+mullins": 0.5, "friction": 0.48, "mullins": 0.02}, ("friction",)),
-        # Each of them is, and both together are not.
-        ({"friction+mullins": 0.92, "friction": 0.04, "mullins": 0.04}, ("friction",)),
-        ({"friction+mullins": 0.94, "friction+mullins+rate": 0.06}, ("friction", "mullins")),
-    ):
-        assert replace(d, probabilities=replace(d.probabilities, effects=sets)).sure == sure
-    assert replace(d, verdict="unknown").sure == ()
 
 
 @pytest.mark.parametrize(("foreign", "told"), [(0.02, 0), (0.2, 1), (0.7, 1)])
