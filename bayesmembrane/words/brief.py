@@ -191,9 +191,7 @@ def tested(d: Diagnosis) -> str:
 def _probabilities(course: Course) -> tuple[str, ...]:
     """``98 % friction in the guide (level 12 mN)``, ``1 % no effect``: what each round named, then the last answer."""
     d = course.telling
-    named, sized = (x for x in course.named if x is not d), course.detail.sized > 0
-    added = [(x, set_name(x.best, x.null.names) if x.explains else "+".join(x.firm)) for x in named]
-    earlier = [_probable_set(x, name, course, sized) for x, name in added]
+    earlier = [_added(x, course) for x in course.named if x is not d]
     first, *others = _every(course)
     return *earlier, f"then {first}" if earlier else first, *others
 
@@ -214,17 +212,28 @@ def _every(course: Course) -> list[str]:
     return told
 
 
+def _added(d: Diagnosis, course: Course) -> str:
+    """What a round added with its probability: the set that it named, or what is firm."""
+    if d.explains:
+        return _probable_set(d, set_name(d.best, d.null.names), course, course.detail.sized > 0)
+    of = d.members[0].candidate if course.detail.sized > 0 else None
+    return f"{percent(d.probabilities.of_effect(*d.firm))} {_with_sizes(d, '+'.join(d.firm), course, of)}"
+
+
 def _probable_set(d: Diagnosis, name: str, course: Course, sized: bool) -> str:
-    """A set of effects with its probability; where the answer rests on it with the sizes, as they were fitted last."""
-    firm = not d.explains and name == "+".join(d.firm)
-    p = percent(d.probabilities.of_effect(*d.firm) if firm else d.probabilities.effects.get(name, 0.0))
-    of = next((j.candidate for j in d.members if firm or set_name(j.candidate, d.null.names) == name), None)
-    if of is None or name == NOTHING or not sized:
-        return f"{p} {set_title(name)}"
+    """A set of effects with its probability; where the answer rests on it with the sizes."""
+    of = next((j.candidate for j in d.members if set_name(j.candidate, d.null.names) == name), None)
+    return f"{percent(d.probabilities.effects.get(name, 0.0))} {_with_sizes(d, name, course, of if sized else None)}"
+
+
+def _with_sizes(d: Diagnosis, name: str, course: Course, of: Candidate | None) -> str:
+    """Effects with their sizes as they were fitted last: by the loop, or in this candidate; without one their names."""
+    if of is None or name == NOTHING:
+        return set_title(name)
     if course.last is not d and set(name.split("+")) <= set(course.last.null.names):
         of = settled(course.last.null, course.sampled)
     own = [e for e in of.hypothesis.effects if e.name in name.split("+")]
-    return f"{p} {listed(f'{e.title} ({flagged_size(e, of, d.measurement)})' for e in own)}"
+    return listed(f"{e.title} ({flagged_size(e, of, d.measurement)})" for e in own)
 
 
 def _adequate(course: Course) -> str:

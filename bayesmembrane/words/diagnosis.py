@@ -89,6 +89,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "smallest_visible_units": {n: components("effects")[n]().size.unit for n in found.power},
         "absorbed": absorbed_sentences(found),
         "unsought": list(found.unsought),
+        "firm": list(found.firm),
         "read_as": read_as(_units(found)),
         "next_measurements": [
             {

@@ -108,6 +108,7 @@ def test_what_is_firm_of_an_ambiguous_answer_is_added_and_told(going_on: Loop) -
     which = "which is in all that is probable and explains more than what is left."
     assert told.endswith(f" Added is friction in the guide, {which}")
     assert then.startswith("With that: ")
+    assert document(going_on.rounds[0].diagnosis)["firm"] == ["friction"]
     brief = of_loop(going_on)
     assert brief.probable[0].startswith("98 % friction in the guide (level ")
     assert brief.probable[1].startswith("then ")
