@@ -50,6 +50,7 @@ def answer_row(document: Mapping[str, Any]) -> Row:
         "reduced_chi2": error["after"]["reduced_chi2"],
         "sentence": document["sentence"],
         "probabilities": beliefs(document.get("probabilities")),
+        "firm": list(document.get("firm", ())),
     }
 
 

@@ -176,6 +176,7 @@ def _rates(rows: Sequence[Row]) -> str:
         ("effects of the library: named and right", counted(spoilt, right_name)),
         (f"the same, tellable and each own ratio >= {CLEAR:g}", counted([r for r in rows if clear(r)], right_name)),
         ("the same: truth inside the answer", counted([r for r in rows if clear(r)], inside)),
+        ("firm effects of answers without a name: of the truth", counted_firm(rows)),
         ("foreign faults: a wrong name", counted([r for r in rows if r["foreign"]], wrong_name)),
         ("energies outside the library, no effect: a wrong name", counted(outside, wrong_name)),
         *((f"90 % intervals hold, {what}", counted_bits(rows, what == "forces")) for what in ("parameters", "forces")),
@@ -188,6 +189,12 @@ def _rates(rows: Sequence[Row]) -> str:
         ("errors", counted(rows, lambda r: r["verdict"] == "error")),
     ]
     return "## Rates\n\n" + _table(("what", "found"), some)
+
+
+def counted_firm(rows: Iterable[Row]) -> str:
+    """How many of the effects that are firm of an answer without a name are there, be it faintly."""
+    told = [name in (*r["truth"], *r["faint"]) for r in rows if r["verdict"] != "named" for name in r.get("firm", ())]
+    return share(sum(told), len(told))
 
 
 def counted_bits(rows: Iterable[Row], forces: bool) -> str:

@@ -11,7 +11,7 @@ from tests.generator.setups import setup
 from tests.studies import reliability, second_plan
 from tests.studies.reliability_plan import ROUND, Case, measured, plan
 from tests.studies.reliability_rows import answer_row, beliefs, right_name, truth_row, wrong_name
-from tests.studies.reliability_table import held, merged, of_truth, report
+from tests.studies.reliability_table import counted_firm, held, merged, of_truth, report
 
 
 def row(probabilities=None, **other):
@@ -155,6 +155,17 @@ def test_no_effect_is_the_right_set_where_what_is_foreign_is_a_question_of_its_o
     for r in (apart, together):
         sets = report([r], "made up").split("## Sets of effects")[1].split("##")[0]
         assert "| 0.99 to 1 | 0.9990 | 1 / 1" in sets
+
+
+def test_firm_effects_are_counted_where_there_is_no_name() -> None:
+    some = [
+        row(verdict="ambiguous", firm=["friction", "force_drift"]),
+        row(verdict="unknown", firm=["mullins"]),
+        row(verdict="named", firm=["hysteresis"]),
+        row(verdict="ambiguous"),
+    ]
+    assert counted_firm(some).startswith("2 / 3 ")
+    assert counted_firm(some[2:]) == counted_firm([])
 
 
 def test_names_of_sets_are_in_one_order_and_nothing_is_lost() -> None:
