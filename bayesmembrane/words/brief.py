@@ -21,6 +21,7 @@ from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.words import language
 from bayesmembrane.words.diagnosis import (
     certain,
+    doubtful,
     laws_off,
     other_energy,
     percent,
@@ -267,7 +268,7 @@ def _improbable(d: Diagnosis) -> str:
 def _ambiguous(course: Course) -> str:
     d = course.telling
     sure, among = _certain(d), _in_all(d) if course.detail.sums else ""
-    which = f"only {sure} is certain" if sure else f"{among}this curve cannot tell which"
+    which = f"only {sure} certain" if sure else f"{among}this curve cannot tell which"
     first = "the first" if course.detail.told > 1 else "it"
     size = (
         ", yet at a size that is hardly met" if d.members and hardly_met(d.members[0].candidate, d.measurement) else ""
@@ -290,12 +291,12 @@ def _in_all(d: Diagnosis) -> str:
 def _unknown(course: Course) -> str:
     d = course.telling
     sure, further = _certain(d), " further" if course.named else ""
-    start = f"{sure} is certain, yet " if sure else ""
+    start = f"{sure} certain, yet " if sure else ""
     if (strange := _strange(d)) is not None:
         beside = listed(effect_title(n) for n in strange.base.names)
         return f"{start}{_foreign(strange, d.measurement)}{f', beside {beside}' if beside and not sure else ''}"
     if d.members:
-        return f"nothing{further} is named, for {why_not(d)}"
+        return f"{start}nothing{further} is named, for {why_not(d)}"
     if d.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{start}none of the energies has this form"
     if far := too_far(d):
@@ -315,10 +316,12 @@ def _strange(d: Diagnosis) -> Foreign | None:
 
 
 def _certain(d: Diagnosis) -> str:
-    """Effects that are in all that is probable; "" if there is none, or nothing else is probable anyway."""
-    sure = certain(d)
-    alone = d.probabilities.effects.get("+".join(sure), 0.0) >= VERDICT.sure
-    return "" if alone else listed(map(effect_title, sure))
+    """``friction is``: of effects in all that is probable; "" if there is none, or nothing else is probable anyway."""
+    doubts = doubtful(d)
+    sure = [n for n in certain(d) if n not in doubts]
+    if not sure or d.probabilities.effects.get("+".join(sure), 0.0) >= VERDICT.sure:
+        return ""
+    return f"{listed(map(effect_title, sure))} {'is' if len(sure) == 1 else 'are'}"
 
 
 _ANSWERS = {

@@ -454,14 +454,24 @@ def why_not(found: Diagnosis) -> str:
 
 def _certain(found: Diagnosis) -> str:
     """Effects that are in all that is probable: what is known where the whole is not."""
-    sure = certain(found)
-    return f"{_at_work(sure)} all that is probable, yet " if sure else ""
+    sure, doubts = certain(found), doubtful(found)
+    if not sure:
+        return ""
+    are, explain = ("is", "explains") if len(doubts) == 1 else ("are", "explain")
+    which = f"{listed(map(effect_title, doubts))}, which {explain} no more than what is left"
+    so = f", and so {are} {which} and may stand in for something else" if doubts else ""
+    return f"{_at_work([n for n in sure if n not in doubts])} all that is probable{so}, yet "
 
 
 def certain(found: Diagnosis) -> list[str]:
     """Effects that are in all that is probable, but for one that comes where the test turns."""
     turned = at_a_turn(found.ranking[0].candidate, found.measurement) if found.ranking else None
     return [n for n in found.probabilities.sure() if turned is None or n != turned.name]
+
+
+def doubtful(found: Diagnosis) -> list[str]:
+    """Certain effects of an `unknown` answer that explain no more than what is left, beside others that do."""
+    return [n for n in certain(found) if n not in found.firm] if found.firm and found.verdict == "unknown" else []
 
 
 _ANSWERS = {

@@ -31,7 +31,7 @@ from bayesmembrane.words import diagnosis as diagnosis_words
 from bayesmembrane.words import loop as loop_words
 from bayesmembrane.words.brief import of_diagnosis, of_loop
 from bayesmembrane.words.candidates import candidate_title
-from bayesmembrane.words.diagnosis import document, set_aside
+from bayesmembrane.words.diagnosis import document, finding_sentence, set_aside
 from bayesmembrane.words.moved import Change, changes, modulus_fitted, modulus_sentence
 from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.rounds import answer, bound_sentences, moved, rival_sentences, subject, validation_sentences
@@ -114,6 +114,18 @@ def test_what_is_firm_of_an_ambiguous_answer_is_added_and_told(going_on: Loop) -
     assert brief.probable[1].startswith("then ")
     assert brief.verdict == "neo-Hookean with friction in the guide describes the curve"
     assert brief.following.startswith("Use neo-Hookean with friction in the guide")
+
+
+def test_what_explains_no_more_than_what_is_left_is_told_apart_from_what_is_firm(going_on: Loop) -> None:
+    d = going_on.rounds[0].diagnosis
+    p = replace(d.probabilities, effects={"friction+mullins": 0.99, "friction": 0.01}, foreign={"none": 1.0})
+    some = replace(d, verdict="unknown", effects=(), probabilities=p)
+    apart = "and so is Mullins softening, which explains no more than what is left and may stand in for something else"
+    assert f"friction in the guide is at work in all that is probable, {apart}, yet " in finding_sentence(some)
+    assert of_diagnosis(some).verdict.startswith("friction in the guide is certain, yet ")
+    for plain in (replace(some, firm=()), replace(some, firm=("friction", "mullins"))):
+        assert "friction in the guide and Mullins softening are at work in all" in finding_sentence(plain)
+        assert "certain" not in of_diagnosis(plain).verdict
 
 
 @pytest.mark.parametrize(("foreign", "told"), [(0.02, 0), (0.2, 1), (0.7, 1)])
