@@ -82,8 +82,10 @@ class Composition:
         return deflection
 
     def end(self, x: Array) -> Array:
-        """(B,) m: the largest deflection that a film may see."""
-        return np.asarray(np.max(self.given(x, self._measured(len(x))), axis=1))
+        """(B,) m: the largest deflection that a film may see, on either side of rest if it is mounted taut."""
+        given = self.given(x, self._measured(len(x)))
+        taut = any(isinstance(e, Geometry) for e in self.effects)
+        return np.asarray(np.max(np.abs(given) if taut else given, axis=1))
 
     def __call__(self, law: Law, x: Array) -> tuple[Array, NDArray[np.int8]]:
         """(reading (B, N) N, status (B, N)) of films with effect parameters x (B, k)."""
@@ -130,7 +132,7 @@ class Composition:
         for effect, p in self._acting(Memory, x):
             force = effect.remember(p, force, self.path)
         with np.errstate(all="ignore"):
-            part = np.where(virgin > 0, np.clip(force / virgin, *REMEMBERED), 0.0)
+            part = np.where(virgin != 0, np.clip(force / virgin, *REMEMBERED), 0.0)
         return force, slope * part
 
     def _measured(self, rows: int) -> Array:

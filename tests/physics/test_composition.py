@@ -12,6 +12,7 @@ from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.effects._history import growth
 from bayesmembrane.physics.effects.base import FilmState
 from bayesmembrane.physics.effects.machine_compliance import MachineCompliance
+from bayesmembrane.physics.effects.permanent_set import PermanentSet
 from bayesmembrane.physics.effects.tearing import Tearing
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -65,6 +66,25 @@ def test_a_shifted_zero_shifts_the_curve_and_a_slack_film_carries_nothing() -> N
     assert np.all(f[m.deflection < 2e-3] == 0)
     taut = m.deflection > 2e-3
     assert f[taut] == pytest.approx(direct("yeoh", m.deflection[taut] - 2e-3), rel=1e-6, abs=1e-9)
+
+
+def test_a_taut_film_pulls_back_below_its_plane_and_what_it_has_lost_does_not() -> None:
+    """Against the solver, which knows both sides of the plane; with a frame, too."""
+    m, c = measured(), 8e-4
+    for shift in (2e-3, 0.7 * m.full_range):
+        d = m.deflection - shift
+        exact = np.sign(d) * direct("yeoh", np.abs(d), prestretch=1.05)
+        f = force(m, "prestretch", "zero_offset", x=np.array([1.05, shift]))
+        assert np.min(f) < -1e-3 * np.max(f)
+        assert np.max(np.abs(f - exact)) < 1e-5 * np.max(exact)
+    names = ("machine_compliance", "prestretch", "zero_offset")
+    f = force(m, *names, x=np.array([c, 1.0, 1.05, 2e-3]))
+    d = m.deflection - 2e-3 - c * f
+    assert np.max(np.abs(f - np.sign(d) * direct("yeoh", np.abs(d), prestretch=1.05))) < 1e-5 * np.max(f)
+    lost = [1e-3 if p.name == "set" else p.typical for p in PermanentSet.coordinates]
+    f = force(m, "permanent_set", "prestretch", x=np.array([*lost, 1.05]))
+    assert np.all(f >= 0)
+    assert np.any(f[m.deflection > 0] == 0)
 
 
 @pytest.mark.parametrize("exponent", [2 / 3, 1.0, 1.3])

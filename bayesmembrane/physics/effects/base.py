@@ -5,7 +5,7 @@ Stages compose in this order, whatever the order in which effects are named:
     Geometry -> Deflection -> Slack -> Carried -> Memory -> Compliance -> Sensor
 
 A slack film carries no force: where the deflection left for the film is not positive, `Carried` and what follows start
-from zero. `Compliance` closes a loop around all stages from `Deflection` to `Memory`, for the frame yields to the force
+from zero. One with a pre-stretch is taut below its plane, too, and pulls back. `Compliance` closes a loop around all stages from `Deflection` to `Memory`, for the frame yields to the force
 that the film has after them. Arrays are (B, N): B draws, N points in the order of the test; ``p`` is (B, k), the
 effect's own parameters in the order of ``coordinates``.
 """
@@ -214,7 +214,7 @@ class FilmState:
     """The film at all points of a path, before what it remembers acts on its force.
 
     path : the protocol
-    deflection : (B, N) m, what is left for the film; the film is slack where it is not positive
+    deflection : (B, N) m, what is left for the film; one without a pre-stretch is slack where it is not positive
     force : (B, N) N, of a film without memory at this deflection; 0 where it is slack
     slope : (B, N) N/m, its derivative
     """

@@ -40,5 +40,5 @@ class OffCentreDisc(Carried):
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         with np.errstate(all="ignore"):
-            n = np.where(state.force > 0, state.slope * state.deflection / state.force, 0.0)
+            n = np.where(state.force != 0, state.slope * state.deflection / state.force, 0.0)
         return np.asarray(force * (1.0 + 0.25 * p[:, :1] * n * (n + 1.0)))

@@ -95,7 +95,8 @@ class FilmLaw:
 
         With ``excess`` e (B, N) the film is longer than its gap: it is stretched as much as at delta_e with
         (L^2 + delta^2) / (1 + e)^2 = L^2 + delta_e^2, and by virtual work F = F(delta_e) (delta / delta_e) / (1 + e).
-        Zero where it is slack.
+        Zero where it is slack, and below rest, but for films with a pre-stretch: taut there, they pull the disc back,
+        F(-delta) = -F(delta).
         """
         force, slope = np.empty(deflection.shape), np.empty(deflection.shape)
         given = np.zeros((1, 1)) if excess is None else np.ascontiguousarray(excess)
@@ -353,8 +354,10 @@ def _evaluate(pieces, step, last, prestretch, length, tautness, deflection, exce
         inverse = 1.0 / step[b]
         end = (last[b] - 0.5) * (1.0 + ROOM)
         for n in range(points):
-            x = deflection[b, n]
-            if not x > 0.0:
+            x, sign = deflection[b, n], 1.0
+            if taut > 0.0 and x <= 0.0:
+                x, sign = -x, -1.0
+            elif not x > 0.0:
                 force[b, n] = 0.0
                 slope[b, n] = 0.0
                 if not x <= 0.0:
@@ -389,5 +392,5 @@ def _evaluate(pieces, step, last, prestretch, length, tautness, deflection, exce
             if y > 1e-9:
                 bend = dg * inverse * (over_wide * over_wide) / (2.0 * y * root)
             k = np.exp(g) * shorter
-            force[b, n] = k * kappa * x
+            force[b, n] = sign * (k * kappa * x)
             slope[b, n] = k * (kappa + 2.0 * (x * x * shorter * shorter) * (rise + kappa * bend))

@@ -80,6 +80,21 @@ def test_nothing_at_rest_and_nothing_below() -> None:
     assert np.isnan(law(np.array([[1.01 * END, np.nan]]))[0]).all()
 
 
+@pytest.mark.parametrize("l0", [1.01, 1.1])
+def test_a_taut_film_pulls_a_disc_back_that_lies_below_it(l0: float) -> None:
+    for name, film in FILMS:
+        law, below = law_of(name, film, l0), -D[:90]
+        exact = solve(request(material(name), film, below, prestretch=l0, **RADII))
+        force, slope = law(below[None])
+        assert np.max(np.abs(force - exact.force)) < 1e-5 * law(D[None])[0].max()
+        assert slope == pytest.approx(law(-below[None])[1], rel=1e-12)
+        near = 1e-7 * np.array([[-1.0, 0.0, 1.0]])
+        assert np.diff(law(near)[0]) / 1e-7 == pytest.approx(law(near)[1][:, 1:], rel=1e-6)
+        assert np.isnan(law(np.array([[-1.01 * END, np.nan]]))[0]).all()
+        longer = law(below[None], np.full((1, below.size), 2e-3))[0]
+        assert longer == pytest.approx(-law(-below[None], np.full((1, below.size), 2e-3))[0], rel=1e-12)
+
+
 def test_no_excess_length_is_none() -> None:
     law = law_of("yeoh", FILMS[3][1])
     for a, b in zip(law(D[None]), law(D[None], np.zeros((1, D.size))), strict=True):
