@@ -5,9 +5,10 @@ Stages compose in this order, whatever the order in which effects are named:
     Geometry -> Deflection -> Slack -> Carried -> Memory -> Compliance -> Sensor
 
 A slack film carries no force: where the deflection left for the film is not positive, `Carried` and what follows start
-from zero. One with a pre-stretch is taut below its plane, too, and pulls back. `Compliance` closes a loop around all stages from `Deflection` to `Memory`, for the frame yields to the force
-that the film has after them. Arrays are (B, N): B draws, N points in the order of the test; ``p`` is (B, k), the
-effect's own parameters in the order of ``coordinates``.
+from zero. One with a pre-stretch is taut below its plane, too, and pulls back. `Compliance` closes a loop around all
+stages from `Deflection` to `Memory`, for the frame yields to the force that the film has after them. Arrays are (B, N):
+B draws, N points in the order of the test; ``p`` is (B, k), the effect's own parameters in the order of
+``coordinates``.
 """
 
 from __future__ import annotations

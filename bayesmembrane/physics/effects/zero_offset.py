@@ -12,7 +12,7 @@ from bayesmembrane.physics.effects.base import Deflection, EffectParameter
 
 @dataclass(frozen=True)
 class ZeroOffset(Deflection):
-    """delta_film = delta - shift. Below zero a film is slack, but for one with a pre-stretch, which pulls the disc back."""
+    """delta_film = delta - shift. Below zero a film is slack; one with a pre-stretch is taut, and pulls back."""
 
     name: ClassVar[str] = "zero_offset"
     title: ClassVar[str] = "offset of the deflection zero"
