@@ -148,14 +148,15 @@ def loop(
     stage = closing.sampled(replace(found.null.hypothesis, noise=noise))
     seen, rounds = {stage.run.hypothesis.label()}, list[Round]()
     while True:
-        following = replace(_following(found), noise=noise)
+        last = len(rounds) + 1 >= closing.settings.most_rounds
+        following = replace(_following(found, last), noise=noise)
         goes_on = following.label() not in seen
         after = closing.sampled(following) if goes_on else stage
         first = found.members[: closing.settings.leaders] if found.verdict == "ambiguous" and not goes_on else ()
         rivals = [closing.sampled(replace(j.candidate.hypothesis, noise=noise)) for j in first]
         # The readings that are left have no outliers: what was set aside at the start is told of every round.
         rounds.append(Round(replace(found, set_aside=aside), stage, after, tuple(rivals)))
-        if not goes_on or len(rounds) >= closing.settings.most_rounds:
+        if not goes_on or last:
             break
         seen.add(following.label())
         again = partial(closing.diagnosed, replace(question, hypothesis=following, declared=True))
@@ -163,9 +164,12 @@ def loop(
     return Loop(tuple(rounds), closing.left(rounds[-1].diagnosis), thinning(measurement, part), others)
 
 
-def _following(found: Diagnosis) -> Hypothesis:
-    """The next model: with what is named, or what is firm of an answer without a name; the given one without either."""
-    if found.explains or not found.firm:
+def _following(found: Diagnosis, last: bool) -> Hypothesis:
+    """The next model: with what is named, or what is firm of an answer without a name; the given one without either.
+
+    What is merely firm is not added in the ``last`` round, after which nobody asks what is beside it.
+    """
+    if found.explains or last or not found.firm:
         return found.hypothesis
     first, given = found.members[0].candidate.hypothesis, found.null.hypothesis
     return replace(first, effects=(*given.effects, *(e for e in first.effects if e.name in found.firm)))

@@ -68,6 +68,11 @@ class Composition:
         """True if there is a loop around the frame to close."""
         return any(isinstance(e, Compliance) for e in self.effects)
 
+    @cached_property
+    def taut(self) -> bool:
+        """True if films may be taut on both sides of their plane."""
+        return any(isinstance(e, Geometry) for e in self.effects)
+
     def prestretch(self, x: Array) -> Array:
         """(B,) pre-stretch of films with effect parameters x (B, k)."""
         out = np.ones(len(x))
@@ -78,14 +83,13 @@ class Composition:
     def given(self, x: Array, deflection: Array) -> Array:
         """(B, N) m: what is left of ``deflection`` (B, N) for the film."""
         for effect, p in self._acting(Deflection, x):
-            deflection = effect.deflect(p, deflection, self.path)
+            deflection = (effect.deflect_taut if self.taut else effect.deflect)(p, deflection, self.path)
         return deflection
 
     def end(self, x: Array) -> Array:
         """(B,) m: the largest deflection that a film may see, on either side of rest if it is mounted taut."""
         given = self.given(x, self._measured(len(x)))
-        taut = any(isinstance(e, Geometry) for e in self.effects)
-        return np.asarray(np.max(np.abs(given) if taut else given, axis=1))
+        return np.asarray(np.max(np.abs(given) if self.taut else given, axis=1))
 
     def __call__(self, law: Law, x: Array) -> tuple[Array, NDArray[np.int8]]:
         """(reading (B, N) N, status (B, N)) of films with effect parameters x (B, k)."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.effects.base import Carried, Deflection, Effect, FilmState, Memory, Slack
+from bayesmembrane.physics.effects.base import Carried, Deflection, Effect, FilmState, Geometry, Memory, Slack
 
 Law = Any
 """As in `physics.composition`."""
@@ -73,8 +73,9 @@ class Shared:
         """What is left of the measured deflection."""
         shape = len(self.points[0]), self.path.deflection.size
         given = _Parts([np.broadcast_to(self.path.deflection, shape)], [0] * len(self.laws))
+        taut = any(isinstance(e, Geometry) for e, _ in self.placed)
         for effect, at in self._acting(Deflection):
-            given = self._acted(effect, at, effect.deflect, given)
+            given = self._acted(effect, at, effect.deflect_taut if taut else effect.deflect, given)
         return given
 
     def _virgin(self, given: _Parts, excess: _Parts | None) -> tuple[_Parts, Callable[[Sequence[int]], FilmState]]:

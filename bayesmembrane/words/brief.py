@@ -129,6 +129,11 @@ class Course:
     sampled: Run | None = None
 
     @property
+    def before(self) -> list[Diagnosis]:
+        """Those by which something had been added before the one that the verdict rests on."""
+        return [d for d in self.named if d is not self.telling]
+
+    @property
     def telling(self) -> Diagnosis:
         """The one that the verdict rests on."""
         ended = self.named and self.named[-1].explains and self.last.verdict == "adequate"
@@ -191,8 +196,7 @@ def tested(d: Diagnosis) -> str:
 
 def _probabilities(course: Course) -> tuple[str, ...]:
     """``98 % friction in the guide (level 12 mN)``, ``1 % no effect``: what each round named, then the last answer."""
-    d = course.telling
-    earlier = [_added(x, course) for x in course.named if x is not d]
+    earlier = [_added(x, course) for x in course.before]
     first, *others = _every(course)
     return *earlier, f"then {first}" if earlier else first, *others
 
@@ -274,7 +278,7 @@ def _ambiguous(course: Course) -> str:
         ", yet at a size that is hardly met" if d.members and hardly_met(d.members[0].candidate, d.measurement) else ""
     )
     energy = f"{other}; " if (other := other_energy(d)) else ""
-    rest = " of what is left" if course.named else ""
+    rest = " of what is left" if course.before else ""
     return f"{energy}{which}; {first} explains {_explained(d)}{rest}{size}{_beside(d)}"
 
 
@@ -290,13 +294,13 @@ def _in_all(d: Diagnosis) -> str:
 
 def _unknown(course: Course) -> str:
     d = course.telling
-    sure, further = _certain(d), " further" if course.named else ""
+    sure, further = _certain(d), " further" if course.before else ""
     start = f"{sure} certain, yet " if sure else ""
     if (strange := _strange(d)) is not None:
         beside = listed(effect_title(n) for n in strange.base.names)
         return f"{start}{_foreign(strange, d.measurement)}{f', beside {beside}' if beside and not sure else ''}"
     if d.members:
-        return f"{start}nothing{further} is named, for {why_not(d)}"
+        return f"{start if d.firm else ''}nothing{further} is named, for {why_not(d)}"
     if d.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{start}none of the energies has this form"
     if far := too_far(d):

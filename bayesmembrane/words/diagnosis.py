@@ -458,7 +458,7 @@ def _certain(found: Diagnosis) -> str:
     if not sure:
         return ""
     are, explain = ("is", "explains") if len(doubts) == 1 else ("are", "explain")
-    which = f"{listed(map(effect_title, doubts))}, which {explain} no more than what is left"
+    which = f"{listed(map(effect_title, doubts))}, which {explain} hardly more than what is left"
     so = f", and so {are} {which} and may stand in for something else" if doubts else ""
     return f"{_at_work([n for n in sure if n not in doubts])} all that is probable{so}, yet "
 
@@ -470,7 +470,7 @@ def certain(found: Diagnosis) -> list[str]:
 
 
 def doubtful(found: Diagnosis) -> list[str]:
-    """Certain effects of an `unknown` answer that explain no more than what is left, beside others that do."""
+    """Certain effects of an `unknown` answer that explain hardly more than what is left, beside others that do."""
     return [n for n in certain(found) if n not in found.firm] if found.firm and found.verdict == "unknown" else []
 
 

@@ -35,10 +35,9 @@ def _firm(r: Round) -> str:
     if not r.changed or r.diagnosis.explains:
         return ""
     firm = r.diagnosis.firm
-    who = "which is" if len(firm) == 1 else "which are"
-    more = "explains" if len(firm) == 1 else "explain"
+    are, explain = ("is", "explains") if len(firm) == 1 else ("are", "explain")
     titles = listed(map(effect_title, firm))
-    return f" Added is {titles}, {who} in all that is probable and {more} more than what is left."
+    return f" Added {are} {titles}, which {are} in all that is probable and {explain} more than what is left."
 
 
 def _settled(r: Round) -> Diagnosis:

@@ -1,7 +1,11 @@
 """A small fixed part of `make study-loop`: clear cases at strength 1, from a generator that shares no code."""
 
+import importlib
 import json
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +13,8 @@ import pytest
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.diagnose import diagnose
+from bayesmembrane.diagnosis.explanation.total import Probabilities
+from bayesmembrane.diagnosis.explanation.verdict import Verdict
 from bayesmembrane.diagnosis.result import VERDICTS, Diagnosis
 from bayesmembrane.diagnosis.thresholds import VERDICT
 from bayesmembrane.ground.errors import SettingsError
@@ -19,6 +25,8 @@ from bayesmembrane.physics.rigs.equibiaxial import Equibiaxial
 from bayesmembrane.words.diagnosis import document, sentence
 from tests.diagnosis.curves import measured, pulled_and_held
 from tests.generator.datasets import Dataset, generate
+
+module = importlib.import_module("bayesmembrane.diagnosis.diagnose")  # the package has a function of that name
 
 ALL, SOME = 1, 3
 """Every reading of the 700 that the generator makes, or every third: that is enough for a clear answer, and quicker."""
@@ -197,3 +205,46 @@ def test_points_as_few_as_a_model_with_an_effect_has_coordinates_are_diagnosed()
     force = stress * rig.width * specimen.thickness
     curve = Measurement(rig.length * (stretch - 1), force, rig, specimen, time=28.1 * np.arange(6.0))
     assert diagnose(curve, Hypothesis(materials()["gent"], convexity="elliptic")).verdict in VERDICTS
+
+
+@pytest.mark.parametrize(
+    ("sets", "clear", "trifling", "firm", "verdict"),
+    [
+        ({"friction+mullins": 0.97, "friction": 0.03}, ("friction", "mullins"), True, ("friction", "mullins"), "named"),
+        (
+            {"friction+mullins": 0.97, "friction": 0.03},
+            ("friction", "mullins"),
+            False,
+            ("friction", "mullins"),
+            "unknown",
+        ),
+        ({"friction+mullins": 0.97, "friction": 0.03}, ("friction",), True, ("friction",), "unknown"),
+        ({"friction+mullins": 0.97, "friction": 0.03}, (), True, (), "unknown"),
+        (
+            {"friction": 0.5, "friction+mullins": 0.46, "mullins": 0.04},
+            ("friction", "mullins"),
+            True,
+            ("friction",),
+            "",
+        ),
+        ({"friction": 0.5, "mullins": 0.5}, ("friction", "mullins"), True, (), ""),
+    ],
+)
+def test_a_strange_rest_leaves_the_name_to_what_is_firm_where_it_is_a_trifle(
+    monkeypatch: pytest.MonkeyPatch,
+    sets: dict[str, float],
+    clear: tuple[str, ...],
+    trifling: bool,
+    firm: tuple[str, ...],
+    verdict: str,
+) -> None:
+    left = SimpleNamespace(strange=True, trifling=trifling, firm=lambda names: [n for n in names if n in clear])
+    monkeypatch.setattr(module, "remaining", lambda *models: left)
+    monkeypatch.setattr(module, "at_a_turn", lambda *models: None)
+    null: Any = SimpleNamespace(names=())
+    first: Any = SimpleNamespace(candidate=SimpleNamespace(names=("friction", "mullins")))
+    found = Verdict("named" if verdict else "ambiguous", (first,), (), Probabilities(sets, {}, {"none": 1.0}))
+    search: Any = SimpleNamespace(measurement=None)
+    assert module._firm(search, found, null) == firm
+    assert module._finished(search, found, null, firm).verdict == (verdict or "ambiguous")
+    assert module._firm(search, replace(found, verdict="unknown"), null) == ()

@@ -70,6 +70,9 @@ def test_a_loop_goes_on_with_what_is_firm(monkeypatch: pytest.MonkeyPatch) -> No
     assert [[e.name for e in h.effects] for h in claims] == [[], ["force_offset"]]
     assert [[e.name for e in h.effects] for h in runs] == [[], ["force_offset"]]
     assert [r.changed for r in found.rounds] == [True, False]
+    claims.clear()
+    once = loop(m, hypothesis("neo_hookean"), LoopSettings(most_rounds=1))
+    assert [r.changed for r in once.rounds] == [False]  # nobody would ask what is beside it
 
 
 @pytest.mark.parametrize(

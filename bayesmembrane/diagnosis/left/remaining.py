@@ -56,7 +56,7 @@ class Remaining:
     @property
     def trifling(self) -> bool:
         """True if laws are usually off by as much."""
-        return self.share < VERDICT.trifle or self.excess < VERDICT.trifle * self.changed
+        return 0.0 < self.share < VERDICT.trifle or self.excess < VERDICT.trifle * self.changed
 
     def firm(self, names: Iterable[str]) -> list[str]:
         """Those of these effects that explain clearly more by themselves than what is left."""

@@ -257,6 +257,10 @@ class Deflection(Effect, ABC):
     def deflect(self, p: Array, deflection: Array, path: Motion) -> Array:
         """(B, N) m: the deflection of the film, from that (B, N) before this effect."""
 
+    def deflect_taut(self, p: Array, deflection: Array, path: Motion) -> Array:
+        """The same of a film with a pre-stretch, which carries force on both sides of its plane."""
+        return self.deflect(p, deflection, path)
+
 
 class Slack(Effect, ABC):
     """Free length that the film gains while it is tested."""

@@ -71,5 +71,8 @@ class PermanentSet(Deflection):
         with np.errstate(all="ignore"):
             part = np.where(largest > 0, np.maximum(deflection, 0.0) / largest, 0.0)
         further = (2 * np.maximum(part, FLAT)) ** -p[:, 6:7]
-        lost = lasting * (1 - p[:, 2:3] * part) * further
-        return np.asarray(np.sign(deflection) * np.maximum(np.abs(deflection) - lost, 0.0))
+        return np.asarray(deflection - lasting * (1 - p[:, 2:3] * part) * further)
+
+    def deflect_taut(self, p: Array, deflection: Array, path: Motion) -> Array:
+        left = self.deflect(p, np.abs(deflection), path)
+        return np.asarray(np.sign(deflection) * np.maximum(left, 0.0))  # no lost length pulls or pushes

@@ -120,8 +120,9 @@ def test_what_explains_no_more_than_what_is_left_is_told_apart_from_what_is_firm
     d = going_on.rounds[0].diagnosis
     p = replace(d.probabilities, effects={"friction+mullins": 0.99, "friction": 0.01}, foreign={"none": 1.0})
     some = replace(d, verdict="unknown", effects=(), probabilities=p)
-    apart = "and so is Mullins softening, which explains no more than what is left and may stand in for something else"
-    assert f"friction in the guide is at work in all that is probable, {apart}, yet " in finding_sentence(some)
+    apart = "which explains hardly more than what is left and may stand in for something else"
+    start = "friction in the guide is at work in all that is probable, and so is Mullins softening"
+    assert f"{start}, {apart}, yet " in finding_sentence(some)
     assert of_diagnosis(some).verdict.startswith("friction in the guide is certain, yet ")
     for plain in (replace(some, firm=()), replace(some, firm=("friction", "mullins"))):
         assert "friction in the guide and Mullins softening are at work in all" in finding_sentence(plain)
