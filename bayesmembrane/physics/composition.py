@@ -29,7 +29,7 @@ from bayesmembrane.physics.effects.base import (
 )
 from bayesmembrane.physics.frame import in_series
 from bayesmembrane.physics.mechanics.solution import Status
-from bayesmembrane.physics.shared import Change, Shared
+from bayesmembrane.physics.shared import Varied, Shared
 
 Law = Any
 """(deflection (B, N), excess (B, N) or None) -> (force (B, N), slope (B, N)), and ``status`` (B,) where it is nan."""
@@ -171,11 +171,11 @@ def differences(
     Differences on the admissible side, in one batch; a material coordinate varies the law to first order. What only the
     load cell adds needs no other film.
     """
-    changes = [Change(x, MATERIAL_STEP, law.varied(MATERIAL_STEP * rate)) for rate in np.moveaxis(jacobian, 2, 0)]
+    changes = [Varied(x, MATERIAL_STEP, law.varied(MATERIAL_STEP * rate)) for rate in np.moveaxis(jacobian, 2, 0)]
     others = iter(mounted)
     for i, effect in enumerate(e for e in composition.effects for _ in e.coordinates):
         moved, step = _moved(composition, x, i)
-        changes.append(Change(moved, step[:, None], next(others) if isinstance(effect, Geometry) else law, effect))
+        changes.append(Varied(moved, step[:, None], next(others) if isinstance(effect, Geometry) else law, effect))
     if composition.yields:
         forces, why = _yielding(composition, law, x, changes)
     else:
@@ -188,7 +188,7 @@ def differences(
 
 
 def _yielding(
-    composition: Composition, law: Law, x: Array, changes: Sequence[Change]
+    composition: Composition, law: Law, x: Array, changes: Sequence[Varied]
 ) -> tuple[list[Array], NDArray[np.int8]]:
     """Forces (B, N) of films with effect parameters x (B, k), and of each change; and `Status` (B,) where they are nan.
 

@@ -24,7 +24,7 @@ Placed = tuple[Effect, slice]
 
 
 @dataclass(frozen=True)
-class Change:
+class Varied:
     """Another point x (B, k) for a difference, ``step`` away, a number or (B, 1), and the law of its films.
 
     effect : whose parameter is another one; None of a change of the energy
@@ -51,7 +51,7 @@ class _Parts:
 class Shared:
     """R films without a frame that yields, each of B points: those with effect parameters x (B, k), and ``changes``."""
 
-    def __init__(self, placed: Sequence[Placed], path: Motion, law: Law, x: Array, changes: Sequence[Change]) -> None:
+    def __init__(self, placed: Sequence[Placed], path: Motion, law: Law, x: Array, changes: Sequence[Varied]) -> None:
         self.placed, self.path = placed, path
         self.laws, self.points = [law, *(c.law for c in changes)], [x, *(c.x for c in changes)]
         self.changed: list[Effect | None] = [None, *(c.effect for c in changes)]
