@@ -29,7 +29,7 @@ from bayesmembrane.physics.effects.base import (
 )
 from bayesmembrane.physics.frame import in_series
 from bayesmembrane.physics.mechanics.solution import Status
-from bayesmembrane.physics.shared import Varied, Shared
+from bayesmembrane.physics.shared import Shared, Varied
 
 Law = Any
 """(deflection (B, N), excess (B, N) or None) -> (force (B, N), slope (B, N)), and ``status`` (B,) where it is nan."""
