@@ -14,7 +14,7 @@ from bayesmembrane.diagnosis.explanation.case import OpenCase, Question, Tell, o
 from bayesmembrane.diagnosis.explanation.total import Judged, set_name
 from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, explained, undoubted
 from bayesmembrane.diagnosis.left.heldout import HeldOut, misfit_of, validate
-from bayesmembrane.diagnosis.left.remaining import remaining
+from bayesmembrane.diagnosis.left.remaining import Remaining, remaining
 from bayesmembrane.diagnosis.left.shape import residual_shape
 from bayesmembrane.diagnosis.left.turning import at_a_turn
 from bayesmembrane.diagnosis.reference.outliers import without_outliers
@@ -64,12 +64,12 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
     """The answer, with what was not needed to find it: power, errors on other points, what to measure next."""
     case.tell("checking on points that were set aside")
     validation = _validated(case, search, found)
-    predicts = _predicting(found, validation)
-    firm = _firm(search, predicts, _null(case, found))
-    found = _finished(search, predicts, _null(case, found), firm)
+    found, null = _predicting(found, validation), _null(case, found)
+    answer = found.members[0].candidate if found.members else _nearest(found, null)
+    left = remaining(search, answer, null)
+    firm = _firm(search, found, left)
+    found = _finished(search, found, left, set(answer.names) - set(null.names) <= set(firm))
     known = found.verdict in ("named", "ambiguous", "material")
-    answer = found.members[0].candidate if found.members else _nearest(found, _null(case, found))
-    left = remaining(search, answer, _null(case, found))
     found = replace(found, members=_adapted(search, found.members), ranking=_adapted(search, found.ranking))
     null = _null(case, found)
     best = found.members[0].candidate if known else null
@@ -131,30 +131,28 @@ def _predicting(found: Verdict, validation: HeldOut | None) -> Verdict:
     return replace(found, verdict="unknown")
 
 
-def _firm(search: Search, found: Verdict, null: Candidate) -> tuple[str, ...]:
-    """Effects beyond those of ``null`` that are together in all that is probable and explain more than what is left."""
+def _firm(search: Search, found: Verdict, left: Remaining) -> tuple[str, ...]:
+    """Effects that are together in all that is probable, and of which each explains more than what is ``left``."""
     if found.verdict not in ("named", "ambiguous"):
         return ()
-    first, p = found.members[0].candidate, found.probabilities
-    if at_a_turn(first, search.measurement) is not None:
+    if at_a_turn(found.members[0].candidate, search.measurement) is not None:
         return ()
-    names = sorted(remaining(search, first, null).firm(p.sure()), key=p.of_effect, reverse=True)
+    p = found.probabilities
+    names = sorted(left.firm(p.sure()), key=p.of_effect, reverse=True)
     while names and p.of_effect(*names) < VERDICT.sure:
         names.pop()
     return tuple(sorted(names))
 
 
-def _finished(search: Search, found: Verdict, null: Candidate, firm: Sequence[str]) -> Verdict:
+def _finished(search: Search, found: Verdict, left: Remaining, firm: bool) -> Verdict:
     """An effect that leaves structure, which no small error of the forms carries, is not the whole of it: no name,
-    unless laws are usually off by as much and all effects of the name are ``firm``. Nor has one that comes where the
-    test turns, beside a law of loops.
+    unless laws are usually off by as much and all of the name is ``firm``. Nor has one that comes where the test
+    turns, beside a law of loops.
     """
     if found.verdict != "named":
         return found
-    first = found.members[0].candidate
-    left, named = remaining(search, first, null), set(first.names) - set(null.names)
-    strange = left.strange and not (left.trifling and named <= set(firm))
-    doubtful = strange or at_a_turn(first, search.measurement) is not None
+    strange = left.strange and not (left.trifling and firm)
+    doubtful = strange or at_a_turn(found.members[0].candidate, search.measurement) is not None
     return replace(found, verdict="unknown") if doubtful else found
 
 

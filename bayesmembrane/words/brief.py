@@ -21,7 +21,6 @@ from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.words import language
 from bayesmembrane.words.diagnosis import (
     certain,
-    doubtful,
     laws_off,
     other_energy,
     percent,
@@ -123,7 +122,7 @@ class Course:
     """
 
     first: Diagnosis
-    named: tuple[Diagnosis, ...]
+    added: tuple[Diagnosis, ...]
     last: Diagnosis
     detail: Detail = Detail()
     sampled: Run | None = None
@@ -131,13 +130,13 @@ class Course:
     @property
     def before(self) -> list[Diagnosis]:
         """Those by which something had been added before the one that the verdict rests on."""
-        return [d for d in self.named if d is not self.telling]
+        return [d for d in self.added if d is not self.telling]
 
     @property
     def telling(self) -> Diagnosis:
         """The one that the verdict rests on."""
-        ended = self.named and self.named[-1].explains and self.last.verdict == "adequate"
-        return self.named[-1] if ended else self.last
+        ended = self.added and self.added[-1].explains and self.last.verdict == "adequate"
+        return self.added[-1] if ended else self.last
 
 
 def of_diagnosis(d: Diagnosis) -> Brief:
@@ -150,7 +149,7 @@ def of_loop(found: Loop, *, sized: bool = True) -> Brief:
     course = replace(course_of(found), sampled=found.rounds[-1].before.run)
     following = _next(course.last)
     before, after = found.rounds[0].before, found.rounds[-1].after
-    if course.named and course.last.verdict == "adequate":
+    if course.added and course.last.verdict == "adequate":
         following = _use(before, after)
     elif any(r.changed for r in found.rounds) and course.last.explains:
         following = f"Run the loop on from {spoken(course.last.hypothesis)}: it stopped before the end."
@@ -254,7 +253,7 @@ def _named(course: Course) -> str:
     count = len(best.names) - len(null.effects)
     who, verb = ("it", "explains") if count == 1 else ("both" if count == 2 else "together they", "explain")
     other = f", with {_energy(best)}," if best.hypothesis.material is not null.material or _bound(best) else ""
-    much = "the curve" if len(course.named) > 1 else f"{_explained(d)} of what {spoken(null)} misses"
+    much = "the curve" if len(course.added) > 1 else f"{_explained(d)} of what {spoken(null)} misses"
     return f"{who} {verb}{other} {much}{_beside(d)}"
 
 
@@ -321,8 +320,7 @@ def _strange(d: Diagnosis) -> Foreign | None:
 
 def _certain(d: Diagnosis) -> str:
     """``friction is``: of effects in all that is probable; "" if there is none, or nothing else is probable anyway."""
-    doubts = doubtful(d)
-    sure = [n for n in certain(d) if n not in doubts]
+    sure = certain(d)
     if not sure or d.probabilities.effects.get("+".join(sure), 0.0) >= VERDICT.sure:
         return ""
     return f"{listed(map(effect_title, sure))} {'is' if len(sure) == 1 else 'are'}"

@@ -427,8 +427,7 @@ def too_far(found: Diagnosis) -> str:
     first = next((fitted[name] for name in found.probabilities.effects if name in fitted), None)
     if first is None:
         return ""
-    in_question = {name: error for name, error in first.law_errors.items() if name not in found.null.names}
-    far = laws_off(in_question, VERDICT.law_carried)
+    far = laws_off(first.law_errors_beyond(found.null.names), VERDICT.law_carried)
     if first.energy_error > VERDICT.carried:
         far.insert(0, f"the energy {100 * first.energy_error:.2g} %")
     return f"it holds only with {listed(far)} off" if far else ""
@@ -460,18 +459,21 @@ def _certain(found: Diagnosis) -> str:
     are, explain = ("is", "explains") if len(doubts) == 1 else ("are", "explain")
     which = f"{listed(map(effect_title, doubts))}, which {explain} hardly more than what is left"
     so = f", and so {are} {which} and may stand in for something else" if doubts else ""
-    return f"{_at_work([n for n in sure if n not in doubts])} all that is probable{so}, yet "
+    return f"{_at_work(sure)} all that is probable{so}, yet "
 
 
 def certain(found: Diagnosis) -> list[str]:
-    """Effects that are in all that is probable, but for one that comes where the test turns."""
+    """Effects that are in all that is probable, but for the `doubtful`, and one that comes where the test turns."""
     turned = at_a_turn(found.ranking[0].candidate, found.measurement) if found.ranking else None
-    return [n for n in found.probabilities.sure() if turned is None or n != turned.name]
+    doubts = doubtful(found)
+    return [n for n in found.probabilities.sure() if n not in doubts and (turned is None or n != turned.name)]
 
 
 def doubtful(found: Diagnosis) -> list[str]:
-    """Certain effects of an `unknown` answer that explain hardly more than what is left, beside others that do."""
-    return [n for n in certain(found) if n not in found.firm] if found.firm and found.verdict == "unknown" else []
+    """Effects in all of an `unknown` answer that explain hardly more than what is left, beside others that do."""
+    if not found.firm or found.verdict != "unknown":
+        return []
+    return [n for n in found.probabilities.sure() if n not in found.firm]
 
 
 _ANSWERS = {

@@ -238,13 +238,13 @@ def test_a_strange_rest_leaves_the_name_to_what_is_firm_where_it_is_a_trifle(
     firm: tuple[str, ...],
     verdict: str,
 ) -> None:
-    left = SimpleNamespace(strange=True, trifling=trifling, firm=lambda names: [n for n in names if n in clear])
-    monkeypatch.setattr(module, "remaining", lambda *models: left)
+    left: Any = SimpleNamespace(strange=True, trifling=trifling, firm=lambda names: [n for n in names if n in clear])
     monkeypatch.setattr(module, "at_a_turn", lambda *models: None)
-    null: Any = SimpleNamespace(names=())
     first: Any = SimpleNamespace(candidate=SimpleNamespace(names=("friction", "mullins")))
     found = Verdict("named" if verdict else "ambiguous", (first,), (), Probabilities(sets, {}, {"none": 1.0}))
     search: Any = SimpleNamespace(measurement=None)
-    assert module._firm(search, found, null) == firm
-    assert module._finished(search, found, null, firm).verdict == (verdict or "ambiguous")
-    assert module._firm(search, replace(found, verdict="unknown"), null) == ()
+    assert module._firm(search, found, left) == firm
+    assert module._finished(search, found, left, {"friction", "mullins"} <= set(firm)).verdict == (
+        verdict or "ambiguous"
+    )
+    assert module._firm(search, replace(found, verdict="unknown"), left) == ()

@@ -64,6 +64,10 @@ class Candidate:
         own = [e.name for e in self.hypothesis.effects if not e.exact]
         return {name: float(np.exp(t)) for name, t in zip(own, self.theta[2:], strict=False)}
 
+    def law_errors_beyond(self, given: Collection[str]) -> dict[str, float]:
+        """The same of the effects that are in question, not of those ``given``."""
+        return {name: error for name, error in self.law_errors.items() if name not in given}
+
     def at(self, keep: NDArray[np.bool_]) -> Candidate:
         """The same, of the readings ``keep`` (N,) alone."""
         return replace(

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.signatures import slopes_of_effect
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
-from bayesmembrane.diagnosis.explanation.visible import Ratio, own_traces
+from bayesmembrane.diagnosis.explanation.visible import Ratio
+from bayesmembrane.diagnosis.reference.noise import free_of
 from bayesmembrane.diagnosis.thresholds import GROWTH
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
@@ -39,7 +40,7 @@ def promised(search: Weighing, base: Candidate, effect: Effect, counts: float = 
     and absorbed nearby, of which only a fit says how large it is.
     """
     slopes, best = _slopes(search, base, [effect]), -np.inf
-    lengths = np.linalg.norm(own_traces(slopes.white, search.noise.white(base.slopes)), axis=0)
+    lengths = np.linalg.norm(free_of(search.noise.white(base.slopes), slopes.white), axis=0)
     for f in _freed(search, base, slopes):
         for i in np.flatnonzero(f.left):
             along, square, length = float(f.along[i]), float(f.product[i, i]), float(lengths[i])

@@ -172,7 +172,7 @@ def _carried(candidate: Candidate, given: Sequence[str]) -> bool:
     """True if it is not the effects that explain the curve, but errors of their laws or of the energy: of the laws of
     those that are in question, not of those ``given``.
     """
-    law = max((e for name, e in candidate.law_errors.items() if name not in given), default=0.0)
+    law = max(candidate.law_errors_beyond(given).values(), default=0.0)
     return candidate.energy_error > VERDICT.carried or law > VERDICT.law_carried
 
 

@@ -13,7 +13,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.unfitted import Key
-from bayesmembrane.diagnosis.reference.noise import orthonormal
+from bayesmembrane.diagnosis.reference.noise import free_of
 from bayesmembrane.diagnosis.thresholds import GROWTH, TINY
 from bayesmembrane.ground.parameters import Array
 
@@ -162,7 +162,7 @@ def log_seen(
             if one_sided:  # where one is at its end the likelihood may speak for the other sign
                 sizes = np.where(sizes == 0, np.minimum(unbound[own] - null, 0.0), sizes)
             ratio = own_ratio(
-                own_traces(white[:, own], others),
+                free_of(others, white[:, own]),
                 sizes,
                 covariance[np.ix_(own, own)],
                 search.expected_sizes(effect),
@@ -195,9 +195,3 @@ def own_ratio(own: Array, sizes: Array, covariance: Array, expected: Array, one_
     mean = 0.0 if not np.any(sizes) else -length if one_sided and along @ usual < 0 else length
     found = Ratio(mean, sd, float(np.linalg.norm(usual)), one_sided)
     return found.without_prior(float(np.linalg.norm(turn * local))).resolved
-
-
-def own_traces(white: Array, others: Array) -> Array:
-    """Columns (N, m), freed of noise, less what ``others`` (N, p) can take of them."""
-    basis = orthonormal(others)
-    return np.asarray(white - basis @ (basis.T @ white))

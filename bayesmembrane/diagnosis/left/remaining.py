@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.weighing import Weighing, beyond_noise
-from bayesmembrane.diagnosis.reference.noise import orthonormal
+from bayesmembrane.diagnosis.reference.noise import free_of
 from bayesmembrane.diagnosis.thresholds import VERDICT
 from bayesmembrane.ground.parameters import Array
 
@@ -80,7 +80,7 @@ def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining
         law_errors=model.law_errors,
         dof=dof,
         excess=max(float(left), 0.0),
-        changed=_own(trace, white[:, :material]),
+        changed=float(np.sum(free_of(white[:, :material], trace) ** 2)),
         own=dict(_own_traces(model, white)),
     )
 
@@ -92,12 +92,5 @@ def _own_traces(model: Candidate, white: Array) -> Iterator[tuple[str, float]]:
         places = [place + i for i in effect.sizes]
         null = np.array([effect.coordinates[i].null or 0.0 for i in effect.sizes])
         others = np.delete(white, range(place, place + len(effect.coordinates)), axis=1)
-        yield effect.name, _own(white[:, places] @ (model.x[places] - null), others)
+        yield effect.name, float(np.sum(free_of(others, white[:, places] @ (model.x[places] - null)) ** 2))
         place += len(effect.coordinates)
-
-
-def _own(trace: Array, others: Array) -> float:
-    """Squares of a ``trace`` (N,), less what columns ``others`` (N, p) can take of it."""
-    basis = orthonormal(others)
-    own = trace - basis @ (basis.T @ trace)
-    return float(own @ own)

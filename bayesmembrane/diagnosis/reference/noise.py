@@ -141,3 +141,9 @@ def orthonormal(basis: Array, tolerance: float = NOISE.rank) -> Array:
     length = np.linalg.norm(basis, axis=0)
     u, s, _ = np.linalg.svd(basis[:, length > 0] / length[length > 0], full_matrices=False)
     return np.asarray(u[:, s > tolerance * (s[0] if s.size else 1.0)])
+
+
+def free_of(others: Array, columns: Array) -> Array:
+    """``columns`` (N,) or (N, m), less what ``others`` (N, p) can take of them."""
+    basis = orthonormal(others)
+    return np.asarray(columns - basis @ (basis.T @ columns))

@@ -356,7 +356,7 @@ def _evaluate(pieces, step, last, prestretch, length, tautness, deflection, exce
         for n in range(points):
             x, sign = deflection[b, n], 1.0
             if taut > 0.0 and x <= 0.0:
-                x, sign = -x, -1.0
+                x, sign = -x, (-1.0 if x < 0.0 else 1.0)
             elif not x > 0.0:
                 force[b, n] = 0.0
                 slope[b, n] = 0.0
