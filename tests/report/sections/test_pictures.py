@@ -2,6 +2,8 @@
 
 import io
 from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from bayesmembrane.report.sections.break_points import break_picture
 from bayesmembrane.report.sections.calibrations import forest_picture
 from bayesmembrane.report.sections.curves import Fitted, Panel, first_look
 from bayesmembrane.report.sections.reconstruction import LossBar, Recovered, reconstruction_picture
+from bayesmembrane.report.sections.run import draws as draws_of_a_run
 from bayesmembrane.report.sections.run.draws import (
     Marginal,
     Walk,
@@ -188,3 +191,25 @@ def test_a_drawing_is_a_cloud_where_it_has_many_marks(points: int, kind: str) ->
     made = encoded(drawn(points, 2), "svg")
     assert made.kind == kind
     assert len(made.data) <= MOST_SVG
+
+
+@pytest.mark.parametrize("count", [7, 12, 18])
+def test_names_of_many_panels_stand_apart_and_on_the_page(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
+    made = list[Any]()
+    monkeypatch.setattr(draws_of_a_run, "encoded", lambda figure, kind: made.append(figure))
+    names = [("level", "extra noise")[i % 2] for i in range(count)]
+    corner_plot(np.random.default_rng(3).standard_normal((200, count)), names, ["MPa"] * count, "yeoh")
+    figure = made[0]
+    figure.draw_without_rendering()
+    axes = np.array(figure.axes).reshape(count, count)
+    boxes = [axes[i, 0].yaxis.label.get_window_extent() for i in range(1, count)]
+    assert all(not a.overlaps(b) for a, b in pairwise(boxes))
+    under = [axes[-1, i].xaxis.label for i in range(count)]
+    starts = [t.get_window_extent().x1 for t in under]
+    turned = [t.get_rotation() for t in under]
+    assert np.min(np.diff(starts)) > 0.3 * figure.dpi
+    assert all(r == 45 for r in turned) or all(
+        not a.get_window_extent().overlaps(b.get_window_extent()) for a, b in pairwise(under)
+    )
+    inside = figure.bbox.padded(1)
+    assert all(inside.x0 <= b.x0 and inside.y0 <= b.y0 for b in (*boxes, *(t.get_window_extent() for t in under)))

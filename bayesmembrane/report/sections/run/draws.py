@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator, NullFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.quiet import arviz
@@ -24,6 +24,7 @@ from bayesmembrane.report.style import ALARM, FAINT, INK, MUTED, RANGE_COLOURS, 
 
 ENSEMBLES = (*RANGE_COLOURS, "#E69F00")
 MOST_MEANS = 150  # of a line of means
+NARROW = 0.85  # inches: beside each other, names of panels that are narrower would run into one another
 
 
 def corner_plot(
@@ -75,7 +76,9 @@ def corner_plot(
 
 def _corner_margins(figure: Figure, m: int, size: float, logarithmic: Sequence[bool]) -> None:
     """Room for ticks and labels in inches, however many panels there are."""
-    left, right, gap = 0.95, 0.1, 0.07
+    right, gap = 0.1, 0.07
+    narrow = (size - 0.95 - right) / m < NARROW
+    left, away, ticks = (2.1, 0.6, 2) if narrow else (0.95, 0.72, 3)
     figure.subplots_adjust(
         left=left / size, bottom=left / size, right=1 - right / size, top=1 - right / size, wspace=gap, hspace=gap
     )
@@ -88,14 +91,21 @@ def _corner_margins(figure: Figure, m: int, size: float, logarithmic: Sequence[b
         if logarithmic[column]:
             ax.xaxis.set_minor_formatter(NullFormatter())
         else:
-            ax.xaxis.set_major_locator(MaxNLocator(3, prune="both"))
-        ax.xaxis.set_label_coords(0.5, -0.72 / panel)
+            ax.xaxis.set_major_locator(MaxNLocator(ticks, prune="both"))
+        ax.xaxis.set_label_coords(0.5, -away / panel)
         if row > column:
             if logarithmic[row]:
                 ax.yaxis.set_minor_formatter(NullFormatter())
             else:
-                ax.yaxis.set_major_locator(MaxNLocator(3, prune="both"))
-            ax.yaxis.set_label_coords(-0.72 / panel, 0.5)
+                ax.yaxis.set_major_locator(MaxNLocator(ticks, prune="both"))
+            ax.yaxis.set_label_coords(-away / panel, 0.5)
+        if narrow:
+            ax.tick_params(labelsize=7)
+            ax.xaxis.label.set(rotation=45, rotation_mode="anchor", ha="right", va="top")
+            ax.yaxis.label.set(rotation=0, ha="right", va="center")
+            for axis, log in ((ax.xaxis, logarithmic[column]), (ax.yaxis, logarithmic[row] and row > column)):
+                if log:
+                    axis.set_major_locator(LogLocator(numticks=3))
 
 
 def _wide(values: Array) -> bool:
