@@ -13,6 +13,7 @@ from bayesmembrane.ground.errors import unknown_name
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import material as material_named
 from bayesmembrane.physics.mechanics import fallback
+from bayesmembrane.physics.mechanics.near_flat import lifted, settled
 from bayesmembrane.physics.mechanics.profile import profile
 from bayesmembrane.physics.mechanics.request import Request, Spared, request
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
@@ -40,8 +41,9 @@ def solve(request: Request) -> Curves:
     films, deflections = request.deflection.shape
     some = LANES * max(1, TOGETHER // deflections // LANES)
     parts = [slice(i, i + some) for i in range(0, films, some)]
-    solver = SOLVERS[request.solver]
-    return solver(request) if len(parts) == 1 else joined([solver(request.of(part)) for part in parts])
+    solver, asked = SOLVERS[request.solver], lifted(request)
+    found = solver(asked) if len(parts) == 1 else joined([solver(asked.of(part)) for part in parts])
+    return found if asked is request else settled(found, request)
 
 
 def unaided(asked: Request, solve: Solve = solve) -> Curves:

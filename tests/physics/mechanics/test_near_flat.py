@@ -1,0 +1,61 @@
+"""Forces of a film that is all but flat: a drive that comes back to rest reads some nanometres."""
+
+import numpy as np
+import pytest
+
+from bayesmembrane.ground.registry import materials, ordinary_materials
+from bayesmembrane.physics.mechanics.api import solve
+from bayesmembrane.physics.mechanics.near_flat import FLAT
+from bayesmembrane.physics.mechanics.request import request
+from bayesmembrane.physics.mechanics.ritz import solver as ritz
+from bayesmembrane.physics.mechanics.solution import Status
+from tests.physics.mechanics.films import SILICONE
+
+RIGS = ((0.010, 0.035), (0.0086, 0.0486), (0.020, 0.023), (0.003, 0.060), (0.002, 0.120))
+STRETCHES = (1.0, 1 + 1e-9, 1 + 1e-7, 1 + 1e-5, 1.001, 1.05)
+
+
+def asked(name, deflection, inner, outer, **more):
+    parameters = materials()[name].from_vector(np.array(SILICONE[name])).vector
+    return request(materials()[name], parameters, deflection, inner, outer, **more)
+
+
+@pytest.mark.parametrize("name", sorted(ordinary_materials()))
+@pytest.mark.parametrize(("inner", "outer"), RIGS)
+def test_every_film_has_a_force_however_little_it_is_lifted(name, inner, outer):
+    d = (outer - inner) * np.array([1.0, 10.0, 1e2, 1e4, 3e5, 1e7, 5e7]) * 1e-8
+    for l0 in STRETCHES:
+        found = solve(asked(name, [0.0, *d, *-d], inner, outer, prestretch=l0))
+        assert np.all(found.status == Status.OK), l0
+        force = found.force[0]
+        assert force[0] == 0.0
+        assert np.all(np.diff(force[: d.size + 1]) > 0)
+        np.testing.assert_array_equal(force[d.size + 1 :], -force[1 : d.size + 1])
+
+
+@pytest.mark.parametrize("l0", [1.0, 1.001, 1.05])
+def test_the_law_of_a_flat_film_equals_what_the_solver_finds_where_it_finds_it(l0):
+    d = 0.025 * FLAT * np.array([0.1, 0.3, 0.7, 0.999])
+    found = asked("mooney_rivlin", d, 0.010, 0.035, prestretch=l0, sensitivities=True)
+    law, solved = solve(found), ritz.solve(found)
+    assert np.all(solved.status == Status.OK)
+    for name in ("force", "slope", "sensitivity"):
+        np.testing.assert_allclose(getattr(law, name), getattr(solved, name), rtol=3e-6)
+    np.testing.assert_allclose(law.energy, solved.energy, rtol=1e-6, atol=1e-6 * np.max(solved.energy))
+    np.testing.assert_allclose(law.max_stretch, solved.max_stretch, rtol=1e-9)
+
+
+@pytest.mark.parametrize("l0", [1.0, 1 + 3e-8, 1 + 1e-6, 1.05])
+def test_energy_force_and_slope_are_derivatives_of_one_another_and_meet_the_solver_s(l0):
+    least = FLAT * 0.025
+    d = least * np.linspace(0.2, 1.0, 50)
+    found = solve(asked("neo_hookean", [*d, least * 1.0001], 0.010, 0.035, prestretch=l0))
+    assert found.force[0, -1] == pytest.approx(found.force[0, -2], rel=1e-3)
+    force, slope = found.force[0, :-1], found.slope[0, :-1]
+    middle = 0.5 * (d[1:] + d[:-1])
+    at = solve(asked("neo_hookean", middle, 0.010, 0.035, prestretch=l0))
+    np.testing.assert_allclose(np.diff(force) / np.diff(d), at.slope[0], rtol=1e-3)
+    assert np.all(slope > 0)
+    flat = solve(asked("neo_hookean", [0.0], 0.010, 0.035, prestretch=l0)).energy[0, 0]
+    done = found.energy[0, 0] + np.concatenate([[0.0], np.cumsum(np.diff(d) * at.force[0])])
+    np.testing.assert_allclose(found.energy[0, :-1] - flat, done - flat, rtol=1e-3, atol=1e-13 * abs(flat))
