@@ -33,9 +33,10 @@ SAMPLERS = ("auto", "emcee")
 SURE = 0.02
 """Standard error of ln Z up to which a mixture is drawn from, if `MOST_FOR_Z` draws do for that."""
 MOST_FOR_Z = 10_000
-SLOW, SLOW_SHAPES = 1000, 8000
-"""Steps for `LEAST_TAUS`, from which on emcee's ensembles are as fast as a mixture that holds them up; of shapes, where
-they have to walk along a narrow valley."""
+SLOW = 8000
+"""Steps for `LEAST_TAUS`, from which on a mixture that holds walkers up is mended, or given up: ensembles that walk
+along a narrow valley take longer. (Ogden with a form error, replicate 0 of `tests.studies.sbc` halfway back: 340 s of a
+processor by ensembles, to which 1000 steps had led, 45 s by mixtures.)"""
 DOUBTED = 5000  # draws of a mixture after which it is looked at for the first time
 GIVEN_UP = 2 * DOUBTED
 """Draws from which on a mixture whose weights are not good is given up; until then no draw of it counts."""
@@ -164,10 +165,10 @@ def run_ensembles(
             if walk.chains.steps >= settings.most_steps:
                 status = "step limit"
                 break
-            if not _worth_it(posterior, walk.chains, found) and walk.mend():
+            if not _worth_it(walk.chains, found) and walk.mend():
                 target = min(settings.most_steps, walk.chains.look)
                 continue
-            if walk.chains.steps >= next_lesson(walk.chains) or not _worth_it(posterior, walk.chains, found):
+            if walk.chains.steps >= next_lesson(walk.chains) or not _worth_it(walk.chains, found):
                 walk.learn()
             target = min(settings.most_steps, _next_look(walk.chains, found, settings))
         if asked.signalled:  # a signal that came at the very end still ends what follows
@@ -189,12 +190,11 @@ def _good(chains: Chains) -> bool:
     return found.good and (not mending or found.k_hat < K_HAT_MENDED)
 
 
-def _worth_it(posterior: Posterior, chains: Chains, found: Convergence) -> bool:
+def _worth_it(chains: Chains, found: Convergence) -> bool:
     """Whether it is still worth while to have a mixture propose, if one does."""
     if chains.mixture is None or chains.offered is None:
         return True
-    of_shapes = chains.mixture.means.shape[1] < posterior.size
-    slow = LEAST_TAUS * float(np.max(found.tau)) > (SLOW_SHAPES if of_shapes else SLOW)
+    slow = LEAST_TAUS * float(np.max(found.tau)) > SLOW
     # Few weights that end at a bound, as where the prior is cut, look like a tail: they are given some more.
     few = chains.offered[:, chains.learned :].size < GIVEN_UP
     return not slow and (_good(chains) or few)
