@@ -446,7 +446,7 @@ def why_not(found: Diagnosis) -> str:
             f"its 90 % band holds only {100 * v.covered_after:.0f} % of the points that were set aside ({set_aside(v)})"
         )
     if found.members and (turned := at_a_turn(found.members[0].candidate, found.measurement)) is not None:
-        return f"{turned.title} comes where the test turns, where laws of loops are farthest off"
+        return f"{turned.title} comes where the test turns, and what makes loops may leave as much there"
     left = found.remaining
     return f"what it leaves (reduced chi-square {left.reduced_chi2:.2f}) is no noise, and no small error of the forms"
 

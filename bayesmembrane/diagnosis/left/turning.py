@@ -1,4 +1,4 @@
-"""What comes where a test turns, beside a law that makes loops there."""
+"""What comes where a test turns, and may be no more than what loops leave there."""
 
 from __future__ import annotations
 
@@ -11,16 +11,19 @@ from bayesmembrane.physics.effects.base import Effect
 
 
 def at_a_turn(candidate: Candidate, measurement: Measurement) -> Effect | None:
-    """An effect that begins within `VERDICT.at_a_turn` of the test about a turn, where another one remembers the way.
+    """An effect that begins within `VERDICT.at_a_turn` of the test about a turn, and may be no more than a loop.
 
-    Laws of loops are farthest off where a test turns, and what comes there of itself may be no more than that.
+    Laws of loops are farthest off where a test turns, so that beside an effect that remembers the way what comes there
+    may make up for that. And behind the last turn, where the disc only comes back, whatever opposes the motion leaves
+    a force that falls at once, too: only another loading would show that a part of the film is gone.
     """
     effects, path = candidate.hypothesis.effects, measurement.path
     turns = path.clock[np.flatnonzero(np.diff(path.leg))]
     near = VERDICT.at_a_turn * float(np.ptp(path.clock))
     for e in effects:
         others = any(o.remembers for o in effects if o is not e)
-        if others and any(np.any(np.abs(moment - turns) < near) for moment in _moments(e, candidate)):
+        doubtful = turns if others else turns[-1:] if path.leg[-1] < 0 else turns[:0]
+        if any(np.any(np.abs(moment - doubtful) < near) for moment in _moments(e, candidate)):
             return e
     return None
 

@@ -1,4 +1,4 @@
-"""What begins at a turn beside a law of loops is told, and nothing else is."""
+"""What begins at a turn beside a law of loops, or at the last one, is told, and nothing else is."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -31,12 +31,14 @@ def torn_beside_loops(names: Sequence[str] = ("tearing", "hysteresis")) -> tuple
         (["tearing", "hysteresis"], 40.5, True),  # the second peak; the first is at 10 s
         (["tearing", "hysteresis"], 10.4, True),
         (["tearing", "hysteresis"], 33.0, False),
-        (["tearing", "force_offset"], 40.5, False),
-        (["tearing"], 40.5, False),
+        (["tearing", "force_offset"], 40.5, True),  # nothing is loaded again after that
+        (["tearing"], 40.5, True),
+        (["tearing", "force_offset"], 10.4, False),
+        (["tearing"], 10.4, False),
         (["hysteresis", "friction"], 40.5, False),
     ],
 )
-def test_a_tear_at_a_turn_beside_loops_is_told(names: list[str], moment: float, told: bool) -> None:
+def test_a_tear_at_a_turn_is_told_where_loops_may_be_all_of_it(names: list[str], moment: float, told: bool) -> None:
     search, fit = torn_beside_loops(names)
     m, h = search.measurement, fit.hypothesis
     turns = m.path.clock[np.flatnonzero(np.diff(m.path.leg))]
