@@ -59,3 +59,13 @@ def test_energy_force_and_slope_are_derivatives_of_one_another_and_meet_the_solv
     flat = solve(asked("neo_hookean", [0.0], 0.010, 0.035, prestretch=l0)).energy[0, 0]
     done = found.energy[0, 0] + np.concatenate([[0.0], np.cumsum(np.diff(d) * at.force[0])])
     np.testing.assert_allclose(found.energy[0, :-1] - flat, done - flat, rtol=1e-3, atol=1e-13 * abs(flat))
+
+
+@pytest.mark.parametrize("name", sorted(ordinary_materials()))
+@pytest.mark.parametrize("apart", [1e-10, 1e-9, 2e-9, 5e-9, 2e-8, 1e-7, 1e-6])
+def test_readings_that_are_nanometres_apart_have_the_forces_of_those_alone(name, apart):
+    up = np.linspace(0.0, 12.5e-3, 36)[1:]
+    alone = ritz.solve(asked(name, up, 0.0113, 0.0226))
+    both = ritz.solve(asked(name, np.sort(np.concatenate([up, up + apart])), 0.0113, 0.0226))
+    assert np.all(both.status == Status.OK)
+    np.testing.assert_allclose(both.force[0, ::2], alone.force[0], rtol=1e-8)

@@ -257,13 +257,15 @@ def backsolve(band, low, width, y, z):
 
 
 def predict(q, dq, old, dold, d_new, d, d_old, guess):
-    """Extrapolate the unknowns to d_new: Hermite cubic through two states, or the tangent if they are the same.
+    """Extrapolate the unknowns to d_new: Hermite cubic through two states, or the tangent if they are nearly the same.
+
+    Of two states that a drive reaches again to within nanometres, the difference is round-off.
 
     For small d the hoop coefficients grow like d^2 and then saturate, the height's grow like d: divided by
     d^2/(1+d^2) and by d they vary slowly with x = ln d, and so they are extrapolated.
     """
     ahead, span, one = np.log(d_new / d), np.log(d / d_old), splat(1.0)
-    cubic = where(greatest(span - 1e-9, 0.0), one, 0.0)
+    cubic = where(greatest(span - 1e-5, 0.0), one, 0.0)
     inverse = 1.0 / (span + (1.0 - cubic))
     for i in range(q.shape[0]):
         if i % 2 == 0:
