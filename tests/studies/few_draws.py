@@ -20,12 +20,11 @@ from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mi
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.candidates.sampled import _TruePosterior, sampled
 from bayesmembrane.diagnosis.candidates.search import Search
-from bayesmembrane.diagnosis.thresholds import SAMPLED
 from bayesmembrane.ground.parameters import Array
 from tests.studies.reliability import SOURCES, diagnosed, warmed
 
 FEW = 0.15
-"""Part of the first rounds' draws; where more count, nothing is asked."""
+"""Part of the draws; where more count, nothing is asked."""
 HYPOTHESES = 8
 """Of each case, the most probable ones."""
 ROUNDS, DRAWS, LEARN_FROM = 10, 1500, 600
@@ -88,7 +87,7 @@ def compared(source: str, half: str, seed: int, first: int, count: int) -> tuple
         for judged in found.ranking[:HYPOTHESES]:
             c = judged.candidate
             few = [sampled(search, c, np.random.default_rng(s)) for s in SEEDS]
-            if min(f.counting for f in few) >= FEW * SAMPLED.rounds * SAMPLED.draws:
+            if min(f.counting / f.drawn for f in few) >= FEW:
                 continue
             many, counting = by_many(_TruePosterior(search, c), np.random.default_rng(11))
             if counting < LEAST:

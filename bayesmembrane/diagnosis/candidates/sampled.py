@@ -81,13 +81,13 @@ def sampled(search: Weighing, candidate: Candidate, rng: np.random.Generator) ->
     target = _TruePosterior(search, candidate)
     proposals = [_Proposal.about(target.mean, target.covariance)]
     u, density = np.empty((0, candidate.x.size)), np.empty(0)
-    for number in range(1, SAMPLED.most_rounds + 1):
+    for _ in range(SAMPLED.most_rounds):
         new = proposals[-1].drawn(SAMPLED.draws, rng)
         u, density = np.concatenate([u, new]), np.concatenate([density, target.log_density(new)])
         q = np.logaddexp.reduce([p.log_density(u) for p in proposals], axis=0) - np.log(len(proposals))
         weights = density - q
         effective = _effective(weights)
-        if effective >= (SAMPLED.enough if number < SAMPLED.rounds else SAMPLED.enough_later):
+        if effective >= SAMPLED.enough:
             break
         if effective:
             proposals.append(_fitted(u, weights, target.covariance))
