@@ -147,7 +147,7 @@ def _firm(search: Search, found: Verdict, left: Remaining) -> tuple[str, ...]:
 def _finished(search: Search, found: Verdict, left: Remaining, firm: bool) -> Verdict:
     """An effect that leaves structure, which no small error of the forms carries, is not the whole of it: no name,
     unless laws are usually off by as much and all of the name is ``firm``. Nor has one that comes where the test
-    turns, beside a law of loops.
+    turns, beside a law of loops, or at its last turn, whatever is beside it.
     """
     if found.verdict != "named":
         return found

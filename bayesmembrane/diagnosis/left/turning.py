@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.thresholds import GROWTH, VERDICT
 from bayesmembrane.physics.effects.base import Effect
@@ -14,18 +15,25 @@ def at_a_turn(candidate: Candidate, measurement: Measurement) -> Effect | None:
     """An effect that begins within `VERDICT.at_a_turn` of the test about a turn, and may be no more than a loop.
 
     Laws of loops are farthest off where a test turns, so that beside an effect that remembers the way what comes there
-    may make up for that. And behind the last turn, where the disc only comes back, whatever opposes the motion leaves
-    a force that falls at once, too: only another loading would show that a part of the film is gone.
+    may make up for that. And about the last turn, after which no loading comes half as far again, whatever opposes the
+    motion leaves a force that falls at once, too: only another loading would show that a part of the film is gone.
     """
     effects, path = candidate.hypothesis.effects, measurement.path
-    turns = path.clock[np.flatnonzero(np.diff(path.leg))]
+    ends = np.flatnonzero(np.diff(path.leg)).tolist()
+    turns, last = path.clock[ends], path.clock[[i for i in ends if _last(path, i)]]
     near = VERDICT.at_a_turn * float(np.ptp(path.clock))
     for e in effects:
         others = any(o.remembers for o in effects if o is not e)
-        doubtful = turns if others else turns[-1:] if path.leg[-1] < 0 else turns[:0]
+        doubtful = turns if others else last
         if any(np.any(np.abs(moment - doubtful) < near) for moment in _moments(e, candidate)):
             return e
     return None
+
+
+def _last(path: Motion, end: int) -> bool:
+    """Whether the disc turns down at reading ``end``, and is not lifted half as far again."""
+    again = path.deflection[end + 1 :][path.leg[end + 1 :] > 0]
+    return bool(path.leg[end] > 0 and np.max(again, initial=0.0) < VERDICT.loads_again * path.deflection[end])
 
 
 def _moments(effect: Effect, candidate: Candidate) -> list[float]:

@@ -11,8 +11,9 @@ from bayesmembrane.physics.mechanics.request import Request
 from bayesmembrane.physics.mechanics.solution import Curves
 
 FLAT = 3e-4
-"""Of the free width: below it strains are less than 1e-7 and the film is linear elastic, to 1e-7 of its force. Solvers,
-which lose films of wide rigs from 4e-5 on, are asked for this deflection instead."""
+"""Of the free width: below it strains are less than 3e-7 (4e-6 beside a pre-stretch, on the widest rigs) and the film
+is linear elastic, to 2e-7 of its force. Solvers, which lose films of wide rigs from 4e-5 on, are asked for this
+deflection instead."""
 
 
 def lifted(request: Request) -> Request:
@@ -30,10 +31,12 @@ def settled(curves: Curves, request: Request) -> Curves:
 
         F(d) = (1 - k) F0 s^3 + k F0 s,  s = d / d0,  3 - 2 k = F0' d0 / F0,
 
-    which is the law of a flat film without (k = 0) and of one with a pre-stretch (k = 1), and close to it between.
+    which is the law of a flat film without (k = 0) and of one with a pre-stretch (k = 1), and close to it between: up
+    to a tenth of a force that is below 1e-11 N, where the pre-stretch is 1e-7 to 1e-5.
     """
-    lift, l0 = curves.deflection, request.prestretch[:, None]
-    s = np.where(lift == 0, 1.0, request.deflection / np.where(lift == 0, 1.0, lift))
+    l0 = request.prestretch[:, None]
+    lift = np.where(curves.deflection == 0, 1.0, curves.deflection)
+    s = np.where(curves.deflection == 0, 1.0, request.deflection / lift)
     near = s != 1
     with np.errstate(invalid="ignore", divide="ignore"):
         k = np.where(l0 == 1, 0.0, np.clip((3 - curves.slope * lift / curves.force) / 2, 0.0, 1.0))

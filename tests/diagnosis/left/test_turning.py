@@ -33,6 +33,8 @@ def torn_beside_loops(names: Sequence[str] = ("tearing", "hysteresis")) -> tuple
         (["tearing", "hysteresis"], 33.0, False),
         (["tearing", "force_offset"], 40.5, True),  # nothing is loaded again after that
         (["tearing"], 40.5, True),
+        (["tearing"], 39.5, True),  # of a turn, too, what comes just before
+        (["tearing"], 45.0, False),  # in the middle of a leg no loop lets a force fall at once
         (["tearing", "force_offset"], 10.4, False),
         (["tearing"], 10.4, False),
         (["hysteresis", "friction"], 40.5, False),
@@ -65,3 +67,17 @@ def test_a_first_tear_at_a_turn_of_which_nothing_is_left_is_not_told() -> None:
     for name, value in (("moment", 40.5), ("second", 1.0), ("second_moment", 33.0)):
         x[fit.hypothesis.names.index(f"tearing.{name}")] = value
     assert at_a_turn(replace(fit, x=x), search.measurement) is None
+
+
+@pytest.mark.parametrize(("lifted", "told"), [(0.0, True), (1e-3, True), (15e-3, True), (25e-3, False)])
+def test_a_turn_is_the_last_one_unless_the_disc_is_lifted_half_as_far_again(lifted: float, told: bool) -> None:
+    d = np.concatenate([triangle(60), np.linspace(0.0, lifted, 8)[1:]]) if lifted else triangle(60)
+    m = measured(8 * d, d)
+    h = hypothesis("neo_hookean", ["tearing"]).on(m)
+    search = Search(m, white_noise(m, SD))
+    (start,) = search.material_starts(hypothesis("neo_hookean"))[:1]
+    fit = search.at(h, np.concatenate([start, *([p.first for p in e.coordinates] for e in h.effects)]))
+    assert fit is not None
+    x = fit.x.copy()
+    x[h.names.index("tearing.moment")] = m.path.clock[np.argmax(d)]
+    assert (at_a_turn(replace(fit, x=x), m) is not None) is told

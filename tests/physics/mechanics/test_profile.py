@@ -64,6 +64,21 @@ def test_flat_film_stays_flat():
     np.testing.assert_allclose(shape.height, 0.0, atol=1e-5 * MM)
 
 
+@pytest.mark.parametrize("prestretch", [1.0, 1.05])
+@pytest.mark.parametrize(("inner", "outer"), [(0.0086, 0.0486), (0.003, 0.060), (0.010, 0.035)])
+@pytest.mark.parametrize("deflection", [1e-9, -1e-8, 1e-7, 3e-6])
+def test_a_film_that_is_all_but_flat_has_the_shape_of_one_lifted_further(inner, outer, prestretch, deflection):
+    film, radii = NeoHookean(7.5), {"inner_radius": inner, "outer_radius": outer, "prestretch": prestretch}
+    shape, lifted = profile(film, deflection, **radii), profile(film, 4e-4 * (outer - inner), **radii)
+    part = deflection / (4e-4 * (outer - inner))
+    assert shape.status is Status.OK
+    np.testing.assert_allclose(shape.height, part * lifted.height, atol=1e-5 * abs(deflection))
+    np.testing.assert_allclose(shape.l2 - prestretch, part**2 * (lifted.l2 - prestretch), atol=1e-11)
+    np.testing.assert_allclose(shape.l1 - prestretch, part**2 * (lifted.l1 - prestretch), atol=1e-11)
+    curves = solve(request(NeoHookean, film.vector, deflection, inner, outer, prestretch=prestretch))
+    assert shape.force == pytest.approx(curves.force[0, 0], rel=1e-9)
+
+
 def test_a_film_without_a_state_says_why():
     shape = profile(Gent(5.0, 2.0), 91.5 * MM, **RADII)
     assert shape.status is Status.LOCKED

@@ -112,13 +112,15 @@ def _of_all_coordinates(search: _Learning, tried: Tried) -> Independent | None:
     best = max(found, key=_rank, default=None)
     if best is None or best.worth.efficiency < HOPELESS:
         return None
-    more = best
     with suppress(np.linalg.LinAlgError):
+        more: Independent | None = best
         for _ in range(FILLINGS):
-            more = search.relearned(more) or more
-            if more is not best and _rank(more) >= (True, LEAST_FILLED):
-                return more
-    best = max(best, more, key=_rank)
+            more = search.relearned(more or best)
+            if more is not None:
+                found.append(more)
+                if _rank(more) >= (True, LEAST_FILLED):
+                    return more
+    best = max(found, key=_rank)
     return best if _rank(best) >= (True, LEAST) else None
 
 

@@ -42,6 +42,8 @@ RESULTS = 13
 # What a lane does, and what it is about to do (see `decide`).
 ACCEPT, HALVE, RESTART, FINISH, ALPHA, BASE, FALL, MODE, MOVES = range(9)
 FRESH, RUNNING, DONE, LOST = 0.0, 1.0, 2.0, 3.0
+# Of ln d: the distance of two states below which what lies between them is round-off.
+NEARLY_ONE = 1e-5
 # Codes of `solution.Status`.
 OK, NOT_ELLIPTIC, INDEFINITE, UNRESOLVED, ITERATION_LIMIT = 0.0, 2.0, 3.0, 4.0, 5.0
 
@@ -259,13 +261,13 @@ def backsolve(band, low, width, y, z):
 def predict(q, dq, old, dold, d_new, d, d_old, guess):
     """Extrapolate the unknowns to d_new: Hermite cubic through two states, or the tangent if they are nearly the same.
 
-    Of two states that a drive reaches again to within nanometres, the difference is round-off.
+    Of two states closer than `NEARLY_ONE` in ln d, as where a drive comes back to a place, the difference is round-off.
 
     For small d the hoop coefficients grow like d^2 and then saturate, the height's grow like d: divided by
     d^2/(1+d^2) and by d they vary slowly with x = ln d, and so they are extrapolated.
     """
     ahead, span, one = np.log(d_new / d), np.log(d / d_old), splat(1.0)
-    cubic = where(greatest(span - 1e-5, 0.0), one, 0.0)
+    cubic = where(greatest(span - NEARLY_ONE, 0.0), one, 0.0)
     inverse = 1.0 / (span + (1.0 - cubic))
     for i in range(q.shape[0]):
         if i % 2 == 0:

@@ -1,12 +1,22 @@
 """A mixture learned in rounds: close to what is known, or none."""
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 from scipy.stats import norm
 
 from bayesmembrane.calibration.posterior import Evaluation, Outcome, Outcomes
 from bayesmembrane.calibration.sampling.proposals import filling
-from bayesmembrane.calibration.sampling.proposals.independent import CHECKED, EACH, FILLINGS, ROUNDS, independent
+from bayesmembrane.calibration.sampling.proposals.independent import (
+    CHECKED,
+    EACH,
+    FILLINGS,
+    ROUNDS,
+    _of_all_coordinates,
+    independent,
+)
 from bayesmembrane.calibration.sampling.weights import worth
 from bayesmembrane.calibration.starts import Tried
 
@@ -68,3 +78,29 @@ def test_what_no_mixture_follows_is_given_up() -> None:
     close, counts = found(Known(6, "spikes"), 1.0, 14)
     assert close is None
     assert counts["ok"] <= ROUNDS * EACH + FILLINGS * (filling.FIRST + filling.TURNS * filling.EACH + CHECKED)
+
+
+def worth_so(efficiency: float, good: bool = True) -> Any:
+    return SimpleNamespace(worth=SimpleNamespace(good=good, efficiency=efficiency))
+
+
+@pytest.mark.parametrize(
+    ("unfilled", "fillings", "best"),
+    [
+        ((0.03,), [(0.07,), (0.03,)], 0.07),  # the first filling is the best one
+        ((0.03,), [(0.07,), (0.07, False)], 0.07),
+        ((0.01,), [(0.07,), (0.07, False)], 0.07),
+        ((0.05, False), [(0.079,), (0.019,)], 0.079),
+        ((0.03,), [None, (0.04,)], 0.04),
+        ((0.03,), [None, None], 0.03),
+        ((0.01,), [(0.015,), None], None),
+        ((0.03,), [(0.09,), (0.5,)], 0.09),  # enough, and not filled again
+    ],
+)
+def test_the_best_of_all_fillings_is_kept(unfilled: Any, fillings: list[Any], best: float | None) -> None:
+    left = [None if f is None else worth_so(*f) for f in fillings]
+    search = SimpleNamespace(
+        round=lambda tried, *_: (worth_so(*unfilled), tried), relearned=lambda _: left.pop(0) if left else None
+    )
+    found = _of_all_coordinates(cast(Any, search), cast(Any, None))
+    assert (None if found is None else found.worth.efficiency) == best
