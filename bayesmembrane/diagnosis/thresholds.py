@@ -6,7 +6,7 @@ One frozen class for each room, and one instance of it: ``NOISE.doubt_from_dof``
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 TINY = 1e-300
 """No threshold: keeps a quotient finite where its denominator is zero."""
@@ -185,16 +185,33 @@ class FormThresholds:
 
 
 @dataclass(frozen=True)
+class Drawing:
+    """When importance sampling ends.
+
+    enough : draws that count, with which it does, in the first ``early`` rounds
+    enough_later : and from then on
+    most_rounds : at most; what is not found by then is not found
+    share : of the sum, from which on a hypothesis is checked so: effort, not belief
+    """
+
+    enough: float
+    early: int
+    enough_later: float
+    most_rounds: int
+    share: float
+
+
+@dataclass(frozen=True)
 class SampledThresholds:
     """How linear evidence is checked by importance sampling, where it decides."""
 
     draws: int = 128
     """Of a round."""
-    enough: float = 100.0
-    """Draws that count, with which it ends: ln Z to 0.1, but for what is missed."""
-    most_rounds: int = 64
-    """At most: what is not found by then is not found. With 8 rounds, and 8 draws that count from the third on, two
-    runs of one hypothesis were 0.9 apart in the mean where few draws count, and are 0.4; docs/studies/few_draws.md."""
+    first: Drawing = field(default_factory=lambda: Drawing(60.0, 3, 8.0, 8, 0.003))
+    """Of all that may decide."""
+    last: Drawing = field(default_factory=lambda: Drawing(100.0, 0, 100.0, 40, 0.03))
+    """Of what then leads: two runs of one hypothesis of which few draws count are 0.4 apart in ln Z in the mean, and
+    0.9 by the first ones; docs/studies/few_draws.md."""
     freedom: float = 6.0
     """Of the t-distribution: tails that no posterior of this kind has more of."""
     kept: float = 0.1
@@ -213,8 +230,6 @@ class SampledThresholds:
     """Part of the draws that count, with which no tail is missed."""
     unseen: float = 0.6
     """Times ln(`all_seen` / e) is what draws miss of ln Z, if a part e of them counts; docs/studies/few_draws.md."""
-    decides: float = 0.003
-    """Of the sum: from that share on a hypothesis is checked."""
     most: int = 60
     """Hypotheses that are checked: effort, not belief."""
 

@@ -25,7 +25,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import Linear
 from bayesmembrane.diagnosis.candidates.standard import Standard
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
-from bayesmembrane.diagnosis.thresholds import SAMPLED
+from bayesmembrane.diagnosis.thresholds import SAMPLED, Drawing
 from bayesmembrane.ground.parameters import Array
 
 
@@ -61,18 +61,20 @@ class ByDraws:
         return self.counting >= SAMPLED.least
 
 
-def checked(search: Weighing, candidate: Candidate) -> Candidate:
-    """The candidate with ln Z by importance sampling; as it is where too few draws count.
+def checked(search: Weighing, candidate: Candidate, drawing: Drawing = SAMPLED.first) -> Candidate:
+    """The candidate with ln Z by importance sampling; with that of the linear model where too few draws count.
 
     Its draws are its own: what was checked before, and which energy was asked about, changes nothing.
     """
     rng = np.random.default_rng([search.seed, *candidate.label.encode()])
-    found = sampled(search, candidate, rng)
-    more = found.difference
-    return replace(candidate, log_evidence=candidate.log_evidence + more, by_draws=more) if found.good else candidate
+    found = sampled(search, candidate, rng, drawing)
+    more = found.difference if found.good else 0.0
+    return replace(candidate, log_evidence=candidate.log_evidence - candidate.by_draws + more, by_draws=more)
 
 
-def sampled(search: Weighing, candidate: Candidate, rng: np.random.Generator) -> ByDraws:
+def sampled(
+    search: Weighing, candidate: Candidate, rng: np.random.Generator, drawing: Drawing = SAMPLED.first
+) -> ByDraws:
     """How far the evidence of ``candidate`` is off for being linear.
 
     Every round of draws is from a t-distribution about what the draws before say of the posterior, and all of them
@@ -81,13 +83,13 @@ def sampled(search: Weighing, candidate: Candidate, rng: np.random.Generator) ->
     target = _TruePosterior(search, candidate)
     proposals = [_Proposal.about(target.mean, target.covariance)]
     u, density = np.empty((0, candidate.x.size)), np.empty(0)
-    for _ in range(SAMPLED.most_rounds):
+    for number in range(drawing.most_rounds):
         new = proposals[-1].drawn(SAMPLED.draws, rng)
         u, density = np.concatenate([u, new]), np.concatenate([density, target.log_density(new)])
         q = np.logaddexp.reduce([p.log_density(u) for p in proposals], axis=0) - np.log(len(proposals))
         weights = density - q
         effective = _effective(weights)
-        if effective >= SAMPLED.enough:
+        if effective >= (drawing.enough if number < drawing.early else drawing.enough_later):
             break
         if effective:
             proposals.append(_fitted(u, weights, target.covariance))

@@ -195,20 +195,24 @@ def _kept(out: Grown, fits: Sequence[Candidate]) -> list[Candidate]:
 
 
 def _checked(out: Grown) -> None:
-    """Importance sampling of all that decides: of the null model, and of every hypothesis that has a share in the sum.
+    """Importance sampling of all that decides: of the null model, and of every hypothesis that has a share in the sum;
+    more of it of those that lead then.
 
     One that loses by it gives its share to others, which then are checked in their turn.
     """
-    rest = dict(out.found)
     out.case.tell("checking what decides by importance sampling")
     null = (out.case.null.hypothesis.material.name, frozenset(out.case.null.names))
     seen = out.seen()
-    for _ in range(SAMPLED.most):
-        shares = _shares(out, seen)
-        key = null if null in rest else max(rest, key=shares.__getitem__, default=null)
-        if key not in rest or (key != null and shares[key] < np.log(SAMPLED.decides)):
-            break
-        out.found[key] = checked(out.search, rest.pop(key))
+    for drawing in (SAMPLED.first, SAMPLED.last):
+        rest = dict.fromkeys(out.found)
+        for _ in range(SAMPLED.most):
+            shares = _shares(out, seen)
+            first = drawing is SAMPLED.first and null in rest
+            key = null if first else max(rest, key=shares.__getitem__, default=null)
+            if key not in rest or not (first or shares[key] > np.log(drawing.share)):
+                break
+            del rest[key]
+            out.found[key] = checked(out.search, out.found[key], drawing)
 
 
 def _grow(out: Grown) -> bool:
@@ -273,7 +277,7 @@ def _with_parts(out: Grown) -> None:
     An effect of no size would seem to matter where the energy beside it is what explains the curve.
     """
     shares = _shares(out, out.seen())
-    near = [out.found[key] for key, share in shares.items() if share > np.log(SAMPLED.decides)]
+    near = [out.found[key] for key, share in shares.items() if share > np.log(SAMPLED.first.share)]
     steps = [(c, name) for c in near for name in _own(out, c)]
     new = [(c, n) for c, n in steps if (c.hypothesis.material.name, frozenset(c.names) - {n}) not in out.found]
     _search_on(out, [without_effect(c, name) for c, name in new])

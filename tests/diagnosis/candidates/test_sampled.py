@@ -9,9 +9,11 @@ import pytest
 from scipy.integrate import dblquad
 
 from bayesmembrane.diagnosis.candidates import sampled as module
+from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.sampled import checked, sampled
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.thresholds import SAMPLED
+from bayesmembrane.physics.hypothesis import hypothesis
 
 LINEAR = -3.0
 
@@ -44,8 +46,11 @@ def test_a_bent_valley_has_the_integral_that_quadrature_finds(target, seed: int)
 
 def test_a_target_that_no_draw_finds_leaves_the_linear_evidence(target) -> None:
     target.log_density = nothing
-    candidate = SimpleNamespace(x=np.zeros(2), label="nothing")
-    assert checked(cast(Weighing, SimpleNamespace(seed=0)), cast(Any, candidate)) is candidate
+    two = np.zeros(2)
+    for by_draws in (0.0, 1.5):  # and of what was drawn before
+        known = Candidate(hypothesis("neo_hookean"), two, two, two, -4.0 + by_draws, (), two, two, two, by_draws)
+        after = checked(cast(Weighing, SimpleNamespace(seed=0)), known)
+        assert (after.log_evidence, after.by_draws) == (-4.0, 0.0)
 
 
 VALLEYS = 5
@@ -65,7 +70,7 @@ def exact() -> float:
 def mean_error(monkeypatch: pytest.MonkeyPatch, unseen: float) -> float:
     monkeypatch.setattr(module, "SAMPLED", replace(SAMPLED, unseen=unseen))
     asked = cast(Any, SimpleNamespace(x=np.zeros(2 * VALLEYS)))
-    found = [sampled(cast(Weighing, None), asked, np.random.default_rng(seed)) for seed in range(40)]
+    found = [sampled(cast(Weighing, None), asked, np.random.default_rng(s), SAMPLED.last) for s in range(40)]
     return LINEAR + float(np.mean([f.difference for f in found])) - VALLEYS * exact()
 
 
@@ -81,8 +86,8 @@ def test_draws_go_on_until_enough_count(target) -> None:
     k = 2 * VALLEYS
     target.log_density, target.mean, target.fit, target.covariance = valleys, np.zeros(k), np.zeros(k), np.eye(k)
     asked = cast(Any, SimpleNamespace(x=np.zeros(k)))
-    found = [sampled(cast(Weighing, None), asked, np.random.default_rng(seed)) for seed in range(3)]
-    assert all(f.counting >= SAMPLED.enough for f in found)
+    found = [sampled(cast(Weighing, None), asked, np.random.default_rng(s), SAMPLED.last) for s in range(3)]
+    assert all(f.counting >= SAMPLED.last.enough for f in found)
     assert all(f.drawn > 2 * SAMPLED.draws for f in found)
 
 
@@ -91,4 +96,4 @@ def test_draws_go_on_where_none_counts(target, monkeypatch: pytest.MonkeyPatch) 
     drawn: list[int] = []
     monkeypatch.setattr(target, "log_density", lambda u: drawn.append(len(u)) or nothing(u))
     assert not sampled(cast(Weighing, None), asked, np.random.default_rng(0)).good
-    assert drawn == [SAMPLED.draws] * SAMPLED.most_rounds
+    assert drawn == [SAMPLED.draws] * SAMPLED.first.most_rounds
