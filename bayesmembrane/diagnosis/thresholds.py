@@ -84,6 +84,11 @@ class DetectionThresholds:
     """Waves over the range for it to be a periodicity; fewer are a bend."""
     fewest_points: int = 60
     """Points for waves to be looked for; a shorter curve shows none."""
+    fewest_moving: int = 24
+    """Points between holds for waves of the deflection."""
+    wave_step: float = 0.5
+    """Of a wave over the range, between two that are looked at: a quarter of one off, a wave loses a fifth of its
+    squares, half of one off three fifths."""
     exact_peaks: int = 5
     """The periodogram's highest peaks that are judged exactly, beside what the reference has taken."""
     slowest_part: float = 0.06

@@ -8,7 +8,8 @@ import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.reference.noise import Whitened, orthonormal
-from bayesmembrane.diagnosis.thresholds import DETECTION, REFERENCE, TINY
+from bayesmembrane.diagnosis.reference.smooth import spline_count
+from bayesmembrane.diagnosis.thresholds import DETECTION, TINY
 from bayesmembrane.ground.parameters import Array
 
 
@@ -55,8 +56,8 @@ def periodicity(measurement: Measurement, model: Whitened) -> Periodicity | None
         return None
     t = np.arange(n, dtype=float) if measurement.time is None else measurement.time
     found = [_strongest(t, model, "time", (DETECTION.slowest_part * n / 2, n / 2))]
-    if np.count_nonzero(measurement.moving) >= DETECTION.fewest_points:
-        ends = REFERENCE.spline_columns / 2, most_waves(measurement)
+    if np.count_nonzero(measurement.moving) >= DETECTION.fewest_moving:
+        ends = spline_count(measurement) / 2, most_waves(measurement)
         found.append(_strongest(measurement.deflection, model, "deflection", ends))
     best = min(found, key=lambda f: f.p_value)
     return replace(best, p_value=min(1.0, len(found) * best.p_value))
@@ -66,7 +67,7 @@ def _strongest(place: Array, model: Whitened, against: str, ends: tuple[float, f
     """The strongest of so many waves over the range: of slower ones the smooth reference has taken the evidence."""
     rest, q = model.rest, model.reference
     span, freedom = float(np.ptp(place)), rest.size - q.shape[1]
-    waves = np.arange(max(DETECTION.least_waves, ends[0]), ends[1])
+    waves = np.arange(max(DETECTION.least_waves, ends[0]), ends[1], DETECTION.wave_step)
     if span == 0 or waves.size < 2 or freedom < 4:
         return Periodicity(against, np.inf, 0.0, 1.0)
     from scipy.signal import lombscargle  # on demand: most of a second, and most residuals are not tested

@@ -22,7 +22,7 @@ from bayesmembrane.diagnosis.detection.periodicity import most_waves
 from bayesmembrane.diagnosis.explanation.limit import Limit, limit_of
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
-from bayesmembrane.diagnosis.thresholds import FOREIGN
+from bayesmembrane.diagnosis.thresholds import DETECTION, FOREIGN
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.form_error import LARGEST, LAW
 
@@ -255,7 +255,7 @@ def _waves(m: Measurement) -> _Family:
     """Cosines and sines over the readings' time, then over the deflection where the disc moves."""
     size = FOREIGN.size / 3 * float(np.max(np.abs(m.force)))
     places = [("time", m.path.clock[m.on_path], _frequencies(len(m) / 2))]
-    if np.count_nonzero(m.moving) >= FOREIGN.least_points:
+    if np.count_nonzero(m.moving) >= DETECTION.fewest_moving:
         places.append(("deflection", m.deflection, _frequencies(most_waves(m))))
     phases = [(_phase(place), frequencies) for _, place, frequencies in places]
 

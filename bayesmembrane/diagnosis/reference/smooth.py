@@ -20,10 +20,8 @@ def smooth_reference(measurement: Measurement) -> Array:
     what tells legs apart.
     """
     d = measurement.deflection
-    room = max(len(measurement) // REFERENCE.points_per_column, 1)
-    still = measurement.holds
-    moving = np.delete(d, np.concatenate(still)) if still else d
-    columns = [splines(d, min(REFERENCE.spline_columns, room, max(np.unique(moving).size // 2, 1)), moving)]
+    room, still = _room(measurement), measurement.holds
+    columns = [splines(d, spline_count(measurement), _moving(measurement))]
     starts = np.flatnonzero(np.diff(measurement.leg.astype(int))) + 1
     legs = np.split(np.arange(d.size), starts)
     if len(legs) > 1:
@@ -31,6 +29,21 @@ def smooth_reference(measurement: Measurement) -> Array:
         columns += [_on_leg(d, leg, REFERENCE.leg_columns if enough else 1) for leg in legs]
     columns += [_on_hold(measurement.path.clock[measurement.on_path], hold) for hold in still]
     return np.concatenate(columns, axis=1)
+
+
+def spline_count(measurement: Measurement) -> int:
+    """Degrees of freedom in the deflection: no wave with more than half as many over the range is followed."""
+    return min(REFERENCE.spline_columns, _room(measurement), max(np.unique(_moving(measurement)).size // 2, 1))
+
+
+def _room(measurement: Measurement) -> int:
+    return max(len(measurement) // REFERENCE.points_per_column, 1)
+
+
+def _moving(measurement: Measurement) -> Array:
+    """Deflections (M,) m of the readings outside of holds."""
+    still = measurement.holds
+    return np.delete(measurement.deflection, np.concatenate(still)) if still else measurement.deflection
 
 
 def splines(d: Array, count: int, at: Array | None = None) -> Array:

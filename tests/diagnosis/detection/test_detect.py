@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.detection import periodicity as waves_of
 from bayesmembrane.diagnosis.detection.detect import Detection
 from bayesmembrane.diagnosis.detection.lack_of_fit import LackOfFit
@@ -31,6 +32,32 @@ def test_a_wave_is_found_with_its_period(against, period) -> None:
     # As exactly as one wave more or less over the range.
     assert abs(np.ptp(place) / found.period - np.ptp(place) / period) < 1
     assert found.p_value < 1e-6
+
+
+def stepwise(n: int = 8, rise: float = 2.5e-3, held: int = 15) -> Measurement:
+    """(N,) five ramps of ``n`` readings with holds behind them: few readings move."""
+    d, t = [0.0], [0.0]
+    for step in range(5):
+        d += [step * rise + rise * (i + 1) / n for i in range(n)] + held * [(step + 1) * rise]
+        t += [t[-1] + 0.2 * (i + 1) for i in range(n)]
+        t += [t[-1] + 0.5 * (i + 1) for i in range(held)]
+    return measured(np.zeros(len(d)), np.array(d[1:] + d[-1:]), np.array(t[1:] + [t[-1] + 1.0]))
+
+
+def test_a_wave_is_found_where_few_readings_move() -> None:
+    """It stands still in the holds, and has four readings a period between them."""
+    m = stepwise()
+    rng, basis, place = np.random.default_rng(16), smooth_reference(m), m.deflection
+    assert 24 <= np.count_nonzero(m.moving) < 60
+    found, alarms = [], 0
+    for _ in range(40):
+        noise = SD * rng.standard_normal(len(m))
+        alarms += periodicity(m, noise, basis, white_noise(m)).p_value < 0.05
+        wave = 3 * SD * np.sin(2 * np.pi * place / 1.1e-3 + rng.uniform(0, 6))
+        found.append(periodicity(m, noise + wave, basis, white_noise(m)))
+    assert np.mean([f.p_value < 0.01 and f.against == "deflection" for f in found]) > 0.8
+    assert np.median([f.period for f in found]) == pytest.approx(1.1e-3, rel=0.05)
+    assert alarms <= 40 * 0.05 + 3 * np.sqrt(40 * 0.05)
 
 
 def test_white_noise_raises_no_more_alarms_than_it_may() -> None:
