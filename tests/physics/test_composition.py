@@ -11,6 +11,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.effects._history import growth
 from bayesmembrane.physics.effects.base import FilmState
+from bayesmembrane.physics.effects.clamp_slip import ClampSlip
 from bayesmembrane.physics.effects.machine_compliance import MachineCompliance
 from bayesmembrane.physics.effects.permanent_set import PermanentSet
 from bayesmembrane.physics.effects.tearing import Tearing
@@ -177,16 +178,16 @@ def test_what_grows_never_shrinks(name: str) -> None:
     assert loading[-1] < 0.99 * loading[0]
 
 
-def test_a_clamp_that_slips_at_once_does_so_at_its_place_and_stays() -> None:
-    """As one that sticks until then: nothing before that deflection is reached for the first time."""
+def test_a_clamp_that_slips_at_once_does_so_at_its_moment_and_stays() -> None:
+    """As one that sticks until then: nothing before."""
     m = measured(staircase((0.02, 0.06, 0.02), 400))
-    f, plain = force(m, "clamp_slip", x=np.array([0.03, 2.0, 0.0, 0.0, 1.0, 0.5, 0.5, 0.0, 0.5, 0.015])), force(m)
-    first, last = m.cycle == 1, m.cycle == 3
-    over = (m.cycle == 2) & (m.leg > 0) & (m.deflection > 0.034)
-    assert f[first] == pytest.approx(plain[first], rel=1e-2)
-    assert np.all(f[over] < 0.98 * plain[over])
-    well = last & (m.deflection > 0.012)
-    assert np.all(f[well] < 0.98 * plain[well])
+    up = (m.cycle == 2) & (m.leg > 0)
+    moment = float(np.interp(0.03, m.deflection[up], m.path.clock[up]))
+    p = np.array([[0.03, 2.0, 0.0, 0.0, 1.0, moment, 0.5, 0.0, moment, 1.0]])
+    excess = ClampSlip().on(Reach(0.06, 1.0, float(m.path.clock[-1]))).excess(p, m.deflection[None], m.path)[0]
+    before, after = m.path.clock < moment - 10, m.path.clock > moment + 10
+    assert excess[before] == pytest.approx(0.0, abs=1e-5)
+    assert excess[after] == pytest.approx(0.03, abs=1e-5)
 
 
 def test_a_tear_runs_at_its_moment_in_a_hold_too_and_comes_to_rest() -> None:

@@ -151,9 +151,8 @@ def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
     sought = []
     for f in (f for f in falls if len(_own(out, f.base)) < _most(out)):
         for effect in out.case.visible:
-            shape = next((s for s in effect.starts if effect.begins in s), None)
-            if shape is not None and effect.sudden and effect.name not in f.base.names:
-                shapes = [{**shape, effect.begins: f.on_clock}]
+            shapes = effect.come_at(f.on_clock)
+            if shapes and effect.name not in f.base.names:
                 starts = starts_with([f.base.x], effect, out.search.expected_sizes(effect), shapes)
                 sought.append(Sought(with_effects(f.base.hypothesis, [effect]), starts, f.base))
     sought += [s for f in falls if (s := _begun_again(f)) is not None]

@@ -29,6 +29,8 @@ JUMP = EffectParameter("jump", "-", "part of it that comes at once", Uniform(0.0
 SECOND = EffectParameter(
     "second", "-", "part of that which comes in a second event", HalfNormal(0.3), (0.0, 1.0), begin=0.0
 )
+AT_ONCE = 2e-3
+"""Of the duration: what takes no longer comes at once."""
 TOGETHER = 8
 """Films that are relaxed side by side."""
 STILL = 1e-7

@@ -182,6 +182,10 @@ class Effect(ABC):
         """Shapes by name from which searches for it start, beside the typical ones."""
         return []
 
+    def come_at(self, moment: float) -> list[dict[str, float]]:
+        """Shapes by name from which it is searched for where it is seen to come at a ``moment`` (s on the clock)."""
+        return []
+
     @property
     def second_places(self) -> list[float]:
         """Where a second event is looked for, of which searches begin without: one is found from nearby only."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
-from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, SECOND, growth
+from bayesmembrane.physics.effects._history import AT_ONCE, CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, SECOND, growth
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 from bayesmembrane.physics.reach import SOURCE
 
@@ -76,6 +76,13 @@ class Tearing(Carried):
     def starts(self) -> list[dict[str, float]]:
         whole = self._whole
         return [{"jump": 0.05}, *({"jump": 0.6, "moment": part * whole, "takes": 0.03 * whole} for part in PLACES)]
+
+    def come_at(self, moment: float) -> list[dict[str, float]]:
+        """In a while, and at once."""
+        return [
+            {"jump": 0.6, "moment": moment, "takes": 0.03 * self._whole},
+            {"jump": 0.9, "moment": moment, "takes": AT_ONCE * self._whole},
+        ]
 
     @property
     def second_places(self) -> list[float]:

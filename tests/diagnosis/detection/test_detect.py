@@ -41,7 +41,7 @@ def stepwise(n: int = 8, rise: float = 2.5e-3, held: int = 15) -> Measurement:
         d += [step * rise + rise * (i + 1) / n for i in range(n)] + held * [(step + 1) * rise]
         t += [t[-1] + 0.2 * (i + 1) for i in range(n)]
         t += [t[-1] + 0.5 * (i + 1) for i in range(held)]
-    return measured(np.zeros(len(d)), np.array(d[1:] + d[-1:]), np.array(t[1:] + [t[-1] + 1.0]))
+    return measured(np.zeros(len(d)), np.array(d[1:] + d[-1:]), np.array([*t[1:], t[-1] + 1.0]))
 
 
 def test_a_wave_is_found_where_few_readings_move() -> None:

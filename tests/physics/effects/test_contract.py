@@ -143,6 +143,17 @@ def test_draws_do_not_mix(effect: Effect, curve: Measurement) -> None:
 
 
 @every
+def test_what_is_sudden_is_searched_for_at_the_moment_at_which_it_is_seen(effect: Effect, curve: Measurement) -> None:
+    (own,) = hypothesis("yeoh", [effect.name]).on(curve).effects
+    shapes = own.come_at(0.4 * curve.path.clock[-1])
+    assert bool(shapes) is own.sudden
+    known = {p.name: p for p in own.coordinates}
+    for shape in shapes:
+        assert shape[own.begins] == 0.4 * curve.path.clock[-1]
+        assert all(known[n].bounds[0] <= v <= known[n].bounds[1] for n, v in shape.items())
+
+
+@every
 def test_slopes_are_those_of_the_force(effect: Effect, curve: Measurement) -> None:
     """Against central differences over a larger step, and on the admissible side of each bound."""
     h = hypothesis("yeoh", [effect.name])
