@@ -178,16 +178,17 @@ def test_what_grows_never_shrinks(name: str) -> None:
     assert loading[-1] < 0.99 * loading[0]
 
 
-def test_a_clamp_that_slips_at_once_does_so_at_its_moment_and_stays() -> None:
-    """As one that sticks until then: nothing before."""
+def test_a_clamp_that_slips_at_once_does_so_at_its_place_and_at_its_moment_and_stays() -> None:
+    """As one that sticks until then: nothing before that deflection is reached for the first time, nor that moment."""
     m = measured(staircase((0.02, 0.06, 0.02), 400))
-    up = (m.cycle == 2) & (m.leg > 0)
-    moment = float(np.interp(0.03, m.deflection[up], m.path.clock[up]))
-    p = np.array([[0.03, 2.0, 0.0, 0.0, 1.0, moment, 0.5, 0.0, moment, 1.0]])
-    excess = ClampSlip().on(Reach(0.06, 1.0, float(m.path.clock[-1]))).excess(p, m.deflection[None], m.path)[0]
-    before, after = m.path.clock < moment - 10, m.path.clock > moment + 10
-    assert excess[before] == pytest.approx(0.0, abs=1e-5)
-    assert excess[after] == pytest.approx(0.03, abs=1e-5)
+    whole, reached = float(m.path.clock[-1]), np.maximum.accumulate(m.deflection)
+    slipping = ClampSlip().on(Reach(0.06, 1.0, whole))
+    for second in (0.0, 0.4, 1.0):
+        p = np.array([[0.03, 2.0, 0.0, 0.0, 1.0, 0.5, 0.5, second, 0.9 * whole, 1e-3]])
+        excess = slipping.excess(p, m.deflection[None], m.path)[0]
+        gone = (1 - second) * (reached > 0.03) + second * (m.path.clock > 0.9 * whole)
+        sharp = (np.abs(reached - 0.03) > 1e-3) & (np.abs(m.path.clock / whole - 0.9) > 0.02)
+        assert excess[sharp] == pytest.approx(0.03 * gone[sharp], abs=1e-5)
 
 
 def test_a_tear_runs_at_its_moment_in_a_hold_too_and_comes_to_rest() -> None:

@@ -171,7 +171,7 @@ def _begun_again(f: Foreign) -> Sought | None:
     """
     names, x = list(f.base.hypothesis.names), f.base.x.copy()
     for e in f.base.hypothesis.effects:
-        if e.second is not None and e.begins == e.second[1]:
+        if e.second is not None and e.begins in e.second[1:]:
             part, _, place = (names.index(f"{e.name}.{own}") for own in e.second)
             if x[part] < GROWTH.no_event:
                 x[part], x[place] = GROWTH.second_part, f.on_clock

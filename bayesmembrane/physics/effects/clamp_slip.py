@@ -11,33 +11,25 @@ from scipy.special import expit
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.physics.effects._history import AT_ONCE, CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, SECOND, growth
-from bayesmembrane.physics.effects.base import EffectParameter, Slack
+from bayesmembrane.physics.effects.base import EffectParameter, Slack, running_max
 from bayesmembrane.physics.reach import SOURCE
 
-MOMENT = EffectParameter(
-    "moment",
-    "s",
-    "when it slips at once",
-    Uniform(0.0, SOURCE.duration),
-    (0.0, SOURCE.duration),
-    of_the_test=True,
-    event="clock",
-)
-PLACES = (0.15, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-"""Of the duration: moments to begin a search with, for one is found from nearby only."""
+JUMPS = tuple({"jump": 0.6, "place": place} for place in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9))
+"""Shapes to begin a search with: a jump is found from nearby only."""
 SECOND_PLACES = tuple(np.linspace(0.02, 0.98, 33).tolist())
-"""Of the duration: moments at which it may slip once more."""
+"""Of the duration: moments at which it may slip once more, or for the first time."""
 
 
 @dataclass(frozen=True)
 class ClampSlip(Slack):
-    """Free length L (1 + slip [(1 - jump) G + jump ((1 - second) H(moment) + second H(second_moment))]),
-    H(m) = 1 / (1 + exp((m - t) / takes)).
+    """Free length L (1 + slip [(1 - jump) G + jump ((1 - second) H(m / D - place) + second H((t - moment) / T))]),
+    H(x) = 1 / (1 + exp(-x / width)).
 
-    G is the growth law of the test (1 after a first loading to its full range), t the time since its start: a film
-    creeps out of its clamp, and sticks until it slips at once, be it in a hold or where it was before, sticks again,
-    and slips a second time. What has slid out stays out: the film is slack until the longer film is taut. Without times
-    the clock is the distance travelled at 1 mm/s.
+    G is the growth law of the test (1 after a first loading to its full range D), m the largest deflection so far, t
+    the time since the start of a test that takes T: a film creeps out of its clamp, and sticks until it slips at once
+    as it is stretched further than before, and at some moment, be it in a hold or where it was before. What has slid
+    out stays out: the film is slack until the longer film is taut. Without times the clock is the distance travelled at
+    1 mm/s.
     On an annulus of 10 and 35 mm a length s that slides out of the outer clamp acts as slip = 0.80 s / L, to a tenth of
     its effect (Yeoh film, 12 to 70 mm, against the exact solution: tests/reference/test_slip.py).
     """
@@ -52,7 +44,7 @@ class ClampSlip(Slack):
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("permanent_set",)  # both are a film that has become longer
     sudden: ClassVar[bool] = True
     begins: ClassVar[str] = "moment"
-    second: ClassVar[tuple[str, str, str] | None] = ("second", "moment", "second_moment")
+    second: ClassVar[tuple[str, str, str] | None] = ("second", "place", "moment")
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "slip", "-", "length slid out on a first loading, over the free length", HalfNormal(0.02), (0.0, 0.5), 0.0
@@ -61,31 +53,37 @@ class ClampSlip(Slack):
         REPEATED,
         SATURATION,
         JUMP,
-        MOMENT,
-        CREEPS,
-        SECOND,
-        replace(MOMENT, name="second_moment", meaning="when it slips once more"),
         EffectParameter(
-            "takes",
+            "place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1), event="way"
+        ),
+        CREEPS,
+        replace(SECOND, meaning="part of that which comes at a moment"),
+        EffectParameter(
+            "moment",
             "s",
-            "how long it slides at once",
-            LogNormal(0.005 * SOURCE.duration, 1.2),
-            (1e-4 * SOURCE.duration, 0.3 * SOURCE.duration),
+            "when it slips at a moment",
+            Uniform(0.0, SOURCE.duration),
+            (0.0, SOURCE.duration),
             of_the_test=True,
-            begin=0.015 * SOURCE.duration,
+            event="clock",
+        ),
+        EffectParameter(
+            "width",
+            "-",
+            "how long it slides at once, over the full range or the time of the test",
+            LogNormal(0.005, 1.2),
+            (1e-4, 0.3),
+            begin=0.015,
         ),
     )
 
     @property
     def starts(self) -> list[dict[str, float]]:
-        return [{"jump": 0.05}, *({"jump": 0.6, "moment": part * self._whole} for part in PLACES)]
+        return [{"jump": 0.05, "place": 0.5}, *JUMPS]
 
     def come_at(self, moment: float) -> list[dict[str, float]]:
         """In a while, and at once."""
-        return [
-            {"jump": 0.6, "moment": moment},
-            {"jump": 0.9, "moment": moment, "takes": AT_ONCE * self._whole},
-        ]
+        return [{"jump": 0.9, "second": 0.95, "moment": moment, "width": width} for width in (0.015, AT_ONCE)]
 
     @property
     def second_places(self) -> list[float]:
@@ -98,6 +96,7 @@ class ClampSlip(Slack):
 
     def excess(self, p: Array, deflection: Array, path: Motion) -> Array:
         slow = growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4], p[:, 6:7])
-        first, then = (expit((path.clock - p[:, i : i + 1]) / p[:, 9:10]) for i in (5, 8))
+        reached, since = running_max(deflection) / path.full_range, (path.clock - p[:, 8:9]) / self._whole
+        first, then = (expit(past / p[:, 9:10]) for past in (reached - p[:, 5:6], since))
         at_once = first + p[:, 7:8] * (then - first)
         return np.asarray(p[:, :1] * ((1 - p[:, 4:5]) * slow + p[:, 4:5] * at_once))

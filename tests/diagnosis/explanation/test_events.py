@@ -45,17 +45,20 @@ def fitted(m: Measurement, effect: str) -> tuple[Search, Candidate]:
 def test_what_came_in_two_steps_is_found_in_both(effect: str) -> None:
     m = strip(effect, (0.45, 0.03), (0.8, 0.05))
     search, found = fitted(m, effect)
+    _, first, second = found.hypothesis.effects[0].second
     one_event = found.x.copy()
-    for name, value in (("second", 0.0), ("second_moment", 0.05)):
+    for name, value in (("second", 0.0), (second, 0.05)):
         one_event[found.hypothesis.names.index(f"{effect}.{name}")] = value
     once = search.at(found.hypothesis, one_event)
     assert once is not None
     (twice,) = with_second_events(search, [once])
     assert twice.log_evidence > once.log_evidence + 50
-    p = twice.parameters
-    loading = m.deflection[: POINTS // 4 + 1] / RIG.length
-    moments = np.sort([p[f"{effect}.moment"], p[f"{effect}.second_moment"]])
-    assert moments == pytest.approx(np.interp([0.45, 0.8], loading, m.time[: POINTS // 4 + 1]), abs=0.03 * m.time[-1])
+    p, begun = twice.parameters, POINTS // 4 + 1
+    moments = [p[f"{effect}.{name}"] for name in (first, second)]
+    if first == "place":
+        moments[0] = float(np.interp(moments[0], m.deflection[:begun] / RIG.length, m.time[:begun]))
+    whole = np.interp([0.45, 0.8], m.deflection[:begun] / RIG.length, m.time[:begun])
+    assert np.sort(moments) == pytest.approx(whole, abs=0.03 * m.time[-1])
 
 
 @pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
@@ -65,22 +68,29 @@ def test_what_came_at_once_has_no_second_event(effect: str) -> None:
     assert once.x[share] < GROWTH.no_event
     for c in with_second_events(search, [once]):
         assert c.x[share] < 5 * GROWTH.no_event
-        assert c.log_evidence < once.log_evidence + 3
+        assert c.log_evidence < once.log_evidence + 4  # what the noise of a reading brings
 
 
-@pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
-def test_all_of_it_in_the_second_event_is_one_event(effect: str) -> None:
-    search, found = fitted(strip(effect, (0.45, 0.03), (0.8, 0.05)), effect)
+def test_all_of_it_in_the_second_event_is_one_event() -> None:
+    """Of a tear: of two that come alike either may be the first."""
+    search, found = fitted(strip("tearing", (0.45, 0.03), (0.8, 0.05)), "tearing")
     x, names = found.x.copy(), found.hypothesis.names
-    part, first, second, jump = (
-        names.index(f"{effect}.{own}") for own in (*found.hypothesis.effects[0].second, "jump")
-    )
+    part, first, second, jump = (names.index(f"tearing.{n}") for n in ("second", "moment", "second_moment", "jump"))
     x[[part, first, second, jump]] = 1.0, 0.3 * x[first], x[first], 0.99
     one = search.at(found.hypothesis, x)
     assert one is not None
     (twice,) = with_second_events(search, [one])
     assert GROWTH.no_event < twice.x[part] < 1 - GROWTH.no_event
     assert twice.log_evidence > one.log_evidence + 50
+
+
+def test_of_what_comes_with_the_way_and_at_a_moment_none_is_taken_for_the_other() -> None:
+    search, found = fitted(strip("clamp_slip", (0.45, 0.03), (0.8, 0.05)), "clamp_slip")
+    x, names = found.x.copy(), found.hypothesis.names
+    x[names.index("clamp_slip.second")] = 1.0
+    one = search.at(found.hypothesis, x)
+    assert one is not None
+    assert with_second_events(search, [one]) == []
 
 
 @pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
@@ -98,16 +108,18 @@ def test_an_effect_without_events_is_left_as_it_is() -> None:
     assert with_second_events(search, [once]) == []
 
 
-@pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
-def test_wherever_between_two_readings_it_came_its_moment_is_known(effect: str) -> None:
+@pytest.mark.parametrize(
+    ("effect", "place", "sharp"), [("clamp_slip", "place", "width"), ("tearing", "moment", "takes")]
+)
+def test_wherever_between_two_readings_it_came_its_place_is_known(effect: str, place: str, sharp: str) -> None:
     """By infinitely small steps it would not be: then ln Z hung on where between them a search ended."""
     search, found = fitted(strip(effect, (0.6, 0.06)), effect)
     names, step = found.hypothesis.names, search.event_steps(found.hypothesis)
-    at = names.index(f"{effect}.moment")
+    at = names.index(f"{effect}.{place}")
     (low, high), told = found.hypothesis.parameters[at].bounds, []
     for part in np.linspace(0.0, 1.0, 5):
         x = found.x.copy()
-        x[names.index(f"{effect}.takes")] = found.hypothesis.parameters[names.index(f"{effect}.takes")].bounds[0]
+        x[names.index(f"{effect}.{sharp}")] = found.hypothesis.parameters[names.index(f"{effect}.{sharp}")].bounds[0]
         x[at] += part * step[at]
         c = search.at(found.hypothesis, x)
         assert c is not None
