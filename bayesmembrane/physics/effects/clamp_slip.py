@@ -10,9 +10,18 @@ from scipy.special import expit
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
-from bayesmembrane.physics.effects._history import AT_ONCE, CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, SECOND, growth
+from bayesmembrane.physics.effects._history import (
+    AT_ONCE,
+    CREEPS,
+    EXPONENT,
+    JUMP,
+    MOMENT,
+    REPEATED,
+    SATURATION,
+    SECOND,
+    growth,
+)
 from bayesmembrane.physics.effects.base import EffectParameter, Slack, running_max
-from bayesmembrane.physics.reach import SOURCE
 
 JUMPS = tuple({"jump": 0.6, "place": place} for place in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9))
 """Shapes to begin a search with: a jump is found from nearby only."""
@@ -58,15 +67,7 @@ class ClampSlip(Slack):
         ),
         CREEPS,
         replace(SECOND, meaning="part of that which comes at a moment"),
-        EffectParameter(
-            "moment",
-            "s",
-            "when it slips at a moment",
-            Uniform(0.0, SOURCE.duration),
-            (0.0, SOURCE.duration),
-            of_the_test=True,
-            event="clock",
-        ),
+        replace(MOMENT, meaning="when it slips at a moment"),
         EffectParameter(
             "width",
             "-",

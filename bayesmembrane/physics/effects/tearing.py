@@ -7,22 +7,23 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
-from bayesmembrane.physics.effects._history import AT_ONCE, CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, SECOND, growth
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal
+from bayesmembrane.physics.effects._history import (
+    AT_ONCE,
+    CREEPS,
+    EXPONENT,
+    JUMP,
+    MOMENT,
+    REPEATED,
+    SATURATION,
+    SECOND,
+    growth,
+)
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 from bayesmembrane.physics.reach import SOURCE
 
 PLACES = (0.15, 0.27, 0.39, 0.51, 0.63, 0.75, 0.87)
 """Of the duration: moments to begin a search with, for one is found from nearby only."""
-MOMENT = EffectParameter(
-    "moment",
-    "s",
-    "when a tear runs",
-    Uniform(0.0, SOURCE.duration),
-    (0.0, SOURCE.duration),
-    of_the_test=True,
-    event="clock",
-)
 SECOND_PLACES = tuple(np.linspace(0.02, 0.98, 33).tolist())
 """Of the duration: moments at which a second one may run."""
 
@@ -58,7 +59,7 @@ class Tearing(Carried):
         REPEATED,
         SATURATION,
         JUMP,
-        MOMENT,
+        replace(MOMENT, meaning="when a tear runs"),
         EffectParameter(
             "takes",
             "s",
