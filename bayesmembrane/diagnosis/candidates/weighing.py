@@ -26,6 +26,8 @@ from bayesmembrane.physics.hypothesis import Hypothesis
 
 ROUND_OFF = 1e-11
 """Of the largest number of columns: what differs by less is the same."""
+A_PART = (0.0, 1.0)
+"""Bounds of a part: it is no more than all, whatever its prior."""
 MODELS = 4
 """Linear models that are kept: what is looked for beside one candidate is looked for piece by piece."""
 
@@ -465,8 +467,8 @@ def _at_bound(hypothesis: Hypothesis, axes: Standard, u: Array) -> tuple[str, ..
     out = []
     for i, (p, axis) in enumerate(zip(hypothesis.parameters[: hypothesis.curve_size], axes.axes, strict=True)):
         low, high = axes.bounds[0][i], axes.bounds[1][i]
-        support = [float(axis.to_u(np.asarray(e))) for e in p.prior.support if np.isfinite(e)]
-        ends = {*support, *([0.0] if axis.one_sided else [])}
+        support = [e for e in p.prior.support if np.isfinite(e)] + [e for e in A_PART if p.bounds == A_PART]
+        ends = {*(float(axis.to_u(np.asarray(e))) for e in support), *([0.0] if axis.one_sided else [])}
         for bound in (low, high):
             if abs(u[i] - bound) <= SEARCH.at_bound * max(high - low, TINY) and bound not in ends:
                 out.append(p.name)

@@ -103,6 +103,19 @@ def test_a_second_event_of_what_is_given_is_found_too(effect: str) -> None:
     assert best.log_evidence > sought.log_evidence - 10
 
 
+@pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
+def test_all_of_it_in_one_event_is_no_bound_that_stops_it(effect: str) -> None:
+    search, found = fitted(strip(effect, (0.6, 0.06)), effect)
+    x, names = found.x.copy(), found.hypothesis.names
+    for name, bound in (("second", 1.0), ("width" if effect == "clamp_slip" else "takes", None)):
+        at = names.index(f"{effect}.{name}")
+        x[at] = found.hypothesis.parameters[at].bounds[1] if bound is None else bound
+    c = search.at(found.hypothesis, x)
+    assert c is not None
+    assert f"{effect}.second" not in c.at_bound
+    assert {f"{effect}.width", f"{effect}.takes"} & set(c.at_bound)
+
+
 def test_an_effect_without_events_is_left_as_it_is() -> None:
     search, once = fitted(strip("tearing", (0.6, 0.06)), "zero_offset")
     assert with_second_events(search, [once]) == []
