@@ -212,7 +212,7 @@ class SampledThresholds:
 
     draws: int = 128
     """Of a round."""
-    first: Drawing = field(default_factory=lambda: Drawing(60.0, 3, 8.0, 8, 0.003))
+    first: Drawing = field(default_factory=lambda: Drawing(60.0, 2, 8.0, 8, 0.003))
     """Of all that may decide."""
     last: Drawing = field(default_factory=lambda: Drawing(100.0, 0, 100.0, 40, 0.03))
     """Of what then leads: two runs of one hypothesis of which few draws count are 0.4 apart in ln Z in the mean, and

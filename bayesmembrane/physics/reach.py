@@ -15,7 +15,8 @@ SHORTEST = 1e-12  # s
 class Reach:
     """What a test reached, in the units of its rig.
 
-    travel : largest deflection of the whole test; force : largest measured; duration : s, of the whole test
+    travel : largest deflection of the whole test; force : largest measured; duration : s, of the whole test since the
+        disc stood at zero, which is what its clock shows
     """
 
     travel: float
@@ -50,5 +51,5 @@ SOURCE = Reach(0.0915, 2.25, 35.0)
 def reach_of(measurement: Measurement) -> Reach:
     """Of one measurement."""
     force = float(np.max(np.abs(measurement.force)))
-    duration = max(float(np.ptp(measurement.path.clock)), SHORTEST)
+    duration = max(float(measurement.path.clock[-1]), SHORTEST)
     return Reach(measurement.full_range, force if force > 0 else SOURCE.force, duration)

@@ -64,7 +64,7 @@ def test_whoever_holds_a_measurement_has_its_priors(make) -> None:  # type: igno
 
 def test_a_longer_and_stronger_test_reaches_more() -> None:
     m = strip()
-    assert reach_of(m) == Reach(2.0, float(np.max(m.force)), float(np.ptp(m.path.clock)))
+    assert reach_of(m) == Reach(2.0, float(np.max(m.force)), float(m.path.clock[-1]))
     assert reach_of(replace(m, force=-m.force)) == reach_of(m)
     assert reach_of(m.up_to(1.0)).travel == 2.0
     assert reach_of(replace(m, force=0 * m.force)).force == SOURCE.force

@@ -46,8 +46,8 @@ def _second_events(c: Candidate) -> Iterator[tuple[Array, Array]]:
         if effect.second is not None:
             names = [p.name for p in effect.coordinates]
             part, place, second = (begin + names.index(name) for name in effect.second)
-            one, alike = c.x.copy(), len({p.event for p in effect.coordinates if p.name in effect.second[1:]}) == 1
-            if alike and one[part] > 1 - GROWTH.no_event:  # all of it comes in the second
+            one = c.x.copy()
+            if one[part] > 1 - GROWTH.no_event:  # all of it comes in the second
                 one[part], one[place] = 0.0, one[second]
             if one[part] < GROWTH.no_event:
                 rows = np.tile(one, (len(effect.second_places), 1))

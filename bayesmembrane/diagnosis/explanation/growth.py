@@ -132,7 +132,7 @@ def grown(case: DiagnosisCase) -> Grown:
         _with_twins(out)
     _with_parts(out)
     _with_crossed(out)
-    _checked(out)
+    check(out)
     return out
 
 
@@ -171,7 +171,7 @@ def _begun_again(f: Foreign) -> Sought | None:
     """
     names, x = list(f.base.hypothesis.names), f.base.x.copy()
     for e in f.base.hypothesis.effects:
-        if e.second is not None and e.begins in e.second[1:]:
+        if e.second is not None and e.begins == e.second[1]:
             part, _, place = (names.index(f"{e.name}.{own}") for own in e.second)
             if x[part] < GROWTH.no_event:
                 x[part], x[place] = GROWTH.second_part, f.on_clock
@@ -193,7 +193,7 @@ def _kept(out: Grown, fits: Sequence[Candidate]) -> list[Candidate]:
     return better
 
 
-def _checked(out: Grown) -> None:
+def check(out: Grown) -> None:
     """Importance sampling of all that decides: of the null model, and of every hypothesis that has a share in the sum;
     more of it of those that lead then.
 

@@ -38,14 +38,12 @@ def _last(path: Motion, end: int) -> bool:
 
 def _moments(effect: Effect, candidate: Candidate) -> list[float]:
     """When it comes, s, as far as that is a good part of it; nothing where it comes with the way."""
-
-    def value(name: str) -> float:
-        return candidate.parameters[f"{effect.name}.{name}"]
-
+    p = {
+        name: candidate.parameters[f"{effect.name}.{name}"] for name in (effect.begins, *(effect.second or ())) if name
+    }
     if not effect.begins:
         return []
     if effect.second is None:
-        return [value(effect.begins)]
-    (part, *places), clock = effect.second, {c.name for c in effect.coordinates if c.event == "clock"}
-    parts = (1 - value(part), value(part))
-    return [value(p) for p, much in zip(places, parts, strict=True) if p in clock and much > GROWTH.no_event]
+        return [p[effect.begins]]
+    part, first, then = (p[name] for name in effect.second)
+    return [t for t, much in ((first, 1 - part), (then, part)) if much > GROWTH.no_event]

@@ -42,8 +42,7 @@ def _room(measurement: Measurement) -> int:
 
 def _moving(measurement: Measurement) -> Array:
     """Deflections (M,) m of the readings outside of holds."""
-    still = measurement.holds
-    return np.delete(measurement.deflection, np.concatenate(still)) if still else measurement.deflection
+    return measurement.deflection[measurement.moving]
 
 
 def splines(d: Array, count: int, at: Array | None = None) -> Array:

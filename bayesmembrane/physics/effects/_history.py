@@ -8,7 +8,6 @@ from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.compiling import compiled, for_kernel
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.physics.effects.base import EffectParameter
-from bayesmembrane.physics.reach import SOURCE
 
 EXPONENT = EffectParameter(
     "exponent", "-", "power of the deflection with which it grows", LogNormal(2.0, 0.5), (0.4, 12.0)
@@ -30,17 +29,6 @@ JUMP = EffectParameter("jump", "-", "part of it that comes at once", Uniform(0.0
 SECOND = EffectParameter(
     "second", "-", "part of that which comes in a second event", HalfNormal(0.3), (0.0, 1.0), begin=0.0
 )
-MOMENT = EffectParameter(
-    "moment",
-    "s",
-    "when it comes at once",
-    Uniform(0.0, SOURCE.duration),
-    (0.0, SOURCE.duration),
-    of_the_test=True,
-    event="clock",
-)
-AT_ONCE = 2e-3
-"""Of the duration: what takes no longer comes at once."""
 TOGETHER = 8
 """Films that are relaxed side by side."""
 STILL = 1e-7

@@ -113,7 +113,7 @@ class Effect(ABC):
     twins_one_way : names of effects that only the way back tells from this one
     begins : the coordinate that says when it comes, in s since the start; "" where it comes with the way
     second : (part, place, second place), the coordinates that say what part of what comes at once comes in a second
-        event, and where or when the two come; None where there is only one
+        event, and where the two are; None where there is only one
     sudden : True if it may come at any moment, which no test tells from a fall of the force that no effect describes
     odds : how often it is met beside the others, before anything is measured
     rank : orders effects within a stage; equal ranks go by name

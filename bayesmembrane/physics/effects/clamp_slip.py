@@ -10,35 +10,28 @@ from scipy.special import expit
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
-from bayesmembrane.physics.effects._history import (
-    AT_ONCE,
-    CREEPS,
-    EXPONENT,
-    JUMP,
-    MOMENT,
-    REPEATED,
-    SATURATION,
-    SECOND,
-    growth,
-)
+from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, SECOND, growth
 from bayesmembrane.physics.effects.base import EffectParameter, Slack, running_max
 
+PLACE = EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1), event="way")
+SECOND_PLACE = replace(PLACE, name="second_place", meaning="where the second event comes, over the full range")
+WIDTH = EffectParameter(
+    "width", "-", "how long it slides at once, over the full range", LogNormal(0.005, 1.2), (1e-4, 0.3), begin=0.015
+)
 JUMPS = tuple({"jump": 0.6, "place": place} for place in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9))
 """Shapes to begin a search with: a jump is found from nearby only."""
-SECOND_PLACES = tuple(np.linspace(0.02, 0.98, 33).tolist())
-"""Of the duration: moments at which it may slip once more, or for the first time."""
+SECOND_PLACES = tuple(np.linspace(0.1, 1.0, 19).tolist())
+"""Of the full range, where a second one is looked for."""
 
 
 @dataclass(frozen=True)
 class ClampSlip(Slack):
-    """Free length L (1 + slip [(1 - jump) G + jump ((1 - second) H(m / D - place) + second H((t - moment) / T))]),
-    H(x) = 1 / (1 + exp(-x / width)).
+    """Free length L (1 + slip [(1 - jump) G + jump ((1 - second) H(place) + second H(second_place))]),
+    H(p) = 1 / (1 + exp((p - m / D) / width)).
 
-    G is the growth law of the test (1 after a first loading to its full range D), m the largest deflection so far, t
-    the time since the start of a test that takes T: a film creeps out of its clamp, and sticks until it slips at once
-    as it is stretched further than before, and at some moment, be it in a hold or where it was before. What has slid
-    out stays out: the film is slack until the longer film is taut. Without times the clock is the distance travelled at
-    1 mm/s.
+    G is the growth law of the test (1 after a first loading to its full range D), m the largest deflection so far: a
+    film creeps out of its clamp, and sticks until it slips at once, sticks again, and slips a second time. What has
+    slid out stays out: the film is slack until the longer film is taut.
     On an annulus of 10 and 35 mm a length s that slides out of the outer clamp acts as slip = 0.80 s / L, to a tenth of
     its effect (Yeoh film, 12 to 70 mm, against the exact solution: tests/reference/test_slip.py).
     """
@@ -51,9 +44,7 @@ class ClampSlip(Slack):
         "below loading, reloading on the unloading curve, and no return to the first curve."
     )
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("permanent_set",)  # both are a film that has become longer
-    sudden: ClassVar[bool] = True
-    begins: ClassVar[str] = "moment"
-    second: ClassVar[tuple[str, str, str] | None] = ("second", "place", "moment")
+    second: ClassVar[tuple[str, str, str] | None] = ("second", "place", "second_place")
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "slip", "-", "length slid out on a first loading, over the free length", HalfNormal(0.02), (0.0, 0.5), 0.0
@@ -62,42 +53,24 @@ class ClampSlip(Slack):
         REPEATED,
         SATURATION,
         JUMP,
-        EffectParameter(
-            "place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1), event="way"
-        ),
+        PLACE,
         CREEPS,
-        replace(SECOND, meaning="part of that which comes at a moment"),
-        replace(MOMENT, meaning="when it slips at a moment"),
-        EffectParameter(
-            "width",
-            "-",
-            "how long it slides at once, over the full range or the time of the test",
-            LogNormal(0.005, 1.2),
-            (1e-4, 0.3),
-            begin=0.015,
-        ),
+        SECOND,
+        SECOND_PLACE,
+        WIDTH,
     )
 
     @property
     def starts(self) -> list[dict[str, float]]:
         return [{"jump": 0.05, "place": 0.5}, *JUMPS]
 
-    def come_at(self, moment: float) -> list[dict[str, float]]:
-        """In a while, and at once."""
-        return [{"jump": 0.9, "second": 0.95, "moment": moment, "width": width} for width in (0.015, AT_ONCE)]
-
     @property
     def second_places(self) -> list[float]:
-        return [part * self._whole for part in SECOND_PLACES]
-
-    @property
-    def _whole(self) -> float:
-        """s: how long the test takes."""
-        return next(c.bounds[1] for c in self.coordinates if c.name == "moment")
+        return list(SECOND_PLACES)
 
     def excess(self, p: Array, deflection: Array, path: Motion) -> Array:
         slow = growth(p[:, 1:2], p[:, 2:3], deflection, path, p[:, 3:4], p[:, 6:7])
-        reached, since = running_max(deflection) / path.full_range, (path.clock - p[:, 8:9]) / self._whole
-        first, then = (expit(past / p[:, 9:10]) for past in (reached - p[:, 5:6], since))
+        reached = running_max(deflection) / path.full_range
+        first, then = (expit((reached - p[:, i : i + 1]) / p[:, 9:10]) for i in (5, 8))
         at_once = first + p[:, 7:8] * (then - first)
         return np.asarray(p[:, :1] * ((1 - p[:, 4:5]) * slow + p[:, 4:5] * at_once))

@@ -7,23 +7,24 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal
-from bayesmembrane.physics.effects._history import (
-    AT_ONCE,
-    CREEPS,
-    EXPONENT,
-    JUMP,
-    MOMENT,
-    REPEATED,
-    SATURATION,
-    SECOND,
-    growth,
-)
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
+from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, JUMP, REPEATED, SATURATION, SECOND, growth
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 from bayesmembrane.physics.reach import SOURCE
 
 PLACES = (0.15, 0.27, 0.39, 0.51, 0.63, 0.75, 0.87)
 """Of the duration: moments to begin a search with, for one is found from nearby only."""
+MOMENT = EffectParameter(
+    "moment",
+    "s",
+    "when a tear runs",
+    Uniform(0.0, SOURCE.duration),
+    (0.0, SOURCE.duration),
+    of_the_test=True,
+    event="clock",
+)
+IN_A_WHILE, AT_ONCE = 0.03, 2e-3
+"""Of the duration: what a tear takes that is searched for."""
 SECOND_PLACES = tuple(np.linspace(0.02, 0.98, 33).tolist())
 """Of the duration: moments at which a second one may run."""
 
@@ -59,7 +60,7 @@ class Tearing(Carried):
         REPEATED,
         SATURATION,
         JUMP,
-        replace(MOMENT, meaning="when a tear runs"),
+        MOMENT,
         EffectParameter(
             "takes",
             "s",
@@ -76,13 +77,16 @@ class Tearing(Carried):
     @property
     def starts(self) -> list[dict[str, float]]:
         whole = self._whole
-        return [{"jump": 0.05}, *({"jump": 0.6, "moment": part * whole, "takes": 0.03 * whole} for part in PLACES)]
+        return [
+            {"jump": 0.05},
+            *({"jump": 0.6, "moment": part * whole, "takes": IN_A_WHILE * whole} for part in PLACES),
+        ]
 
     def come_at(self, moment: float) -> list[dict[str, float]]:
         """In a while, and at once."""
         return [
-            {"jump": 0.6, "moment": moment, "takes": 0.03 * self._whole},
-            {"jump": 0.9, "moment": moment, "takes": AT_ONCE * self._whole},
+            {"jump": jump, "moment": moment, "takes": takes * self._whole}
+            for jump, takes in ((0.6, IN_A_WHILE), (0.9, AT_ONCE))
         ]
 
     @property

@@ -37,7 +37,8 @@ def profile(
         gap = np.full(points, np.nan)
         return Profile(radius, gap, gap, gap, gap, gap, gap, gap, np.nan, np.nan, status)
     l2, u, w, rise = ritz.shape(solved, t)
-    side, part = np.sign(deflection), abs(deflection) / solved.deflection[0, 0]
+    side, lift = np.sign(deflection), float(solved.deflection[0, 0])
+    part = abs(deflection) / lift if lift > 0 else 1.0
     l2, u = prestretch + part**2 * (l2 - prestretch), prestretch + part**2 * (u - prestretch)
     l1, rise = np.hypot(u, part * w), part * rise
     p1, p2 = material.tension(l1, l2)

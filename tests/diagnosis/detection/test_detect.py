@@ -44,19 +44,22 @@ def stepwise(n: int = 8, rise: float = 2.5e-3, held: int = 15) -> Measurement:
     return measured(np.zeros(len(d)), np.array(d[1:] + d[-1:]), np.array([*t[1:], t[-1] + 1.0]))
 
 
-def test_a_wave_is_found_where_few_readings_move() -> None:
-    """It stands still in the holds, and has four readings a period between them."""
-    m = stepwise()
+@pytest.mark.parametrize(("n", "period"), [(8, 1.1e-3), (6, 1.42e-3)])
+def test_a_wave_is_found_where_few_readings_move(n: int, period: float) -> None:
+    """It stands still in the holds, and has four readings a period between them; nine waves are more than fifteen
+    splines follow.
+    """
+    m = stepwise(n)
     rng, basis, place = np.random.default_rng(16), smooth_reference(m), m.deflection
     assert 24 <= np.count_nonzero(m.moving) < 60
     found, alarms = [], 0
     for _ in range(40):
         noise = SD * rng.standard_normal(len(m))
         alarms += periodicity(m, noise, basis, white_noise(m)).p_value < 0.05
-        wave = 3 * SD * np.sin(2 * np.pi * place / 1.1e-3 + rng.uniform(0, 6))
+        wave = 3 * SD * np.sin(2 * np.pi * place / period + rng.uniform(0, 6))
         found.append(periodicity(m, noise + wave, basis, white_noise(m)))
     assert np.mean([f.p_value < 0.01 and f.against == "deflection" for f in found]) > 0.8
-    assert np.median([f.period for f in found]) == pytest.approx(1.1e-3, rel=0.05)
+    assert np.median([f.period for f in found]) == pytest.approx(period, rel=0.05)
     assert alarms <= 40 * 0.05 + 3 * np.sqrt(40 * 0.05)
 
 

@@ -41,24 +41,22 @@ def fitted(m: Measurement, effect: str) -> tuple[Search, Candidate]:
     return search, search.polished(found)
 
 
-@pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
-def test_what_came_in_two_steps_is_found_in_both(effect: str) -> None:
+@pytest.mark.parametrize(("effect", "place"), [("clamp_slip", "place"), ("tearing", "moment")])
+def test_what_came_in_two_steps_is_found_in_both(effect: str, place: str) -> None:
     m = strip(effect, (0.45, 0.03), (0.8, 0.05))
     search, found = fitted(m, effect)
-    _, first, second = found.hypothesis.effects[0].second
     one_event = found.x.copy()
-    for name, value in (("second", 0.0), (second, 0.05)):
+    for name, value in (("second", 0.0), (f"second_{place}", 0.05)):
         one_event[found.hypothesis.names.index(f"{effect}.{name}")] = value
     once = search.at(found.hypothesis, one_event)
     assert once is not None
     (twice,) = with_second_events(search, [once])
     assert twice.log_evidence > once.log_evidence + 50
-    p, begun = twice.parameters, POINTS // 4 + 1
-    moments = [p[f"{effect}.{name}"] for name in (first, second)]
-    if first == "place":
-        moments[0] = float(np.interp(moments[0], m.deflection[:begun] / RIG.length, m.time[:begun]))
-    whole = np.interp([0.45, 0.8], m.deflection[:begun] / RIG.length, m.time[:begun])
-    assert np.sort(moments) == pytest.approx(whole, abs=0.03 * m.time[-1])
+    p = twice.parameters
+    loading = m.deflection[: POINTS // 4 + 1] / RIG.length
+    whole = np.interp([0.45, 0.8], loading, m.time[: POINTS // 4 + 1]) if place == "moment" else np.array([0.45, 0.8])
+    places = np.sort([p[f"{effect}.{place}"], p[f"{effect}.second_{place}"]])
+    assert places == pytest.approx(whole, abs=0.03 * (m.time[-1] if place == "moment" else 1.0))
 
 
 @pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
@@ -68,29 +66,20 @@ def test_what_came_at_once_has_no_second_event(effect: str) -> None:
     assert once.x[share] < GROWTH.no_event
     for c in with_second_events(search, [once]):
         assert c.x[share] < 5 * GROWTH.no_event
-        assert c.log_evidence < once.log_evidence + 4  # what the noise of a reading brings
+        assert c.log_evidence < once.log_evidence + 3
 
 
-def test_all_of_it_in_the_second_event_is_one_event() -> None:
-    """Of a tear: of two that come alike either may be the first."""
-    search, found = fitted(strip("tearing", (0.45, 0.03), (0.8, 0.05)), "tearing")
+@pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
+def test_all_of_it_in_the_second_event_is_one_event(effect: str) -> None:
+    search, found = fitted(strip(effect, (0.45, 0.03), (0.8, 0.05)), effect)
     x, names = found.x.copy(), found.hypothesis.names
-    part, first, second, jump = (names.index(f"tearing.{n}") for n in ("second", "moment", "second_moment", "jump"))
-    x[[part, first, second, jump]] = 1.0, 0.3 * x[first], x[first], 0.99
+    part, place, _ = (names.index(f"{effect}.{own}") for own in found.hypothesis.effects[0].second)
+    x[[part, place]] = 1.0, 0.3 * x[place]
     one = search.at(found.hypothesis, x)
     assert one is not None
     (twice,) = with_second_events(search, [one])
     assert GROWTH.no_event < twice.x[part] < 1 - GROWTH.no_event
     assert twice.log_evidence > one.log_evidence + 50
-
-
-def test_of_what_comes_with_the_way_and_at_a_moment_none_is_taken_for_the_other() -> None:
-    search, found = fitted(strip("clamp_slip", (0.45, 0.03), (0.8, 0.05)), "clamp_slip")
-    x, names = found.x.copy(), found.hypothesis.names
-    x[names.index("clamp_slip.second")] = 1.0
-    one = search.at(found.hypothesis, x)
-    assert one is not None
-    assert with_second_events(search, [one]) == []
 
 
 @pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
@@ -103,17 +92,15 @@ def test_a_second_event_of_what_is_given_is_found_too(effect: str) -> None:
     assert best.log_evidence > sought.log_evidence - 10
 
 
-@pytest.mark.parametrize("effect", ["clamp_slip", "tearing"])
-def test_all_of_it_in_one_event_is_no_bound_that_stops_it(effect: str) -> None:
-    search, found = fitted(strip(effect, (0.6, 0.06)), effect)
+def test_all_of_it_in_one_event_is_no_bound_that_stops_it() -> None:
+    search, found = fitted(strip("tearing", (0.6, 0.06)), "tearing")
     x, names = found.x.copy(), found.hypothesis.names
-    for name, bound in (("second", 1.0), ("width" if effect == "clamp_slip" else "takes", None)):
-        at = names.index(f"{effect}.{name}")
-        x[at] = found.hypothesis.parameters[at].bounds[1] if bound is None else bound
+    x[names.index("tearing.second")] = 1.0
+    x[names.index("tearing.takes")] = found.hypothesis.parameters[names.index("tearing.takes")].bounds[1]
     c = search.at(found.hypothesis, x)
     assert c is not None
-    assert f"{effect}.second" not in c.at_bound
-    assert {f"{effect}.width", f"{effect}.takes"} & set(c.at_bound)
+    assert "tearing.second" not in c.at_bound
+    assert "tearing.takes" in c.at_bound
 
 
 def test_an_effect_without_events_is_left_as_it_is() -> None:

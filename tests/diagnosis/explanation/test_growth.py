@@ -20,10 +20,11 @@ from bayesmembrane.diagnosis.explanation.growth import (
     _with_exchanged,
     _with_less,
     _with_parts,
+    check,
     with_falls,
     with_sets,
 )
-from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH
+from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 
@@ -190,6 +191,25 @@ def test_a_tear_is_looked_for_where_the_force_is_seen_to_fall(
     assert [e.name for _, e in grew] == (["friction"] if better else [])
 
 
+def test_of_what_leads_more_draws_are_made_than_of_what_may_decide(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The null model, all that has a share, and, with more draws, what leads by then."""
+    shares = {(): 1e-6, ("friction",): 0.9, ("mullins",): 0.09, ("tearing",): 0.005, ("rate",): 1e-5}
+    drawn: list[tuple[tuple[str, ...], Any]] = []
+    monkeypatch.setattr(growth, "checked", lambda _, c, drawing: drawn.append((c.names, drawing)) or c)
+    monkeypatch.setattr(
+        growth, "_shares", lambda out, _: {key: float(np.log(shares[c.names])) for key, c in out.found.items()}
+    )
+    monkeypatch.setattr(Grown, "seen", lambda _: {})
+    case = SimpleNamespace(null=candidate(claim(), 0.0), tell=lambda _: None)
+    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, None)))
+    for names in shares:
+        grown.add(candidate(claim(*names), 0.0))
+    check(grown)
+    first, last = ([names for names, d in drawn if d is each] for each in (SAMPLED.first, SAMPLED.last))
+    assert first == [(), ("friction",), ("mullins",), ("tearing",)]
+    assert last == [("friction",), ("mullins",)]
+
+
 def test_what_decides_is_searched_for_from_the_materials_of_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each from those of its energy that have a share, with its own effects; a better end is polished and kept."""
     monkeypatch.setattr(growth, "all_seen", lambda _, found, *__: dict.fromkeys(found, 0.0))
@@ -330,7 +350,7 @@ def test_nothing_grows_where_a_limit_leaves_noise_alone(monkeypatch: pytest.Monk
 
     for step in ("_with_less", "_with_exchanged", "_with_pairs", "_with_twins"):
         monkeypatch.setattr(growth, step, lambda *_, step=step: grew.append(step))
-    for step in ("_with_parts", "_with_crossed", "_checked", "_with_other_energies"):
+    for step in ("_with_parts", "_with_crossed", "check", "_with_other_energies"):
         monkeypatch.setattr(growth, step, lambda *_: None)
     monkeypatch.setattr(growth, "_add_effects", add)
     monkeypatch.setattr(growth, "_worth_more", lambda *_: False)

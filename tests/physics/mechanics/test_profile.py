@@ -79,6 +79,13 @@ def test_a_film_that_is_all_but_flat_has_the_shape_of_one_lifted_further(inner, 
     assert shape.force == pytest.approx(curves.force[0, 0], rel=1e-9)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_film_at_rest_that_round_off_has_made_slack_is_flat():
+    shape = profile(NeoHookean(7.5), 0.0, prestretch=1 - 1e-13, **RADII)
+    np.testing.assert_allclose(shape.height, 0.0, atol=1e-5 * MM)
+    np.testing.assert_allclose(shape.l1, 1.0, rtol=1e-6)
+
+
 def test_a_film_without_a_state_says_why():
     shape = profile(Gent(5.0, 2.0), 91.5 * MM, **RADII)
     assert shape.status is Status.LOCKED
