@@ -6,7 +6,7 @@ One frozen class for each room, and one instance of it: ``NOISE.doubt_from_dof``
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 TINY = 1e-300
 """No threshold: keeps a quotient finite where its denominator is zero."""
@@ -212,9 +212,9 @@ class SampledThresholds:
 
     draws: int = 128
     """Of a round."""
-    first: Drawing = field(default_factory=lambda: Drawing(60.0, 2, 8.0, 8, 0.003))
+    first: Drawing = Drawing(enough=60.0, early=2, enough_later=8.0, most_rounds=8, share=0.003)
     """Of all that may decide."""
-    last: Drawing = field(default_factory=lambda: Drawing(100.0, 0, 100.0, 40, 0.03))
+    last: Drawing = Drawing(enough=100.0, early=0, enough_later=100.0, most_rounds=40, share=0.03)
     """Of what then leads: two runs of one hypothesis of which few draws count are 0.4 apart in ln Z in the mean, and
     0.9 by the first ones; docs/studies/few_draws.md."""
     freedom: float = 6.0

@@ -70,6 +70,15 @@ def test_a_longer_and_stronger_test_reaches_more() -> None:
     assert reach_of(replace(m, force=0 * m.force)).force == SOURCE.force
 
 
+def test_what_comes_at_a_moment_may_come_until_the_last_reading() -> None:
+    """Where the first reading is not at rest, too: the clock runs from rest on."""
+    d = np.linspace(0.7, 2.0, 27)
+    begun = Measurement(d, 1e5 * d, Uniaxial(), Specimen("strip", 1e-3), time=d)
+    (tear,) = hypothesis("gent", ["tearing"]).on(begun).effects
+    (moment,) = (p for p in tear.coordinates if p.name == "moment")
+    assert moment.bounds == (0.0, pytest.approx(2.0))
+
+
 def test_a_plain_film_is_the_same_in_any_test() -> None:
     h = hypothesis("yeoh")
     assert h.on(strip()) is h

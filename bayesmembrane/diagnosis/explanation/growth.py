@@ -132,7 +132,7 @@ def grown(case: DiagnosisCase) -> Grown:
         _with_twins(out)
     _with_parts(out)
     _with_crossed(out)
-    check(out)
+    weigh_by_draws(out)
     return out
 
 
@@ -193,7 +193,7 @@ def _kept(out: Grown, fits: Sequence[Candidate]) -> list[Candidate]:
     return better
 
 
-def check(out: Grown) -> None:
+def weigh_by_draws(out: Grown) -> None:
     """Importance sampling of all that decides: of the null model, and of every hypothesis that has a share in the sum;
     more of it of those that lead then.
 

@@ -20,7 +20,7 @@ from bayesmembrane.diagnosis.explanation.growth import (
     _with_exchanged,
     _with_less,
     _with_parts,
-    check,
+    weigh_by_draws,
     with_falls,
     with_sets,
 )
@@ -204,7 +204,7 @@ def test_of_what_leads_more_draws_are_made_than_of_what_may_decide(monkeypatch: 
     grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, None)))
     for names in shares:
         grown.add(candidate(claim(*names), 0.0))
-    check(grown)
+    weigh_by_draws(grown)
     first, last = ([names for names, d in drawn if d is each] for each in (SAMPLED.first, SAMPLED.last))
     assert first == [(), ("friction",), ("mullins",), ("tearing",)]
     assert last == [("friction",), ("mullins",)]
@@ -350,7 +350,7 @@ def test_nothing_grows_where_a_limit_leaves_noise_alone(monkeypatch: pytest.Monk
 
     for step in ("_with_less", "_with_exchanged", "_with_pairs", "_with_twins"):
         monkeypatch.setattr(growth, step, lambda *_, step=step: grew.append(step))
-    for step in ("_with_parts", "_with_crossed", "check", "_with_other_energies"):
+    for step in ("_with_parts", "_with_crossed", "weigh_by_draws", "_with_other_energies"):
         monkeypatch.setattr(growth, step, lambda *_: None)
     monkeypatch.setattr(growth, "_add_effects", add)
     monkeypatch.setattr(growth, "_worth_more", lambda *_: False)
