@@ -254,9 +254,21 @@ def test_a_drift_comes_to_rest() -> None:
     m = measured()
     t = m.path.clock
     first = t[np.argmax(np.diff(m.path.leg) != 0)]
-    steady, soon = (force(m, "force_drift", x=np.array([1e-3, 1.0, rest])) - force(m) for rest in (1e7, 50.0))
+    one_way = (np.array([1e-3, 1.0, rest, 0.0, 35.0, 0.3]) for rest in (1e7, 50.0))
+    steady, soon = (force(m, "force_drift", x=x) - force(m) for x in one_way)
     assert steady == pytest.approx(1e-3 * t, rel=1e-3, abs=1e-9)
     assert soon == pytest.approx(1e-3 * t * (50.0 + first) / (50.0 + t), rel=1e-6, abs=1e-12)
+
+
+def test_a_drift_swings_back() -> None:
+    m = measured()
+    t = m.path.clock
+    first, period = t[np.argmax(np.diff(m.path.leg) != 0)], t[-1] / 1.5
+    swung = force(m, "force_drift", x=np.array([1e-3, 1.0, 1e7, 1.0, period, 0.25])) - force(m)
+    assert swung == pytest.approx(1e-3 * first * (np.cos(2 * np.pi * t / period) - 1), rel=1e-9, abs=1e-12)
+    once = force(m, "force_drift", x=np.array([1e-3, 1.0, 1e7, 0.0, period, 0.25])) - force(m)
+    half = force(m, "force_drift", x=np.array([1e-3, 1.0, 1e7, np.sqrt(0.5), period, 0.25])) - force(m)
+    assert half == pytest.approx((swung + once) / 2, rel=1e-9, abs=1e-12)
 
 
 def test_speed_counts_as_a_power() -> None:

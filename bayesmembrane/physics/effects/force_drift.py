@@ -8,25 +8,27 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.data.motion import Motion
-from bayesmembrane.ground.parameters import Array, LogNormal, Normal
+from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Uniform
 from bayesmembrane.physics.effects.base import EffectParameter, Sensor
 
 
 @dataclass(frozen=True)
 class ForceDrift(Sensor):
-    """F_read = F + rate t1 [(t / t1) (rest + t1) / (rest + t)]^exponent, with the time t since the start.
+    """F_read = F + rate t1 {(1 - w) [(t / t1) (rest + t1) / (rest + t)]^exponent + w s}, with w = swings^2, the time t
+    since the start, and s = sin(2 pi (t / period + phase)) - sin(2 pi phase).
 
-    t1 is when the first leg ends, and ``rate`` the mean until then: what comes later does not change what was read. A
-    cell that warms up drifts quickly at first (exponent below 1) and comes to rest (t beyond ``rest``). Without times
-    the clock is the distance travelled at 1 mm/s.
+    t1 is when the first leg ends, and ``rate`` the mean until then of a drift that goes one way: what comes later does
+    not change what was read. A cell that warms up drifts quickly at first (exponent below 1) and comes to rest (t
+    beyond ``rest``). With the temperature of a room a drift goes and comes back: a part w of it swings, about once in
+    a test. Without times the clock is the distance travelled at 1 mm/s.
     """
 
     name: ClassVar[str] = "force_drift"
     title: ClassVar[str] = "drift of the force zero"
     reference: ClassVar[str] = "ISO 376:2011, C.3 (drift of the zero); OIML R 60-1:2021, 3.9"
     signature: ClassVar[str] = (
-        "A force that grows (or falls) with time, steadily or until it rests, whatever the deflection: all cycles "
-        "shift, slack parts too."
+        "A force that grows (or falls) with time, steadily, until it rests or until it swings back, whatever the "
+        "deflection: all cycles shift, slack parts too."
     )
     rank: ClassVar[int] = 1
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
@@ -41,10 +43,26 @@ class ForceDrift(Sensor):
             LogNormal(500.0, 1.6),
             (1e-2, 1e7),
         ),
+        EffectParameter(
+            "swings", "-", "root of the part of it that swings back", HalfNormal(0.3), (0.0, 1.0), begin=0.0
+        ),
+        EffectParameter(
+            "period", "s", "time after which that comes again", LogNormal(35.0, 0.6), (5.0, 350.0), of_the_test=True
+        ),
+        EffectParameter("phase", "-", "of a period, where it is at the start", Uniform(0.0, 1.0), (0.0, 1.0)),
     )
+
+    @property
+    def starts(self) -> list[dict[str, float]]:
+        """A swing is found from nearby only: half a one and more than one, from its middle and from its end."""
+        usual = next(p.typical for p in self.coordinates if p.name == "period")
+        return [{"swings": 0.6, "period": k * usual, "phase": f} for k in (0.7, 1.6) for f in (0.05, 0.3)]
 
     def read(self, p: Array, force: Array, path: Motion) -> Array:
         turns = np.flatnonzero(np.diff(path.leg))
         first = max(float(path.clock[turns[0] if turns.size else -1]), 1e-12)
         part = path.clock / first * (p[:, 2:3] + first) / (p[:, 2:3] + path.clock)
-        return np.asarray(force + p[:, :1] * first * part ** p[:, 1:2])
+        once = part ** p[:, 1:2]
+        angle = 2 * np.pi * p[:, 5:6]
+        swing = np.sin(2 * np.pi * path.clock / p[:, 4:5] + angle) - np.sin(angle)
+        return np.asarray(force + p[:, :1] * first * (once + p[:, 3:4] ** 2 * (swing - once)))
