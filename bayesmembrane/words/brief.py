@@ -315,7 +315,7 @@ def _beside(d: Diagnosis) -> str:
 
 def _strange(d: Diagnosis) -> Foreign | None:
     """What is foreign, where that is more probable than that nothing is."""
-    return d.foreign if d.probabilities.anything_foreign > 0.5 else None
+    return d.foreign if d.probabilities.something_found > 0.5 else None
 
 
 def _certain(d: Diagnosis) -> str:

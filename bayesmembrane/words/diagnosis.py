@@ -371,7 +371,7 @@ def _beside(found: Diagnosis) -> str:
     """What is foreign beside the effects, or may be."""
     if found.foreign is None:
         return ""
-    p = found.probabilities.anything_foreign
+    p = found.probabilities.something_found
     how = "Beside it" if p > 0.5 else f"Perhaps beside it ({percent(p)})"
     return f" {how}: {foreign_sentence(found.foreign, _units(found))}"
 
@@ -393,12 +393,12 @@ def _foreign_alone(found: Diagnosis) -> bool:
     """True if nothing speaks for a model without effects but what is foreign beside it."""
     f, p = found.foreign, found.probabilities
     alone = f is not None and set_name(f.base, found.null.names) == NOTHING
-    return alone and not found.detection.adequate and 0.99 * p.effects.get(NOTHING, 0.0) < p.anything_foreign
+    return alone and not found.detection.adequate and 0.99 * p.effects.get(NOTHING, 0.0) < p.something_found
 
 
 def _unknown(found: Diagnosis) -> str:
     waves, units = found.detection.periodicity, _units(found)
-    if found.foreign is not None and found.probabilities.anything_foreign > 0.5:
+    if found.foreign is not None and found.probabilities.something_found > 0.5:
         base = found.foreign.base.names
         beside = f" beside {' and '.join(effect_title(n) for n in base)}" if base else ""
         return (

@@ -163,7 +163,7 @@ def _foreign(found: JointDiagnosis) -> str:
         return ""
     f, label = found.foreign
     m = next(t.measurement for t in found.tests if t.label == label)
-    p = found.probabilities.anything_foreign
+    p = found.probabilities.something_found
     how = f"In {label}" if p > 0.5 else f"Perhaps in {label} ({percent(p)})"
     return f"{how}: {foreign_sentence(f, m.rig.shown(m.specimen.thickness))}"
 

@@ -24,6 +24,8 @@ Named = TypeVar("Named")
 
 NOTHING = "none"
 """No effect; nothing foreign."""
+ANOTHER_LAW = "another_law"
+"""A kind of what is foreign: what no law, or no energy, of the library follows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +82,11 @@ class Probabilities:
         """Of something foreign, of whatever kind."""
         return 1.0 - self.foreign.get(NOTHING, 1.0)
 
+    @property
+    def something_found(self) -> float:
+        """Of something foreign that was looked for and found, and is not only concluded from laws that do not hold."""
+        return self.anything_foreign - self.foreign.get(ANOTHER_LAW, 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Total:
@@ -102,8 +109,19 @@ def set_name(candidate: Candidate, given: Sequence[str]) -> str:
     return _joined(frozenset(candidate.names) - set(given))
 
 
+def carried(candidate: Candidate, given: Sequence[str]) -> bool:
+    """True if it is not the effects that explain the curve, but errors of their laws or of the energy: of the laws of
+    those that are in question, not of those ``given``.
+    """
+    law = max(candidate.law_errors_beyond(given).values(), default=0.0)
+    return candidate.energy_error > VERDICT.carried or law > VERDICT.law_carried
+
+
 def summed(grown: Grown) -> Total:
-    """All that was grown, and what is foreign beside the most probable of it."""
+    """All that was grown, and what is foreign beside the most probable of it.
+
+    Of what holds only with laws or an energy that are far off, most is told to be something foreign.
+    """
     case = grown.case
     given = case.null.names
     every, counts = list(grown.found.values()), grown.counts
@@ -137,9 +155,14 @@ def summed(grown: Grown) -> Total:
     parts = [(c.hypothesis.material.name, set_name(c, given), kind) for c, kind, _ in terms]
     parts += [(energy, _joined(names - set(given)), NOTHING) for (energy, names), _ in guessed]
     joint, energies = defaultdict[tuple[str, str], float](float), defaultdict[str, float](float)
-    for (energy, name, kind), q in zip(parts, p.tolist(), strict=True):
-        joint[name, kind] += q
+    for (energy, _, _), q in zip(parts, p.tolist(), strict=True):
         energies[energy] += q
+    for i, (c, kind, _) in enumerate(terms):
+        if kind == NOTHING and not case.sees_nothing and carried(c, given):
+            joint[set_name(c, given), ANOTHER_LAW] += BELIEFS.another_law * float(p[i])
+            p[i] *= 1 - BELIEFS.another_law
+    for (_, name, kind), q in zip(parts, p.tolist(), strict=True):
+        joint[name, kind] += q
     for name, q in _untried(grown, every, joint).items():
         joint[name, NOTHING] += q
     both = _flattened(joint)
@@ -166,7 +189,8 @@ def _flattened(joint: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], 
             out[name, kind] = q
         else:
             kinds[kind][name] = q
-    out |= {(name, kind): q for kind, sets in kinds.items() for name, q in BELIEFS.flattened(sets).items()}
+    for kind, sets in kinds.items():
+        out |= {(name, kind): q for name, q in BELIEFS.flattened(sets, kind != ANOTHER_LAW).items()}
     whole = sum(joint.values())
     return _falling({key: q / whole for key, q in out.items()})
 

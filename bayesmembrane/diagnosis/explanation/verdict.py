@@ -7,14 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import grown, weigh_by_draws, with_falls, with_sets
 from bayesmembrane.diagnosis.explanation.promise import promised
-from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, Total, set_name, summed
+from bayesmembrane.diagnosis.explanation.total import (
+    ANOTHER_LAW,
+    NOTHING,
+    Judged,
+    Probabilities,
+    Total,
+    carried,
+    set_name,
+    summed,
+)
 from bayesmembrane.diagnosis.thresholds import GROWTH, VERDICT
 
 
@@ -111,11 +119,11 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     if not members or (len(members) > VERDICT.most_members and not _worth_telling(p)):
         return unknown
     first = members[0]
-    if strange is not None and p.anything_foreign > 0.5 and _carries(strange, first, given):
+    if strange is not None and p.something_found > 0.5 and _carries(strange, first, given):
         return unknown
     if [set_name(m.candidate, given) for m in members] == [NOTHING]:
         return unknown if p.anything_foreign > 1 - VERDICT.sure else _without_effects(case, total, members)
-    if _carried(first.candidate, given):
+    if carried(first.candidate, given):
         return unknown
     return Verdict("named" if len(members) == 1 else "ambiguous", members, total.ranking, p, strange)
 
@@ -137,7 +145,7 @@ def _first_of_each_set(ranking: Sequence[Judged], given: Sequence[str]) -> dict[
         sets.setdefault(set_name(j.candidate, given), []).append(j)
     for name, same in sets.items():
         near = [j for j in same if j.probability * VERDICT.alike >= same[0].probability]
-        good = [j for j in near if not _carried(j.candidate, given)]
+        good = [j for j in near if not carried(j.candidate, given)]
         if name != NOTHING and good:
             sets[name] = [min(good, key=lambda j: j.candidate.x.size)]
     return {name: same[0] for name, same in sets.items()}
@@ -152,9 +160,9 @@ def _carries(strange: Foreign, first: Judged, given: Sequence[str]) -> bool:
 def _strange(total: Total, given: Sequence[str]) -> Foreign | None:
     """The most probable thing that is foreign, beside the most probable set; None if that is not worth a word."""
     p = total.probabilities
-    if p.anything_foreign <= VERDICT.foreign_told:
+    if p.something_found <= VERDICT.foreign_told:
         return None
-    first, kind = next(key for key in total.joint if key[1] != NOTHING)
+    first, kind = next(key for key in total.joint if key[1] not in (NOTHING, ANOTHER_LAW))
     same = [f for f in total.foreign if f.kind == kind]
     return next((f for f in same if set_name(f.base, given) == first), same[0])
 
@@ -168,14 +176,6 @@ def _smallest(probabilities: Mapping[str, float]) -> list[str]:
         if held >= VERDICT.sure:
             break
     return out
-
-
-def _carried(candidate: Candidate, given: Sequence[str]) -> bool:
-    """True if it is not the effects that explain the curve, but errors of their laws or of the energy: of the laws of
-    those that are in question, not of those ``given``.
-    """
-    law = max(candidate.law_errors_beyond(given).values(), default=0.0)
-    return candidate.energy_error > VERDICT.carried or law > VERDICT.law_carried
 
 
 def _without_effects(case: DiagnosisCase, total: Total, members: tuple[Judged, ...]) -> Verdict:

@@ -43,6 +43,8 @@ def test_factors_count_whole_where_little_is_gained_and_less_the_more_there_is()
 def test_what_stands_out_is_left_as_it_is(first: float) -> None:
     said = {"a": first, "b": 0.7 - 0.7 * first, "c": 0.3 - 0.3 * first}
     assert BELIEFS.flattened(said) == pytest.approx(said)
+    by_none = BELIEFS.flattened(said, by_known_laws=False)
+    assert by_none["a"] / by_none["b"] == pytest.approx((said["a"] / said["b"]) ** BELIEFS.flatter)
 
 
 def test_where_nothing_stands_out_odds_are_raised_to_a_power() -> None:

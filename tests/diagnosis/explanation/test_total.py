@@ -16,7 +16,7 @@ from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, UNNAMED, Foreign
 from bayesmembrane.diagnosis.explanation.growth import Grown
-from bayesmembrane.diagnosis.explanation.total import NOTHING
+from bayesmembrane.diagnosis.explanation.total import ANOTHER_LAW, NOTHING
 from bayesmembrane.diagnosis.thresholds import TWINS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect
@@ -46,6 +46,7 @@ def summed_up(
     promised: float = -np.inf,
     step: Mapping[str, Any] | None = None,
     flatter: float = 1.0,
+    sees_nothing: bool = True,
 ) -> total.Total:
     """The sum where friction explains the curve, and Mullins beside it has a ``gain`` in ln Z.
 
@@ -87,6 +88,7 @@ def summed_up(
         plain={"gent": plain},
         visible=[*untried, *TRIED, *TRIED][:4],
         question=SimpleNamespace(energy=None),
+        sees_nothing=sees_nothing,
         twins=lambda: frozenset(),
         foreign=lambda _, bases, __: [] if step is None else [Foreign(SUDDEN, bases[0], 30.0, **step)],
         tell=lambda _: None,
@@ -193,6 +195,7 @@ def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_li
         plain={"gent": base},
         visible=[*TRIED, SimpleNamespace(odds=1.0, name="tearing")],
         question=SimpleNamespace(energy=None),
+        sees_nothing=True,
         twins=lambda: frozenset(),
         foreign=lambda *_: [Foreign(SUDDEN, base, 24.0, -1.0, size=size)],
         tell=lambda _: None,
@@ -215,6 +218,7 @@ def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monke
         plain=dict(zip(("gent", "yeoh"), plain, strict=True)),
         visible=[*TRIED, *TRIED],
         question=SimpleNamespace(energy=None),
+        sees_nothing=True,
         twins=lambda: frozenset(),
         foreign=lambda *_: [],
         tell=lambda _: None,
@@ -247,6 +251,7 @@ def test_draws_of_a_poor_model_say_nothing_of_what_takes_its_misfit_away(monkeyp
             plain={"gent": null},
             visible=[*TRIED, *TRIED],
             question=SimpleNamespace(energy=None),
+        sees_nothing=True,
             twins=lambda: frozenset(),
             foreign=lambda *_: [Foreign(UNNAMED, null, 850.0, share=share)],
             tell=lambda _: None,
@@ -259,3 +264,18 @@ def test_draws_of_a_poor_model_say_nothing_of_what_takes_its_misfit_away(monkeyp
     assert foreign_with(55.0, 1.0) == pytest.approx(foreign_with(0.0, 1.0), rel=0.2)
     assert foreign_with(55.0, 0.0) > 0.9
     assert foreign_with(-55.0, 1.0) < foreign_with(0.0, 1.0)
+
+
+@pytest.mark.parametrize("off", [True, False])
+def test_what_holds_only_with_a_law_far_off_is_mostly_something_foreign(
+    monkeypatch: pytest.MonkeyPatch, off: bool
+) -> None:
+    """Beside the same sets, flatter as all that does not stand out; where the tests see nothing, nothing is said of it."""
+    monkeypatch.setattr(total, "carried", lambda c, given: off and "friction" in c.names)
+    found = summed_up(monkeypatch, 0.0, 1.0, sees_nothing=False).probabilities
+    none = found.effects[NOTHING]
+    assert found.foreign.get(ANOTHER_LAW, 0.0) == pytest.approx(BELIEFS.another_law * (1 - none) if off else 0.0)
+    assert sum(found.foreign.values()) == pytest.approx(1.0)
+    assert found.something_found == pytest.approx(0.0)
+    assert found.anything_foreign == pytest.approx(BELIEFS.another_law * (1 - none) if off else 0.0)
+    assert found.effects == pytest.approx(summed_up(monkeypatch, 0.0, 1.0).probabilities.effects)
