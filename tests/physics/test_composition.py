@@ -180,7 +180,7 @@ def test_what_grows_never_shrinks(name: str) -> None:
 def test_a_clamp_that_slips_at_once_does_so_at_its_place_and_stays() -> None:
     """As one that sticks until then: nothing before that deflection is reached for the first time."""
     m = measured(staircase((0.02, 0.06, 0.02), 400))
-    f, plain = force(m, "clamp_slip", x=np.array([0.03, 2.0, 0.0, 0.0, 1.0, 0.5, 0.5, 0.0, 0.5, 0.015])), force(m)
+    f, plain = force(m, "clamp_slip", x=np.array([0.03, 2.0, 0.0, 0.0, 1.0, 0.5, 0.5, 0.0, 0.5, 0.015, 0.0])), force(m)
     first, last = m.cycle == 1, m.cycle == 3
     over = (m.cycle == 2) & (m.leg > 0) & (m.deflection > 0.034)
     assert f[first] == pytest.approx(plain[first], rel=1e-2)
