@@ -319,7 +319,9 @@ class TwinsThresholds:
     speeds: float = 1.5
     """Times by which the fastest leg is faster than the slowest: below it the disc moved at one speed."""
     readings: int = 5
-    """Of a leg, at least, for its speed to count."""
+    """Of a leg, or a part of it, at least, for its speed to count."""
+    parts: int = 6
+    """Of a leg, whose speeds count each for itself: a drive may change its speed on the way."""
     alike: float = 0.05
     """Of the misfit beyond noise: a set that leaves more than this beyond its twin does not fit as it does. It is the
     square of a law that is 22 % off."""
@@ -330,6 +332,8 @@ class TwinsThresholds:
     `make study-third` a frame that yields was 9 behind an offset of the zero, which was named."""
     alike_in_time: float = 0.25
     """The same where only another speed or a hold could tell: there no shape of a law counts for much."""
+    back: float = 0.5
+    """Of a deflection, to which the disc comes back, at least, for the way back to tell apart what only that does."""
     usual: float = 5.0
     """Times the expected size: a twin as large is told apart by being implausible."""
     least: float = 1e-3

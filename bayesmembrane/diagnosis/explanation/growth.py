@@ -146,7 +146,7 @@ def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
     got better.
 
     One is found from nearby only, and a search for a fall looks at every reading. What is best by that is grown from
-    once more.
+    once more, and says what noise is.
     """
     sought = []
     for f in (f for f in falls if len(_own(out, f.base)) < _most(out)):
@@ -156,12 +156,14 @@ def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
                 starts = starts_with([f.base.x], effect, out.search.expected_sizes(effect), shapes)
                 sought.append(Sought(with_effects(f.base.hypothesis, [effect]), starts, f.base))
     sought += [s for f in falls if (s := _begun_again(f)) is not None]
-    better = _kept(out, [c for c in out.search.fits(sought) if c is not None])
+    before, better = out.best, _kept(out, [c for c in out.search.fits(sought) if c is not None])
     first = max(better, key=lambda c: c.log_evidence, default=None)
     if first is not None and len(_own(out, first)) < _most(out):
         rest = [e for e in out.case.visible if e.name not in first.names]
         rest.sort(key=lambda e: -first_order(out.search, first, e))
         _kept(out, _fitted(out, [(first, e) for e in rest[: GROWTH.refits]]))
+    if out.best is not before:
+        out.renew()
     return bool(better)
 
 

@@ -158,8 +158,9 @@ def summed(grown: Grown) -> Total:
     for (energy, _, _), q in zip(parts, p.tolist(), strict=True):
         energies[energy] += q
     for i, (c, kind, _) in enumerate(terms):
-        if kind == NOTHING and not case.sees_nothing and carried(c, given):
-            joint[set_name(c, given), ANOTHER_LAW] += BELIEFS.another_law * float(p[i])
+        name = set_name(c, given)
+        if kind == NOTHING and carried(c, given) and not (name == NOTHING and case.sees_nothing):
+            joint[name, ANOTHER_LAW] += BELIEFS.another_law * float(p[i])
             p[i] *= 1 - BELIEFS.another_law
     for (_, name, kind), q in zip(parts, p.tolist(), strict=True):
         joint[name, kind] += q

@@ -3,7 +3,7 @@
 Two effects are twins on a measurement where both change the curve by functions of the deflection alone that nearly
 coincide beside the plain model (`confounded`), where both make loops at any speed, where one follows time and the
 other the way, and the disc moved at one speed without a hold, or where only the way back would tell them apart, and
-there is none. Laws of a library are close to what happens, not the
+there is less than half of it. Laws of a library are close to what happens, not the
 same: of two sets that differ by twins, and stand nearly as well, none is told to be more than `BELIEFS.apart` times as
 probable as the other, nor one with both twins than one of them alone.
 """
@@ -69,8 +69,10 @@ def twins_in_time(effects: Sequence[Effect], measurement: Measurement) -> dict[S
 
 
 def twins_one_way(effects: Sequence[Effect], measurement: Measurement) -> dict[Set, Near]:
-    """Pairs of ``effects`` that only the way back tells apart, where the disc never came back."""
-    if np.any(measurement.leg < 0):
+    """Pairs of ``effects`` that only the way back tells apart, where the disc never came half of the way back."""
+    deflection = np.abs(measurement.deflection)
+    reached = np.maximum.accumulate(deflection)
+    if np.any((deflection < TWINS.back * reached) & (reached > TWINS.back * reached[-1])):
         return {}
     known = {e.name for e in effects}
     return {frozenset((e.name, o)): Near(TWINS.alike) for e in effects for o in e.twins_one_way if o in known}
@@ -87,10 +89,12 @@ def one_speed(*measurements: Measurement) -> bool:
 
 
 def _speeds(measurement: Measurement) -> list[float]:
-    """1/s, that of every leg over the largest deflection."""
+    """1/s, those of the parts of every leg over the largest deflection."""
     leg = np.cumsum(np.abs(np.diff(measurement.leg, prepend=measurement.leg[0])) > 0)
     speed = measurement.path.speed[measurement.on_path] / np.max(np.abs(measurement.deflection))
-    return [float(np.median(speed[leg == n])) for n in np.unique(leg) if np.count_nonzero(leg == n) >= TWINS.readings]
+    legs = [speed[leg == n] for n in np.unique(leg)]
+    parts = [p for own in legs for p in np.array_split(own, max(1, min(TWINS.parts, own.size // TWINS.readings)))]
+    return [float(np.median(p)) for p in parts if p.size >= TWINS.readings]
 
 
 def swapped(names: Set, pairs: Iterable[Set]) -> Iterator[tuple[str, str, Set]]:

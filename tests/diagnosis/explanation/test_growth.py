@@ -179,7 +179,10 @@ def test_a_tear_is_looked_for_where_the_force_is_seen_to_fall(
         Foreign(SUDDEN, grown.best, 3.0, size=-0.01, on_clock=0.2),
         Foreign(SUDDEN, candidate(claim("mullins", "friction", "rate"), -9.0), 30.0, size=-0.03, on_clock=0.5),
     ]
+    monkeypatch.setattr(Grown, "renew", lambda out: renewed.append(out.best))
+    first, renewed = grown.best, list[Candidate]()
     assert with_falls(grown, falls) is better
+    assert renewed == ([grown.best] if grown.best is not first else [])  # what is best by now says what noise is
     assert [[e.name for e in s.hypothesis.effects] for s in asked] == 2 * [["mullins", "tearing"]]
     own = [c.name for c in tear.coordinates]
     place, part, again = (base.x.size + own.index(n) for n in ("moment", "second", "second_moment"))

@@ -30,7 +30,9 @@ TRIED = [SimpleNamespace(odds=1.0, name=n) for n in ("friction", "mullins")]
 def candidate(*effects: str, log_evidence: float, energy: str = "gent") -> Candidate:
     claim = with_effects(hypothesis(energy), [components("effects")[n]() for n in effects])
     nothing, x = np.zeros(3), np.zeros(claim.curve_size)
-    return Candidate(claim, x, nothing, nothing[:, None], log_evidence, (), nothing[None], np.zeros(2), nothing)
+    return Candidate(
+        claim, x, nothing, nothing[:, None], log_evidence, (), nothing[None], np.array([0.0, -9.0]), nothing
+    )
 
 
 def effects(monkeypatch: pytest.MonkeyPatch, **said: Any) -> dict[str, float]:
@@ -251,7 +253,7 @@ def test_draws_of_a_poor_model_say_nothing_of_what_takes_its_misfit_away(monkeyp
             plain={"gent": null},
             visible=[*TRIED, *TRIED],
             question=SimpleNamespace(energy=None),
-        sees_nothing=True,
+            sees_nothing=True,
             twins=lambda: frozenset(),
             foreign=lambda *_: [Foreign(UNNAMED, null, 850.0, share=share)],
             tell=lambda _: None,
@@ -266,16 +268,21 @@ def test_draws_of_a_poor_model_say_nothing_of_what_takes_its_misfit_away(monkeyp
     assert foreign_with(-55.0, 1.0) < foreign_with(0.0, 1.0)
 
 
-@pytest.mark.parametrize("off", [True, False])
+@pytest.mark.parametrize(
+    ("off", "sees_nothing"), [("friction", False), ("friction", True), (NOTHING, False), (NOTHING, True), ("", False)]
+)
 def test_what_holds_only_with_a_law_far_off_is_mostly_something_foreign(
-    monkeypatch: pytest.MonkeyPatch, off: bool
+    monkeypatch: pytest.MonkeyPatch, off: str, sees_nothing: bool
 ) -> None:
-    """Beside the same sets, flatter as all that does not stand out; where the tests see nothing, nothing is said of it."""
-    monkeypatch.setattr(total, "carried", lambda c, given: off and "friction" in c.names)
-    found = summed_up(monkeypatch, 0.0, 1.0, sees_nothing=False).probabilities
-    none = found.effects[NOTHING]
-    assert found.foreign.get(ANOTHER_LAW, 0.0) == pytest.approx(BELIEFS.another_law * (1 - none) if off else 0.0)
+    """Beside the same sets; an energy that is off is none where the tests see nothing."""
+    monkeypatch.setattr(total, "carried", lambda c, _: off in (c.names or (NOTHING,)))
+    found = summed_up(monkeypatch, 0.0, 1.0, sees_nothing=sees_nothing).probabilities
+    plain = summed_up(monkeypatch, 0.0, 1.0).probabilities.effects
+    far = (
+        sum(p for name, p in plain.items() if off in name.split("+")) if (off, sees_nothing) != (NOTHING, True) else 0.0
+    )
+    assert found.foreign.get(ANOTHER_LAW, 0.0) == pytest.approx(BELIEFS.another_law * far)
     assert sum(found.foreign.values()) == pytest.approx(1.0)
-    assert found.something_found == pytest.approx(0.0)
-    assert found.anything_foreign == pytest.approx(BELIEFS.another_law * (1 - none) if off else 0.0)
-    assert found.effects == pytest.approx(summed_up(monkeypatch, 0.0, 1.0).probabilities.effects)
+    assert found.something_found == pytest.approx(0.0, abs=1e-12)
+    assert found.anything_foreign == pytest.approx(BELIEFS.another_law * far)
+    assert found.effects == pytest.approx(plain)
