@@ -49,7 +49,7 @@ class Diagnosis(Showable):
     null, best : the model as given, and the most probable one
     ranking : every hypothesis that was fitted, the most probable first
     members : the hypotheses that the verdict rests on
-    foreign : the most probable thing that is foreign, or None where there is surely nothing
+    foreign : the most probable thing that is foreign, or None where none was found
     confounded : (effect, effect, degrees) that this protocol cannot separate
     noise : the measurement's own
     power : by effect, the smallest |size| that this measurement would have shown, SI

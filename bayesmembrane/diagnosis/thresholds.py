@@ -317,11 +317,12 @@ class TwinsThresholds:
     """When two effects cannot be told apart by a test, beside `DETECTION.near_degrees`."""
 
     speeds: float = 1.5
-    """Times by which the fastest leg is faster than the slowest: below it the disc moved at one speed."""
+    """Times by which the fastest part of a leg is faster than the slowest: below it the disc moved at one speed."""
     readings: int = 5
     """Of a leg, or a part of it, at least, for its speed to count."""
-    parts: int = 6
-    """Of a leg, whose speeds count each for itself: a drive may change its speed on the way."""
+    parts: int = 3
+    """Of a leg, whose speeds count each for itself: a drive may change its speed on the way. By the medians of thirds
+    a drive that speeds up and brakes over a sixth of a leg each has one speed."""
     alike: float = 0.05
     """Of the misfit beyond noise: a set that leaves more than this beyond its twin does not fit as it does. It is the
     square of a law that is 22 % off."""

@@ -16,12 +16,13 @@ class Reach:
     """What a test reached, in the units of its rig.
 
     travel : largest deflection of the whole test; force : largest measured; duration : s, of the whole test since the
-        disc stood at zero, which is what its clock shows
+        disc stood at zero, which is what its clock shows; clamped : True if the film is clamped all round
     """
 
     travel: float
     force: float
     duration: float
+    clamped: bool = True
 
     @property
     def by_unit(self) -> dict[str, float]:
@@ -52,4 +53,4 @@ def reach_of(measurement: Measurement) -> Reach:
     """Of one measurement."""
     force = float(np.max(np.abs(measurement.force)))
     duration = max(float(measurement.path.clock[-1]), SHORTEST)
-    return Reach(measurement.full_range, force if force > 0 else SOURCE.force, duration)
+    return Reach(measurement.full_range, force if force > 0 else SOURCE.force, duration, measurement.rig.clamped)

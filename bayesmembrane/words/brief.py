@@ -21,6 +21,7 @@ from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.words import language
 from bayesmembrane.words.diagnosis import (
     certain,
+    foreign_told,
     laws_off,
     other_energy,
     percent,
@@ -203,14 +204,14 @@ def _probabilities(course: Course) -> tuple[str, ...]:
 def _every(course: Course) -> list[str]:
     d = course.telling
     p = d.probabilities
-    foreign = p.anything_foreign
     room = max(1, course.detail.told - bool(d.verdict == "ambiguous" and course.detail.sums and _in_all(d)))
-    strange = foreign >= WORDS.probable and sum(q > foreign for q in p.effects.values()) < room
+    what, foreign = max(foreign_told(p), key=lambda told: told[1], default=("", 0.0))
+    strange = bool(what) and sum(q > foreign for q in p.effects.values()) < room
     probable = [name for name, q in p.effects.items() if q >= WORDS.probable][: max(1, room - strange)]
     sizes = np.cumsum([len(name.split("+")) for name in probable])
     told = [_probable_set(d, n, course, bool(k <= course.detail.sized)) for n, k in zip(probable, sizes, strict=True)]
     if strange:
-        told.insert(0 if foreign > 0.5 else len(told), f"{percent(foreign)} something foreign")
+        told.insert(0 if foreign > 0.5 else len(told), f"{percent(foreign)} {what}")
     if d.verdict == "material":
         told.append(f"{percent(p.energies.get(d.material, 0.0))} the energy {d.best.hypothesis.material.title}")
     return told

@@ -12,7 +12,7 @@ from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, UNNAMED, WAVE, Foreign
-from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, set_name
+from bayesmembrane.diagnosis.explanation.total import ANOTHER_LAW, NOTHING, Judged, Probabilities, set_name
 from bayesmembrane.diagnosis.left.heldout import HeldOut
 from bayesmembrane.diagnosis.left.shape import resolution_of
 from bayesmembrane.diagnosis.left.turning import at_a_turn
@@ -154,9 +154,14 @@ def probabilities_told(p: Probabilities) -> list[str]:
     if first and alone < VERDICT.sure and in_sum >= max(WORDS.nearly_all, alone + WORDS.probable):
         told = [f"{set_title('+'.join(sorted(first)))} {percent(in_sum)}"]
         told += [f"{_beyond(first, name)} {percent(q)}" for name, q in probable]
-    if p.anything_foreign >= WORDS.probable:
-        told.append(f"something foreign {percent(p.anything_foreign)}")
-    return told
+    return [*told, *(f"{what} {percent(q)}" for what, q in foreign_told(p))]
+
+
+def foreign_told(p: Probabilities) -> list[tuple[str, float]]:
+    """What is foreign, in words, and how probable, where it counts: what was found, and what no law describes."""
+    other_law = p.foreign.get(ANOTHER_LAW, 0.0)
+    told = [("something foreign", p.something_found), ("a law that is not in the library", other_law)]
+    return [(what, q) for what, q in told if q >= WORDS.probable]
 
 
 def _beyond(first: set[str], name: str) -> str:

@@ -10,6 +10,7 @@ from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect
+from bayesmembrane.physics.effects.clamp_slip import ClampSlip
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.reach import SOURCE, Reach, reach_of
@@ -64,7 +65,7 @@ def test_whoever_holds_a_measurement_has_its_priors(make) -> None:  # type: igno
 
 def test_a_longer_and_stronger_test_reaches_more() -> None:
     m = strip()
-    assert reach_of(m) == Reach(2.0, float(np.max(m.force)), float(m.path.clock[-1]))
+    assert reach_of(m) == Reach(2.0, float(np.max(m.force)), float(m.path.clock[-1]), False)
     assert reach_of(replace(m, force=-m.force)) == reach_of(m)
     assert reach_of(m.up_to(1.0)).travel == 2.0
     assert reach_of(replace(m, force=0 * m.force)).force == SOURCE.force
@@ -82,3 +83,10 @@ def test_what_comes_at_a_moment_may_come_until_the_last_reading() -> None:
 def test_a_plain_film_is_the_same_in_any_test() -> None:
     h = hypothesis("yeoh")
     assert h.on(strip()) is h
+
+
+def test_slip_is_felt_alike_at_any_stretch_where_no_clamp_holds_the_film_all_round() -> None:
+    (effect,) = hypothesis("gent", ["clamp_slip"]).on(strip()).effects
+    eased, declared = (next(p for p in c if p.name == "eased") for c in (effect.coordinates, ClampSlip.coordinates))
+    assert eased.prior.mean_sd[1] < 0.1 * declared.prior.mean_sd[1]
+    assert eased.first == 0.0

@@ -5,17 +5,20 @@ import pytest
 from scipy.integrate import solve_bvp
 from scipy.optimize import least_squares
 
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.registry import material
+from bayesmembrane.physics.effects.clamp_slip import ClampSlip
 from bayesmembrane.physics.mechanics import request
 from bayesmembrane.physics.mechanics.film_law import film_law
 
 R1, R2 = 0.010, 0.035
 YEOH, FILM = material("yeoh"), np.array([8.0, -0.2, 0.03])
-D = np.linspace(0.050, 0.008, 13)
 
 
-def slipped(slip: float) -> np.ndarray:
-    """F (N,) at D of a film of stress-free radii R1 and R2 + slip whose edges are held at R1 and R2."""
+def slipped(slip: float, d: np.ndarray) -> np.ndarray:
+    """F (N,) at deflections d (N,) m, which fall, of a film of stress-free radii R1 and R2 + slip with edges held at
+    R1 and R2.
+    """
     span, found = np.log((R2 + slip) / R1), []
 
     def rates(t: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -26,9 +29,9 @@ def slipped(slip: float) -> np.ndarray:
         return np.array([dl2, dl1, -np.sin(th) * p2 / p1, R1 * np.exp(t) * l1 * np.sin(th)])
 
     t = np.linspace(0, span, 60)
-    cone = D[0] / (R2 - R1)
-    y = np.stack([np.ones(60), np.full(60, np.hypot(1, cone)), np.full(60, np.arctan(cone)), D[0] * t / span])
-    for delta in D:
+    cone = d[0] / (R2 - R1)
+    y = np.stack([np.ones(60), np.full(60, np.hypot(1, cone)), np.full(60, np.arctan(cone)), d[0] * t / span])
+    for delta in d:
         ends = np.array([1.0, R2 / (R2 + slip), 0.0, delta])
         done = solve_bvp(
             rates,
@@ -45,19 +48,36 @@ def slipped(slip: float) -> np.ndarray:
     return np.array(found)
 
 
-def test_excess_length_that_eases_stands_for_slip_to_a_twentieth_of_its_effect() -> None:
-    law, _ = film_law(request(YEOH, FILM, [0.06], R1, R2), np.array([0.06]))
-    at_rest = slipped(0.0)
-    assert at_rest == pytest.approx(law(D[None])[0][0], rel=1e-6)
+def at_once(slip: float, eased: float, d: np.ndarray) -> np.ndarray:
+    """(1, N) excess length of a clamp that has slipped before the first deflection of d (N,), which is the largest."""
+    said = {"slip": slip, "eased": eased, "jump": 1.0, "place": 0.0, "width": 1e-3}
+    p = np.array([[said.get(c.name, 0.0) for c in ClampSlip.coordinates]])
+    return ClampSlip().excess(p, d[None], Motion(d, None, float(d[0])))
+
+
+@pytest.mark.parametrize(
+    ("top", "usual", "most", "gains"),
+    [(0.030, (0.95, 0.46), 0.03, 3.0), (0.050, (0.69, 0.95), 0.05, 3.0), (0.070, (0.76, 0.36), 0.09, 1.1)],
+)
+def test_excess_length_that_eases_stands_for_slip(
+    top: float, usual: tuple[float, float], most: float, gains: float
+) -> None:
+    """To 3 and 5 % of its effect up to twice the width of the film, where by one number alone it is 9 and 19 %; beyond
+    that hardly better than by one number.
+    """
+    d = np.linspace(top, 0.16 * top, 13)
+    law, _ = film_law(request(YEOH, FILM, [1.2 * top], R1, R2), np.array([1.2 * top]))
+    at_rest = slipped(0.0, d)
+    assert at_rest == pytest.approx(law(d[None])[0][0], rel=1e-6)
     for slip in (1e-4, 2.5e-4):
-        exact = slipped(slip)
+        exact = slipped(slip, d)
 
         def missed(p: np.ndarray, exact: np.ndarray = exact, slip: float = slip) -> np.ndarray:
-            excess = p[0] * slip / (R2 - R1) * (1 + p[1] * (1 - D / D[0]))
-            return np.asarray(law(D[None], excess[None])[0][0] - exact)
+            excess = at_once(p[0] * slip / (R2 - R1), p[1], d)
+            return np.asarray(law(d[None], excess)[0][0] - exact)
 
         best = least_squares(missed, [0.8, 0.4], diff_step=1e-4)
         even = least_squares(lambda p: missed(np.array([p[0], 0.0])), [0.8], diff_step=1e-4)
-        assert best.x == pytest.approx([0.69, 0.95], abs=0.04)
-        assert np.linalg.norm(best.fun) < 0.05 * np.linalg.norm(exact - at_rest)
-        assert np.linalg.norm(even.fun) > 3 * np.linalg.norm(best.fun)
+        assert best.x == pytest.approx(usual, abs=0.1)
+        assert np.linalg.norm(best.fun) < most * np.linalg.norm(exact - at_rest)
+        assert np.linalg.norm(even.fun) > gains * np.linalg.norm(best.fun)

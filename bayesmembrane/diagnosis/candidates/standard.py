@@ -114,7 +114,8 @@ class Standard:
         with np.errstate(divide="ignore"):
             ends = [[float(a.to_u(np.asarray(b, dtype=float))) for b in a.bounds] for a in self.axes]
         low, high = np.array(ends).T
-        return np.maximum(low, -8.0), np.minimum(high, np.where(self.heavy, np.inf, 8.0))
+        most = np.where(self.heavy, np.inf, 8.0)
+        return np.maximum(low, -most), np.minimum(high, most)
 
     @cached_property
     def ends(self) -> tuple[Array, Array]:

@@ -138,7 +138,10 @@ def grown(case: DiagnosisCase) -> Grown:
 
 def with_sets(out: Grown, sets: Sequence[frozenset[str]]) -> None:
     """Sets that promised nothing, from each of their parts; searched on and checked as what grew."""
+    before = out.best
     _kept(out, _fitted(out, [step for names in sets for step in _last_steps(out, names)]))
+    if out.best is not before:
+        out.renew()
 
 
 def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
@@ -205,7 +208,8 @@ def weigh_by_draws(out: Grown) -> None:
     null = (out.case.null.hypothesis.material.name, frozenset(out.case.null.names))
     seen = out.seen()
     for drawing in (SAMPLED.first, SAMPLED.last):
-        rest = dict.fromkeys(out.found)
+        again = drawing is SAMPLED.last
+        rest = dict.fromkeys(key for key, c in out.found.items() if again or not c.by_draws or key == null)
         for _ in range(SAMPLED.most):
             shares = _shares(out, seen)
             first = drawing is SAMPLED.first and null in rest

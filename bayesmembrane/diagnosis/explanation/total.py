@@ -155,17 +155,17 @@ def summed(grown: Grown) -> Total:
     parts = [(c.hypothesis.material.name, set_name(c, given), kind) for c, kind, _ in terms]
     parts += [(energy, _joined(names - set(given)), NOTHING) for (energy, names), _ in guessed]
     joint, energies = defaultdict[tuple[str, str], float](float), defaultdict[str, float](float)
-    for (energy, _, _), q in zip(parts, p.tolist(), strict=True):
-        energies[energy] += q
-    for i, (c, kind, _) in enumerate(terms):
-        name = set_name(c, given)
-        if kind == NOTHING and carried(c, given) and not (name == NOTHING and case.sees_nothing):
-            joint[name, ANOTHER_LAW] += BELIEFS.another_law * float(p[i])
-            p[i] *= 1 - BELIEFS.another_law
-    for (_, name, kind), q in zip(parts, p.tolist(), strict=True):
+    for (energy, name, kind), q in zip(parts, p.tolist(), strict=True):
         joint[name, kind] += q
+        energies[energy] += q
     for name, q in _untried(grown, every, joint).items():
         joint[name, NOTHING] += q
+    for i, (c, kind, _) in enumerate(terms):
+        if kind == NOTHING and carried(c, given) and not _described(grown, c, given):
+            name, elsewhere = set_name(c, given), BELIEFS.another_law * float(p[i])
+            joint[name, NOTHING] -= elsewhere
+            joint[name, ANOTHER_LAW] += elsewhere
+            p[i] -= elsewhere
     both = _flattened(joint)
     judged = []
     for (c, kind, _), q in zip(terms, p[: len(terms)].tolist(), strict=True):
@@ -176,6 +176,11 @@ def summed(grown: Grown) -> Total:
     judged.sort(key=lambda j: -j.probability)
     marginal = Probabilities(_summed_out(both, 0), _falling(BELIEFS.energies_flattened(energies)), _summed_out(both, 1))
     return Total(tuple(judged), marginal, both, tuple(found))
+
+
+def _described(grown: Grown, c: Candidate, given: Sequence[str]) -> bool:
+    """True of an energy without effects by which the tests see nothing that is missing."""
+    return set_name(c, given) == NOTHING and (grown.case.sees_nothing or grown.case.tested(c).adequate)
 
 
 def _flattened(joint: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], float]:

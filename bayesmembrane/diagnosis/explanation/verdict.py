@@ -34,7 +34,7 @@ class Verdict:
     members : the hypotheses that it rests on, each with one energy of its set of effects (`_first_of_each_set`)
     ranking : every hypothesis that was fitted, the most probable first
     probabilities : summed
-    foreign : what is foreign, where it is not sure that there is nothing
+    foreign : what was found that is foreign, where it is not sure that there is nothing
     """
 
     verdict: str
@@ -123,7 +123,7 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
         return unknown
     if [set_name(m.candidate, given) for m in members] == [NOTHING]:
         return unknown if p.anything_foreign > 1 - VERDICT.sure else _without_effects(case, total, members)
-    if carried(first.candidate, given):
+    if carried(first.candidate, given) or p.foreign.get(ANOTHER_LAW, 0.0) > 0.5:
         return unknown
     return Verdict("named" if len(members) == 1 else "ambiguous", members, total.ranking, p, strange)
 

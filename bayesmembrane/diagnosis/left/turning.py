@@ -38,11 +38,9 @@ def _last(path: Motion, end: int) -> bool:
 
 def _moments(effect: Effect, candidate: Candidate) -> list[float]:
     """When it comes, s, as far as that is a good part of it; nothing where it comes with the way."""
-    p = {
-        name: candidate.parameters[f"{effect.name}.{name}"] for name in (effect.begins, *(effect.second or ())) if name
-    }
     if not effect.begins:
         return []
+    p = {name: candidate.parameters[f"{effect.name}.{name}"] for name in (effect.begins, *(effect.second or ()))}
     if effect.second is None:
         return [p[effect.begins]]
     part, first, then = (p[name] for name in effect.second)

@@ -14,13 +14,13 @@ from bayesmembrane.physics.effects.base import EffectParameter, Sensor
 
 @dataclass(frozen=True)
 class ForceDrift(Sensor):
-    """F_read = F + rate t1 {(1 - w) [(t / t1) (rest + t1) / (rest + t)]^exponent + w s}, with w = swings^2, the time t
-    since the start, and s = sin(2 pi (t / period + phase)) - sin(2 pi phase).
+    """F_read = F + rate {(1 - w) t1 [(t / t1) (rest + t1) / (rest + t)]^exponent + w s}, with w = swings^2, the time t
+    since the start, and s = (period / 4) [sin(2 pi (t / period + phase)) - sin(2 pi phase)].
 
-    t1 is when the first leg ends, and ``rate`` the mean until then of a drift that goes one way: what comes later does
-    not change what was read. A cell that warms up drifts quickly at first (exponent below 1) and comes to rest (t
-    beyond ``rest``). With the temperature of a room a drift goes and comes back: a part w of it swings, about once in
-    a test. Without times the clock is the distance travelled at 1 mm/s.
+    t1 is when the first leg ends: what comes later does not change what was read. ``rate`` is the mean until then of
+    what goes one way, and that of the first quarter of a period of what swings back, as with the temperature of a room.
+    A cell that warms up drifts quickly at first (exponent below 1) and comes to rest (t beyond ``rest``). Without times
+    the clock is the distance travelled at 1 mm/s.
     """
 
     name: ClassVar[str] = "force_drift"
@@ -33,7 +33,12 @@ class ForceDrift(Sensor):
     rank: ClassVar[int] = 1
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
-            "rate", "N/s", "mean change of the zero with time, on the first leg", Normal(0.0, 3e-4), (-1.0, 1.0), 0.0
+            "rate",
+            "N/s",
+            "mean change of the zero with time: on the first leg, or in a quarter of a period",
+            Normal(0.0, 3e-4),
+            (-1.0, 1.0),
+            0.0,
         ),
         EffectParameter("exponent", "-", "power of the time with which it goes on", LogNormal(1.0, 0.28), (0.4, 3.0)),
         EffectParameter(
@@ -64,5 +69,5 @@ class ForceDrift(Sensor):
         part = path.clock / first * (p[:, 2:3] + first) / (p[:, 2:3] + path.clock)
         once = part ** p[:, 1:2]
         angle = 2 * np.pi * p[:, 5:6]
-        swing = np.sin(2 * np.pi * path.clock / p[:, 4:5] + angle) - np.sin(angle)
-        return np.asarray(force + p[:, :1] * first * (once + p[:, 3:4] ** 2 * (swing - once)))
+        swing = 0.25 * p[:, 4:5] * (np.sin(2 * np.pi * path.clock / p[:, 4:5] + angle) - np.sin(angle))
+        return np.asarray(force + p[:, :1] * (first * once + p[:, 3:4] ** 2 * (swing - first * once)))

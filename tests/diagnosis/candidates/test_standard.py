@@ -35,6 +35,14 @@ def test_absence_is_at_zero_and_its_side_is_kept(name) -> None:
     assert axes.heavy[2]
 
 
+@pytest.mark.parametrize("name", ["force_drift", "force_offset", "zero_offset"])
+def test_a_size_of_either_sign_may_be_as_large_on_both_sides(name: str) -> None:
+    axes = standard(Hypothesis(materials()["gent"], (components("effects")[name](),)), CURVE)
+    low, high = (b[2] for b in axes.bounds)
+    assert low == pytest.approx(-high)
+    assert high > 8.0
+
+
 def test_pulls_are_roots_of_the_prior_and_local_normals_have_its_value_and_slope() -> None:
     axes = standard(Hypothesis(materials()["gent"], (components("effects")["machine_compliance"](),)), CURVE)
     u = np.array([0.4, -1.2, 3.0, 0.7])

@@ -49,6 +49,7 @@ def summed_up(
     step: Mapping[str, Any] | None = None,
     flatter: float = 1.0,
     sees_nothing: bool = True,
+    adequate: bool = False,
 ) -> total.Total:
     """The sum where friction explains the curve, and Mullins beside it has a ``gain`` in ln Z.
 
@@ -91,6 +92,7 @@ def summed_up(
         visible=[*untried, *TRIED, *TRIED][:4],
         question=SimpleNamespace(energy=None),
         sees_nothing=sees_nothing,
+        tested=lambda _: SimpleNamespace(adequate=adequate),
         twins=lambda: frozenset(),
         foreign=lambda _, bases, __: [] if step is None else [Foreign(SUDDEN, bases[0], 30.0, **step)],
         tell=lambda _: None,
@@ -269,20 +271,43 @@ def test_draws_of_a_poor_model_say_nothing_of_what_takes_its_misfit_away(monkeyp
 
 
 @pytest.mark.parametrize(
-    ("off", "sees_nothing"), [("friction", False), ("friction", True), (NOTHING, False), (NOTHING, True), ("", False)]
+    ("off", "sees_nothing", "adequate", "far"),
+    [
+        ("friction", False, False, ["friction", "friction+mullins"]),
+        ("friction", True, False, ["friction", "friction+mullins"]),
+        (NOTHING, False, False, [NOTHING]),
+        (NOTHING, False, True, []),
+        (NOTHING, True, False, []),
+        ("", False, False, []),
+    ],
 )
 def test_what_holds_only_with_a_law_far_off_is_mostly_something_foreign(
-    monkeypatch: pytest.MonkeyPatch, off: str, sees_nothing: bool
+    monkeypatch: pytest.MonkeyPatch, off: str, sees_nothing: bool, adequate: bool, far: list[str]
 ) -> None:
     """Beside the same sets; an energy that is off is none where the tests see nothing."""
     monkeypatch.setattr(total, "carried", lambda c, _: off in (c.names or (NOTHING,)))
-    found = summed_up(monkeypatch, 0.0, 1.0, sees_nothing=sees_nothing).probabilities
+    said = {"sees_nothing": sees_nothing, "adequate": adequate}
+    found = summed_up(monkeypatch, 0.0, 1.0, **said).probabilities
     plain = summed_up(monkeypatch, 0.0, 1.0).probabilities.effects
-    far = (
-        sum(p for name, p in plain.items() if off in name.split("+")) if (off, sees_nothing) != (NOTHING, True) else 0.0
-    )
-    assert found.foreign.get(ANOTHER_LAW, 0.0) == pytest.approx(BELIEFS.another_law * far)
+    moved = BELIEFS.another_law * sum(plain[name] for name in far)
+    assert found.foreign.get(ANOTHER_LAW, 0.0) == pytest.approx(moved)
     assert sum(found.foreign.values()) == pytest.approx(1.0)
     assert found.something_found == pytest.approx(0.0, abs=1e-12)
-    assert found.anything_foreign == pytest.approx(BELIEFS.another_law * far)
+    assert found.anything_foreign == pytest.approx(moved)
     assert found.effects == pytest.approx(plain)
+
+
+def test_beside_another_law_sets_are_flatter_however_one_stands_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And those that nobody fitted keep what they have."""
+    monkeypatch.setattr(total, "carried", lambda c, _: "friction" in c.names)
+    said = {"untried": TRIED[:1], "promised": 0.0}
+    plain = summed_up(monkeypatch, 0.0, -8.0, **said).joint
+    flat = summed_up(monkeypatch, 0.0, -8.0, flatter=0.5, **said).joint
+    odds = plain["friction", ANOTHER_LAW] / plain["friction+mullins", ANOTHER_LAW]
+    assert odds > 20
+    assert flat["friction", ANOTHER_LAW] / flat["friction+mullins", ANOTHER_LAW] == pytest.approx(odds**0.5)
+    monkeypatch.setattr(total, "carried", lambda *_: False)
+    known = summed_up(monkeypatch, 0.0, -8.0, **said).joint
+    assert {s for s, _ in plain} == {s for s, _ in known}
+    for name in {s for s, _ in known}:
+        assert sum(q for (s, _), q in plain.items() if s == name) == pytest.approx(known[name, NOTHING])

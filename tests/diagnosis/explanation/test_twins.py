@@ -107,6 +107,8 @@ def test_one_speed_is_one_speed_until_a_leg_is_faster_or_the_disc_stands() -> No
     assert not one_speed(curve(LEG, faster))
     on_the_way = np.where(even < 15, even, 14 + 0.1 * (even - 14))
     assert not one_speed(curve(UP, on_the_way[: UP.size]))
+    gently = np.concatenate([np.linspace(0.5, 1, 5), np.ones(20), np.linspace(1, 0.5, 6)])
+    assert one_speed(curve(UP, np.cumsum(1 / gently)))
     still = np.insert(LEG, 31, np.full(20, LEG[30]))
     assert not one_speed(curve(still, np.arange(still.size, dtype=float)))
 
