@@ -331,6 +331,10 @@ class TwinsThresholds:
     laws of the deflection alone are nearly exact. On the calibration half of `make study-reliability` (cases 60 to 123)
     sets that were levelled at a gap of 10 to 60 were the wrong ones, each of three times; on seed 36 of
     `make study-third` a frame that yields was 9 behind an offset of the zero, which was named."""
+    far_behind: float = 20.0
+    """The same of effects whose laws have many shapes, whatever they leave. Loops of one width in newtons at any
+    deflection, which others call hysteresis, were named friction in three of three films of ratio 8 to 23; hysteresis
+    was 11, 16 and 19 behind. In five films that were named friction rightly it was 15, 21, 24, 25 and 45 behind."""
     alike_in_time: float = 0.25
     """The same where only another speed or a hold could tell: there no shape of a law counts for much."""
     back: float = 0.5

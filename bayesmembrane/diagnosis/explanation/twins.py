@@ -56,9 +56,14 @@ Pairs = Mapping[Set, Near]
 def twins(effects: Sequence[Effect], signatures: Sequence[Signature]) -> dict[Set, Near]:
     """Pairs of ``effects`` that are functions of the deflection alone, and nearly coincide, or loops at any speed."""
     still, known = {e.name for e in effects if not e.remembers}, {e.name for e in effects}
-    alike = Near(TWINS.alike, TWINS.behind)
-    loops = {frozenset((e.name, o)): alike for e in effects for o in e.twins_at_any_speed if o in known}
-    return loops | {frozenset((a, b)): alike for a, b, _ in confounded(signatures) if {a, b} <= still}
+    alike, loose = Near(TWINS.alike, TWINS.behind), Near(np.inf, TWINS.far_behind)
+    by_nature = {
+        frozenset((e.name, o)): loose if e.of_many_shapes else alike
+        for e in effects
+        for o in e.twins_at_any_speed
+        if o in known
+    }
+    return by_nature | {frozenset((a, b)): alike for a, b, _ in confounded(signatures) if {a, b} <= still}
 
 
 def twins_in_time(effects: Sequence[Effect], measurement: Measurement) -> dict[Set, Near]:

@@ -110,6 +110,7 @@ class Effect(ABC):
     constant : True if its parameters are then the same in all of them; those of others belong to what a test reached
     twins_at_one_speed : names of effects that only another speed, or a hold, tells from this one
     twins_at_any_speed : names of effects that only the shape of its law tells from this one, whatever the motion
+    of_many_shapes : True if its law has so many shapes that only one far behind is told from its twins at any speed
     twins_one_way : names of effects that only the way back tells from this one
     begins : the coordinate that says when it comes, in s since the start; "" where it comes with the way
     second : (part, place, second place), the coordinates that say what part of what comes at once comes in a second
@@ -140,6 +141,7 @@ class Effect(ABC):
     constant: ClassVar[bool] = False
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ()
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ()
+    of_many_shapes: ClassVar[bool] = False
     twins_one_way: ClassVar[tuple[str, ...]] = ()
     sudden: ClassVar[bool] = False
     begins: ClassVar[str] = ""

@@ -42,6 +42,7 @@ class Hysteresis(Carried):
     )
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ("viscoelastic",)
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("friction",)
+    of_many_shapes: ClassVar[bool] = True
     of_the_material = True
     needs_return: ClassVar[bool] = True
     scales_with_modulus: ClassVar[bool] = True
