@@ -11,6 +11,7 @@ from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.twins import Near, Stands, levelled, one_speed, swapped, twins, twins_one_way
 from bayesmembrane.diagnosis.joint.case import JointCase
 from bayesmembrane.diagnosis.joint.effects import effects_in_tests
+from bayesmembrane.diagnosis.thresholds import TWINS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -89,7 +90,11 @@ def test_levels_are_those_of_a_first_look_whoever_is_raised() -> None:
 def test_loops_losses_and_longer_films_of_whatever_law_are_twins_whatever_the_motion() -> None:
     every = [cls() for cls in components("effects").values()]
     alike = (("friction", "hysteresis"), ("mullins", "tearing"), ("clamp_slip", "permanent_set"))
-    assert set(twins(every, ())) == {frozenset(pair) for pair in alike}
+    found = twins(every, ())
+    assert set(found) == {frozenset(pair) for pair in alike}
+    # Of loops no shape is sure: what is no more than a little behind is alike, whatever it leaves.
+    loose = [pair for pair, near in found.items() if near.left == np.inf and near.behind > TWINS.behind]
+    assert loose == [frozenset({"friction", "hysteresis"})]
     assert not twins([e for e in every if e.name not in ("friction", "mullins", "clamp_slip")], ())
 
 
