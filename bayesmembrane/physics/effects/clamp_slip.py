@@ -14,14 +14,12 @@ from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, JUMP, REPEA
 from bayesmembrane.physics.effects.base import EffectParameter, Slack, running_max
 
 PLACE = EffectParameter("place", "-", "where it comes, over the full range", Uniform(0.0, 1.0), (0.0, 1.1), event="way")
-SECOND_PLACE = replace(
-    PLACE, name="second_place", meaning="where the second event comes, over the full range", begin=0.99
-)
+SECOND_PLACE = replace(PLACE, name="second_place", meaning="where the second event comes, over the full range")
 WIDTH = EffectParameter(
     "width", "-", "how long it slides at once, over the full range", LogNormal(0.005, 1.2), (1e-4, 0.3), begin=0.015
 )
-EVEN = Normal(0.0, 0.02)
-"""Prior of `eased` where films are not clamped all round."""
+EVEN, EVEN_WITHIN = Normal(0.0, 0.01), (-0.04, 0.04)
+"""Prior and bounds of `eased` where films are not clamped all round."""
 JUMPS = tuple({"jump": 0.6, "place": place} for place in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9))
 """Shapes to begin a search with: a jump is found from nearby only."""
 SECOND_PLACES = tuple(np.linspace(0.1, 1.0, 19).tolist())
@@ -78,7 +76,7 @@ class ClampSlip(Slack):
         """A strip that slides out of its grips is a longer strip, at any stretch."""
         super().__post_init__()
         if self.reach is not None and not self.reach.clamped:
-            own = (replace(p, prior=EVEN, begin=0.0) if p.name == "eased" else p for p in self.coordinates)
+            own = (replace(p, prior=EVEN, bounds=EVEN_WITHIN) if p.name == "eased" else p for p in self.coordinates)
             object.__setattr__(self, "coordinates", tuple(own))
 
     @property

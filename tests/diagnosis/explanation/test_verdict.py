@@ -130,7 +130,7 @@ def test_too_many_sets_are_no_answer() -> None:
     found = verdict({"friction": 0.36, **dict.fromkeys(names[1:], 0.64 / 6)})
     assert found[0] == "ambiguous"  # a test that decides on friction is worth making
     few = {"friction": 0.25, "mullins": 0.25, "tearing": 0.2, **dict.fromkeys(names[3:], 0.3 / 4)}
-    assert verdict(few)[0] == "ambiguous"  # three of them hold two thirds
+    assert verdict(few)[0] == "ambiguous"  # three of them hold three fifths
     assert verdict({NOTHING: 0.36, **dict.fromkeys(names[1:], 0.64 / 6)})[0] == "ambiguous"
     assert verdict({NOTHING: 0.30, **dict.fromkeys(names[1:], 0.70 / 6)})[0] == "unknown"
     assert found[1][0] == "friction"
