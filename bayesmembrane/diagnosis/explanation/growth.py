@@ -140,8 +140,7 @@ def with_sets(out: Grown, sets: Sequence[frozenset[str]]) -> None:
     """Sets that promised nothing, from each of their parts; searched on and checked as what grew."""
     before = out.best
     _kept(out, _fitted(out, [step for names in sets for step in _last_steps(out, names)]))
-    if out.best is not before:
-        out.renew()
+    _settle(out, before)
 
 
 def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
@@ -165,9 +164,18 @@ def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
         rest = [e for e in out.case.visible if e.name not in first.names]
         rest.sort(key=lambda e: -first_order(out.search, first, e))
         _kept(out, _fitted(out, [(first, e) for e in rest[: GROWTH.refits]]))
+    if better:
+        _settle(out, before)
+    return bool(better)
+
+
+def _settle(out: Grown, before: Candidate) -> None:
+    """After what was found late: noise from what leads now, if that is not what led ``before``, and draws of what
+    decides.
+    """
     if out.best is not before:
         out.renew()
-    return bool(better)
+    weigh_by_draws(out)
 
 
 def _begun_again(f: Foreign) -> Sought | None:

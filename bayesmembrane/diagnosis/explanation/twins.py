@@ -3,9 +3,9 @@
 Two effects are twins on a measurement where both change the curve by functions of the deflection alone that nearly
 coincide beside the plain model (`confounded`), where both make loops at any speed, where one follows time and the
 other the way, and the disc moved at one speed without a hold, or where only the way back would tell them apart, and
-there is less than half of it. Laws of a library are close to what happens, not the
-same: of two sets that differ by twins, and stand nearly as well, none is told to be more than `BELIEFS.apart` times as
-probable as the other, nor one with both twins than one of them alone.
+there is less than half of it. Laws of a library are close to what happens, not the same: of two sets that differ by
+twins, and stand nearly as well, none is told to be more than `BELIEFS.apart` times as probable as the other, nor one
+with both twins than one of them alone.
 """
 
 from __future__ import annotations

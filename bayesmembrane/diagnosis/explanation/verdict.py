@@ -11,7 +11,7 @@ from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
-from bayesmembrane.diagnosis.explanation.growth import grown, weigh_by_draws, with_falls, with_sets
+from bayesmembrane.diagnosis.explanation.growth import grown, with_falls, with_sets
 from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.total import (
     ANOTHER_LAW,
@@ -74,14 +74,12 @@ def explained(case: DiagnosisCase) -> tuple[Weighing, Verdict]:
     every = grown(case)
     total = summed(every)
     if with_falls(every, _falls(total)):
-        weigh_by_draws(every)
         total = summed(every)
     for _ in range(VERDICT.looked_again):
         rivals = _unfitted_rivals(total, case.null.names)
         if not rivals:
             break
         with_sets(every, rivals)
-        weigh_by_draws(every)
         total = summed(every)
     return every.search, decided(case, total)
 

@@ -101,9 +101,8 @@ def test_sets_that_share_an_answer_with_one_that_was_fitted_are_fitted(
     monkeypatch.setattr(verdicts, "summed", lambda _: sums.pop(0))
     monkeypatch.setattr(verdicts, "with_sets", lambda _, names: fitted.append(names))
     monkeypatch.setattr(verdicts, "with_falls", lambda _, falls: bool(falls))
-    monkeypatch.setattr(verdicts, "weigh_by_draws", lambda _: fitted.append([frozenset({"checked"})]))
     _, found = verdicts.explained(cast(OpenCase, SimpleNamespace(null=candidate(NOTHING), sees_nothing=False)))
-    assert fitted == [[frozenset({"mullins"})], [frozenset({"checked"})]]
+    assert fitted == [[frozenset({"mullins"})]]
     assert (found.verdict, sums) == (answer, [])
 
 
@@ -115,9 +114,8 @@ def test_falls_of_the_force_that_are_worth_a_word_are_looked_at_once_more(monkey
     monkeypatch.setattr(verdicts, "grown", lambda _: SimpleNamespace(search=None))
     monkeypatch.setattr(verdicts, "summed", lambda _: sums.pop(0))
     monkeypatch.setattr(verdicts, "with_falls", lambda _, found: asked.append(found) or True)
-    monkeypatch.setattr(verdicts, "weigh_by_draws", lambda _: asked.append([]))
     _, found = verdicts.explained(cast(OpenCase, SimpleNamespace(null=candidate(NOTHING), sees_nothing=False)))
-    assert asked == [falls[:1], []]  # what is found there is drawn from as all that leads is
+    assert asked == [falls[:1]]
     assert [m.candidate.names for m in found.members] == [("mullins", "tearing")]
     faint = replace(said, probabilities=total({"mullins": 1.0}, strange=0.01).probabilities)
     assert verdicts._falls(faint) == []
