@@ -17,6 +17,7 @@ from bayesmembrane.calibration.quality import NOTEWORTHY
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.growing import picked
 from bayesmembrane.calibration.sampling.leaps import offers
+from bayesmembrane.calibration.sampling.proposals.collapsed import collapsed
 from bayesmembrane.calibration.sampling.walk import Sampled
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
@@ -76,9 +77,13 @@ def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) ->
 
 
 def _evaluated(posterior: Posterior, x: Array) -> Evaluation:
-    """As `Posterior.evaluate` of draws x (B, k), many of them the same since chains stand: each is solved once."""
+    """As `Posterior.evaluate` of draws x (B, k), many of them the same since chains stand: each is solved once.
+
+    Where chains were walked by shapes, what was proposed is known.
+    """
     distinct, back = np.unique(x, axis=0, return_inverse=True)
-    found, back = posterior.evaluate(distinct), back.ravel()
+    shape = collapsed(posterior)
+    found, back = posterior.evaluate(distinct) if shape is None else shape.at(distinct), back.ravel()
     traces = None if found.traces is None else found.traces[back]
     return Evaluation(found.log_prior[back], found.log_likelihood[back], found.outcome[back], found.force[back], traces)
 

@@ -173,6 +173,11 @@ class Posterior:
         return nodes_of(self.forward)
 
     @cached_property
+    def known(self) -> dict[bytes, Array]:
+        """Curves (N,) for Gd = 1 of films that were solved, by their shapes (`Collapsed.remember`)."""
+        return {}
+
+    @cached_property
     def noise(self) -> NoiseLikelihood:
         return self.hypothesis.noise.bind(self.measurement)
 

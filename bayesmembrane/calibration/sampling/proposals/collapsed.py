@@ -8,11 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesmembrane.calibration.posterior import Evaluation, Posterior
+from bayesmembrane.calibration.posterior import Evaluation, Outcome, Posterior
 from bayesmembrane.calibration.sampling.proposals.bend import Bend
 from bayesmembrane.calibration.sampling.proposals.conditional import Residuals
 from bayesmembrane.calibration.sampling.proposals.scores import Scores
 from bayesmembrane.ground.parameters import Array, Normal
+from bayesmembrane.physics.forward import AT_ONCE
 from bayesmembrane.physics.noise.base import NoiseSpectrum
 
 GROUPS = 16
@@ -54,6 +55,34 @@ class Collapsed:
         ok &= np.isfinite(log_likelihood)
         log_likelihood[~ok] = -np.inf
         return Evaluation(np.where(ok, self.log_prior(s), -np.inf), log_likelihood, found.outcome, force)
+
+    def remember(self, x: Array, force: Array) -> None:
+        """Curves (B, N) for Gd = 1 of films x (B, k) that are possible, for `at`; as long as they are not too many."""
+        known = self.posterior.known
+        if (len(known) + len(x)) * self.readings <= AT_ONCE:
+            known.update(zip(_shapes(x), force, strict=True))
+
+    def at(self, x: Array) -> Evaluation:
+        """As `Posterior.evaluate` of x (B, k), from curves for Gd = 1: those that are remembered are not solved again.
+
+        The same to the last digit whether they are. Films that are not possible have no likelihood.
+        """
+        kept = [self.posterior.known.get(key) for key in _shapes(x)]
+        new = np.array([force is None for force in kept], dtype=bool)
+        force, outcome = np.empty((len(x), self.readings)), np.full(len(x), Outcome.OK, dtype=np.int8)
+        log_prior, log_likelihood = self.posterior.prior.log_density(x), np.full(len(x), -np.inf)
+        if not np.all(new):
+            force[~new] = np.stack([f for f in kept if f is not None])
+        if np.any(new):
+            unit = x[new]
+            unit[:, 0], unit[:, -1] = self.modulus.mean, self.noise.mean
+            found = self.posterior.evaluate(unit)
+            force[new], outcome[new] = found.force / np.exp(self.modulus.mean), found.outcome
+            log_prior[new] = np.where(np.isfinite(found.log_prior), log_prior[new], -np.inf)
+        force *= np.exp(x[:, :1])
+        ok = outcome == Outcome.OK
+        log_likelihood[ok] = self.posterior.likelihood_given(force[ok], x[ok])
+        return Evaluation(log_prior, log_likelihood, outcome, force)
 
     def given(self, curves: Array, s: Array) -> Array:
         """(B,) ln p0(s) + ln p(y | s) if s (B, k - 2) had the ``curves`` (B, N) for Gd = 1."""
@@ -131,6 +160,11 @@ def collapsed(posterior: object) -> Collapsed | None:
         return None
     few = _alike(spectrum.variance, posterior.readings)[0].size <= GROUPS * left
     return Collapsed(posterior, spectrum) if few else None
+
+
+def _shapes(x: Array) -> list[bytes]:
+    """What tells the shapes of films x (B, k) apart: their coordinates, digit by digit."""
+    return [row.tobytes() for row in np.ascontiguousarray(x[:, 1:-1])]
 
 
 def _alike(variance: Array, readings: int) -> tuple[Array, NDArray[np.intp]]:

@@ -111,6 +111,7 @@ class ShapeFirst:
             x[ok, 0], x[ok, -1] = given.drawn(u[ok])
             lp[ok] = self.collapsed.posterior.given(np.exp(x[ok, :1]) * e.force[ok], x[ok])
             weights[ok] = self._weights(x[ok], lp[ok], given)
+            self.collapsed.remember(x[ok], e.force[ok])
         return x, lp, weights, e.outcome
 
     def _weighed(self, both: Array) -> Array:

@@ -112,6 +112,30 @@ def test_proposals_are_weighed_by_the_exact_density(noise: str) -> None:
     assert found[0].log_mean == pytest.approx(found[1].log_mean, abs=6 * np.hypot(*(f.log_mean_sd for f in found)))
 
 
+@pytest.mark.parametrize("rig", ["strip", "annulus"])
+def test_what_was_proposed_is_known_to_the_last_digit(monkeypatch: pytest.MonkeyPatch, rig: str) -> None:
+    """And is what all coordinates weigh, to round-off; films that nothing knows are solved."""
+    m = strip("none")
+    if rig == "annulus":
+        lifts = np.linspace(4e-3, 0.04, 8)
+        m = Measurement(lifts, 30.0 * lifts + 1.0, Annulus(0.01, 0.035), Specimen("film", 5e-5))
+    known, anew = (collapsed(Posterior(hypothesis("gent"), m)) for _ in range(2))
+    assert known is not None
+    assert anew is not None
+    proposal = ShapeFirst(known, mixture(3.5, 0.3))
+    made = proposal.solved(proposal.drawn(np.random.default_rng(55), 64))
+    x = np.concatenate([made.x[np.isfinite(made.log_posterior)], anew.whole(np.array([[3.4], [-40.0]]))])
+    plain, solved = known.posterior.evaluate(x), anew.at(x)
+    told = known.at(x)
+    assert np.array_equal(told.outcome, plain.outcome)
+    for name in ("force", "log_prior", "log_likelihood"):
+        a, b, c = (getattr(e, name) for e in (told, solved, plain))
+        assert np.array_equal(a, b, equal_nan=True)
+        assert a == pytest.approx(c, rel=1e-9, abs=1e-12, nan_ok=True)
+    monkeypatch.setattr(Posterior, "evaluate", lambda *_: pytest.fail("solved again"))
+    assert np.array_equal(known.at(x[:-2]).force, told.force[:-2])
+
+
 def test_a_mixture_of_all_coordinates_proposes_those() -> None:
     p = Posterior(hypothesis("gent"), strip("none"))
     assert isinstance(proposing(p, Mixture(np.zeros(1), np.zeros((1, 3)), np.eye(3)[None], 5.0)), Whole)
