@@ -139,7 +139,7 @@ def _firm(search: Search, found: Verdict, left: Remaining) -> tuple[str, ...]:
         return ()
     p = found.probabilities
     names = sorted(left.firm(p.sure()), key=p.of_effect, reverse=True)
-    while names and p.of_effect(*names) < VERDICT.sure:
+    while names and p.of_effect(*names) < VERDICT.certain:
         names.pop()
     return tuple(sorted(names))
 

@@ -431,6 +431,9 @@ class VerdictThresholds:
 
     sure: float = 0.95
     """From which an answer is given; sets of an ambiguous one hold as much together."""
+    certain: float = 0.9
+    """Of an effect, whatever else is at work, from which it is in all that is probable, as far as can be said beside
+    what is told of sets next to those of the sum (`Beliefs.elsewhere`)."""
     doubted: float = 0.85
     """Of no effect, and of nothing foreign, where no test sees a misfit: if both are more probable, the answer is that
     nothing is missing; if one is less by traces to first order, all are weighed. Of 104 plain films (`make study-loop`,

@@ -119,10 +119,10 @@ def _answer(found: JointDiagnosis) -> str:
 
 
 def _common(found: JointDiagnosis) -> str:
-    """What is in every set of an ambiguous answer."""
-    shared = sorted(set.intersection(*(set(m.name.split("+")) for m in found.members)) - {NOTHING})
+    """What is in all that is probable of an ambiguous answer."""
+    shared = found.probabilities.sure()
     is_there = "is" if len(shared) == 1 else "are"
-    return f"{set_title('+'.join(shared))} {is_there} in each of them, yet " if shared else ""
+    return f"{set_title('+'.join(shared))} {is_there} in all that is probable, yet " if shared else ""
 
 
 def _member(member: JointMember, found: JointDiagnosis) -> str:

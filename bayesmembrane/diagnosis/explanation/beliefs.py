@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import log, prod, sqrt
 
@@ -73,6 +73,18 @@ class Beliefs:
     """From the first of these on what is most probable begins to be left as it is, and from the second on it is: on
     those fresh seeds 45 of 50 were so (mean 0.98). To flatten these, too, takes two names of three, and one wrong one
     of two."""
+    elsewhere: float = 0.15
+    """Part of what is told of sets, where none stands out, that is told of those next to them (`neighbours`): of other
+    laws than the library's the true set may be far behind by all that is fitted, or was never looked at. Reckoned from
+    stored answers of 358 films of two generators by hands that knew nothing of this package: the truth in the 95 % set
+    of 314 instead of 290, log score -2.39 instead of -2.50, and what had 0.5 to 0.95 (mean 0.74) was so in 40 of 65
+    instead of 52 of 93 (0.72). With 0.1 or 0.2 the score is the same; spread from no effect, too, -2.39 and 316. On the
+    own generator, whose laws are the library's, it is 0.08 worse. Sets in an answer: 38 in the mean instead of 12."""
+    elsewhere_by_another_law: float = 0.5
+    """That of sets which hold only by a law that is not the library's (`another_law`): one in six that led so was
+    right."""
+    farther: float = 0.3
+    """Part of that which is told of sets two steps away."""
     declared: float = 1 / 3
     """Of the energy that was declared; the others share the rest. Without one, all are equally probable. Twice the odds
     of each of five others: what somebody typed is a hint, and no other question."""
@@ -105,11 +117,14 @@ class Beliefs:
 
     def flattened(self, probabilities: Mapping[str, float], by_known_laws: bool = True) -> dict[str, float]:
         """p^t / sum p^t, with t = `flatter`, and one where the largest of p stands out ``by_known_laws``."""
-        whole = sum(probabilities.values())
-        least, enough = self.stands_out
-        out = (max(probabilities.values(), default=0.0) / max(whole, 1e-300) - least) / (enough - least)
-        power = self.flatter + (1 - self.flatter) * min(max(out, 0.0), 1.0)
+        power = self.flatter + (1 - self.flatter) * self.standing_out(probabilities.values())
         return _raised(probabilities, power if by_known_laws else self.flatter)
+
+    def standing_out(self, probabilities: Collection[float]) -> float:
+        """From 0 to 1, how far the largest of them stands out (`stands_out`)."""
+        whole, (least, enough) = sum(probabilities), self.stands_out
+        out = (max(probabilities, default=0.0) / max(whole, 1e-300) - least) / (enough - least)
+        return min(max(out, 0.0), 1.0)
 
     def energies_flattened(self, probabilities: Mapping[str, float]) -> dict[str, float]:
         """p^t / sum p^t, with t = `energies_flatter`."""

@@ -14,6 +14,7 @@ from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown, key_of
+from bayesmembrane.diagnosis.explanation.neighbours import spread
 from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
 from bayesmembrane.diagnosis.explanation.unfitted import Key, unfitted
@@ -70,7 +71,7 @@ class Probabilities:
 
     def sure(self) -> list[str]:
         """Effects that are in all that is probable, by name: what is known even where the whole set is not."""
-        return self.likely(VERDICT.sure)
+        return self.likely(VERDICT.certain)
 
     def likely(self, least: float = 0.5) -> list[str]:
         """Effects whose probability is ``least`` or more, by name."""
@@ -95,12 +96,14 @@ class Total:
     ranking : every hypothesis, the most probable first
     probabilities : summed
     joint : by (set of effects, kind of what is foreign), the most probable first
+    by_laws : of sets of effects, before some of it is told of those next to them
     foreign : what was found of each kind beside the models where it was looked for, the most probable first
     """
 
     ranking: tuple[Judged, ...]
     probabilities: Probabilities
     joint: Mapping[tuple[str, str], float]
+    by_laws: Mapping[str, float]
     foreign: tuple[Foreign, ...]
 
 
@@ -166,16 +169,17 @@ def summed(grown: Grown) -> Total:
             joint[name, NOTHING] -= elsewhere
             joint[name, ANOTHER_LAW] += elsewhere
             p[i] -= elsewhere
-    both = _flattened(joint)
+    flat = _flattened(joint)
+    both = _beside(flat, [e.name for e in case.visible if e.name not in given])
     judged = []
     for (c, kind, _), q in zip(terms, p[: len(terms)].tolist(), strict=True):
         if kind == NOTHING:
             key = set_name(c, given), NOTHING
             of_set = q / joint[key] if q > 0 else 0.0
-            judged.append(_judged(grown, c, of_set * both[key], grown.believed(c)))
+            judged.append(_judged(grown, c, of_set * both.get(key, 0.0), grown.believed(c)))
     judged.sort(key=lambda j: -j.probability)
     marginal = Probabilities(_summed_out(both, 0), _falling(BELIEFS.energies_flattened(energies)), _summed_out(both, 1))
-    return Total(tuple(judged), marginal, both, tuple(found))
+    return Total(tuple(judged), marginal, both, _summed_out(flat, 0), tuple(found))
 
 
 def _described(grown: Grown, c: Candidate, given: Sequence[str]) -> bool:
@@ -199,6 +203,21 @@ def _flattened(joint: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], 
         out |= {(name, kind): q for name, q in BELIEFS.flattened(sets, kind != ANOTHER_LAW).items()}
     whole = sum(joint.values())
     return _falling({key: q / whole for key, q in out.items()})
+
+
+def _beside(joint: Mapping[tuple[str, str], float], visible: Sequence[str]) -> dict[tuple[str, str], float]:
+    """With a part of what sets have beside each kind of what is foreign told of those next to them, as far as none
+    stands out by known laws.
+    """
+    kinds, out = defaultdict[str, dict[frozenset[str], float]](dict), dict[tuple[str, str], float]()
+    for (name, kind), q in joint.items():
+        kinds[kind][frozenset() if name == NOTHING else frozenset(name.split("+"))] = q
+    for kind, sets in kinds.items():
+        doubted = BELIEFS.elsewhere * (1 - BELIEFS.standing_out(sets.values()))
+        share = BELIEFS.elsewhere_by_another_law if kind == ANOTHER_LAW else doubted
+        near = spread(sets, visible, BELIEFS.most, share, BELIEFS.farther)
+        out |= {(_joined(names), kind): q for names, q in near.items()}
+    return _falling(out)
 
 
 def _like_a_tear(f: Foreign, every: Sequence[Candidate], weight: Callable[[Candidate], float]) -> float:

@@ -93,7 +93,7 @@ def _falls(total: Total) -> list[Foreign]:
 def _unfitted_rivals(total: Total, given: Sequence[str]) -> list[frozenset[str]]:
     """Sets, the effects ``given`` among them, that were never fitted and share an answer with one set alone."""
     fitted = {set_name(j.candidate, given) for j in total.ranking}
-    told = _smallest(total.probabilities.effects)
+    told = _smallest(total.by_laws)
     rest = [name for name in told if name not in fitted]
     return [frozenset((*name.split("+"), *given)) for name in rest] if len(told) - len(rest) == 1 else []
 
@@ -114,7 +114,7 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     count = max(sum(name in best for name in told), min(len(told), 2))
     members = tuple(best[name] for name in fitted[:count])
     unknown = Verdict("unknown", (), total.ranking, p, strange)
-    if not members or (len(members) > VERDICT.most_members and not _worth_telling(p)):
+    if not members or (len(members) > VERDICT.most_members and not _worth_telling(total)):
         return unknown
     first = members[0]
     if strange is not None and p.something_found > 0.5 and _carries(strange, first, given):
@@ -126,10 +126,10 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     return Verdict("named" if len(members) == 1 else "ambiguous", members, total.ranking, p, strange)
 
 
-def _worth_telling(p: Probabilities) -> bool:
-    """True if an effect or none leads, or a few sets do, however many share the rest."""
-    few, together = VERDICT.few
-    first = sum(list(p.effects.values())[:few])
+def _worth_telling(total: Total) -> bool:
+    """True if an effect or none leads, or a few sets do by known laws, however many share the rest."""
+    p, (few, together) = total.probabilities, VERDICT.few
+    first = sum(list(total.by_laws.values())[:few])
     return bool(p.likely(VERDICT.leads)) or p.effects.get(NOTHING, 0.0) >= VERDICT.leads or first >= together
 
 

@@ -12,7 +12,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation import total
 from bayesmembrane.diagnosis.explanation import visible as visible_module
-from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
+from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS, Beliefs
 from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, UNNAMED, Foreign
 from bayesmembrane.diagnosis.explanation.growth import Grown
@@ -50,14 +50,16 @@ def summed_up(
     flatter: float = 1.0,
     sees_nothing: bool = True,
     adequate: bool = False,
+    elsewhere: float = 0.0,
 ) -> total.Total:
     """The sum where friction explains the curve, and Mullins beside it has a ``gain`` in ln Z.
 
     That changes by ``seen`` where what could not be seen counts as absent. Of four effects that can be seen some may be
     ``untried``, where traces of those that were not fitted have a ``promised`` ln of the Bayes factor. Beside the first
-    set there is a ``step``, if there is one. ``flatter`` : the power of `Beliefs.flattened`.
+    set there is a ``step``, if there is one. ``flatter`` : the power of `Beliefs.flattened`;
+    ``elsewhere`` : told of sets that are next to those of the sum.
     """
-    monkeypatch.setattr(total, "BELIEFS", replace(BELIEFS, flatter=flatter))
+    monkeypatch.setattr(total, "BELIEFS", told(flatter, elsewhere))
     takes = {
         frozenset({"friction"}): {"friction": LEFT - 20.0},
         frozenset({"friction", "mullins"}): {"mullins": 3.0},
@@ -105,6 +107,11 @@ def summed_up(
     ):
         grown.add(c)
     return total.summed(grown)
+
+
+def told(flatter: float = 1.0, elsewhere: float = 0.0) -> Beliefs:
+    """With another power of `Beliefs.flattened`, and so much told of sets next to those of the sum."""
+    return replace(BELIEFS, flatter=flatter, elsewhere=elsewhere, elsewhere_by_another_law=2 * elsewhere)
 
 
 def by_likelihood_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,7 +198,7 @@ def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_li
     monkeypatch: pytest.MonkeyPatch, size: float, behind: float, held: bool
 ) -> None:
     by_likelihood_alone(monkeypatch)
-    monkeypatch.setattr(total, "BELIEFS", replace(BELIEFS, flatter=1.0))
+    monkeypatch.setattr(total, "BELIEFS", told())
     base = candidate("friction", log_evidence=-60.0)
     torn = candidate("friction", "tearing", log_evidence=-35.0 - behind * TWINS.behind)
     case = SimpleNamespace(
@@ -311,3 +318,30 @@ def test_beside_another_law_sets_are_flatter_however_one_stands_out(monkeypatch:
     assert {s for s, _ in plain} == {s for s, _ in known}
     for name in {s for s, _ in known}:
         assert sum(q for (s, _), q in plain.items() if s == name) == pytest.approx(known[name, NOTHING])
+
+
+def test_a_part_is_told_of_sets_next_to_those_of_the_sum(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where none stands out; nothing is taken from no effect, and the sum by the laws of the library is kept."""
+    said = {"seen": 0.0, "gain": 3.0, "untried": [SimpleNamespace(odds=1.0, name="tearing")]}
+    plain, near = (summed_up(monkeypatch, **said, elsewhere=e) for e in (0.0, 0.2))
+    before, after = (dict(t.probabilities.effects) for t in (plain, near))
+    assert max(before.values()) < 0.9
+    assert near.by_laws == pytest.approx(plain.by_laws)
+    assert plain.by_laws == pytest.approx(before)
+    assert sum(after.values()) == pytest.approx(1.0)
+    assert after[NOTHING] >= before[NOTHING]
+    for name in ("tearing", "mullins", "friction+tearing", "mullins+tearing"):
+        assert after[name] > before.get(name, 0.0) + 1e-4
+    kept = sum(after[name] for name in ("friction", "friction+mullins"))
+    assert 0.8 < kept / sum(before[name] for name in ("friction", "friction+mullins")) < 0.9
+
+
+def test_nothing_is_told_of_others_where_one_stands_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """But beside a law that is not the library's."""
+    plain, near = (dict(summed_up(monkeypatch, 0.0, -9.0, elsewhere=e).probabilities.effects) for e in (0.0, 0.2))
+    assert max(plain.values()) > 0.95
+    assert near == pytest.approx({n: p for n, p in plain.items() if n in near}, abs=1e-4)
+    monkeypatch.setattr(total, "carried", lambda *_: True)
+    far = summed_up(monkeypatch, 0.0, -9.0, elsewhere=0.2).probabilities
+    moved = 1 - far.effects["friction"] / plain["friction"]
+    assert moved == pytest.approx(0.4 * far.foreign[ANOTHER_LAW], abs=0.05)

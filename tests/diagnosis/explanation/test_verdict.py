@@ -45,6 +45,7 @@ def total(
         ranking,
         Probabilities(sets, {"gent": 1.0}, dict(sorted(kinds.items(), key=lambda i: -i[1]))),
         dict(sorted(joint.items(), key=lambda i: -i[1])),
+        sets,
         (foreign,) if strange else (),
     )
 
