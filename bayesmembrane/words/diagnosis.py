@@ -338,12 +338,20 @@ def _material(found: Diagnosis) -> str:
 def _ambiguous(found: Diagnosis) -> str:
     told, more = found.members[: WORDS.listed_sets], len(found.members) - WORDS.listed_sets
     names = "; or ".join(_member(j, found) for j in told) + (
-        f"; or one of {more} less probable sets" if more > 1 else "; or a less probable set" if more else ""
+        f"; or one of {more} less probable sets" if more > 1 else "; or a less probable set" if more > 0 else ""
     )
+    names += _elsewhere(found)
     return (
         f"{_misses(found)}{_common(found)}this measurement cannot tell which of these it is: {names}. {_error(found)}"
         f"{_advice(found)}{_beside(found)}"
     )
+
+
+def _elsewhere(found: Diagnosis) -> str:
+    """What is told of sets beside those that the laws of the library lead to."""
+    own = {set_name(j.candidate, found.null.names) for j in found.members}
+    rest = sum(p for name, p in found.probabilities.effects.items() if name not in own)
+    return f"; or, by laws of its own, another set ({percent(rest)})" if rest > 1 - VERDICT.sure else ""
 
 
 def _advice(found: Diagnosis) -> str:

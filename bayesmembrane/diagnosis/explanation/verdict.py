@@ -31,7 +31,8 @@ class Verdict:
     """What the probabilities come to.
 
     verdict : "adequate", "named", "ambiguous", "material" or "unknown"
-    members : the hypotheses that it rests on, each with one energy of its set of effects (`_first_of_each_set`)
+    members : the hypotheses that it rests on, each with one energy of its set of effects (`_first_of_each_set`): the
+        fewest that hold `VERDICT.sure` together by the laws of the library
     ranking : every hypothesis that was fitted, the most probable first
     probabilities : summed
     foreign : what was found that is foreign, where it is not sure that there is nothing
@@ -106,12 +107,13 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     """
     p, given = total.probabilities, case.null.names
     strange = _strange(total, given)
-    best, told = _first_of_each_set(total.ranking, given), _smallest(p.effects)
+    best, told = _first_of_each_set(total.ranking, given), _smallest(total.by_laws)
     if case.sees_nothing and undoubted(p) and NOTHING in best:
         return Verdict("adequate", (best[NOTHING],), total.ranking, p, strange)
-    fitted = [name for name in p.effects if name in best]
-    # What was never fitted is no member; that one alone is left of several does not make it sure.
-    count = max(sum(name in best for name in told), min(len(told), 2))
+    fitted = [name for name in total.by_laws if name in best]
+    # What was never fitted is no member; that one alone is left of several, or of what is told, does not make it sure.
+    sure = p.effects.get(told[0], 0.0) >= VERDICT.sure
+    count = max(sum(name in best for name in told), 1 if sure else 2)
     members = tuple(best[name] for name in fitted[:count])
     unknown = Verdict("unknown", (), total.ranking, p, strange)
     if not members or (len(members) > VERDICT.most_members and not _worth_telling(total)):
