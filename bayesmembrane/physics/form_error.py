@@ -245,7 +245,8 @@ def form_columns(
 
 
 def unseen_columns(factors: FormFactors, force: Array, effects: Sequence[Effect], traces: Array) -> list[Array]:
-    """Of every effect whose law could be off columns (N, q) N of what a test at another speed may show beside it:
+    """Of every effect that remembers, and whose law could be off, columns (N, q) N of what a test at another speed may
+    show beside it:
 
         min((t^2 + (F |t| / |F|)^2)^(1/2), |F|) v(progress),
 
@@ -254,7 +255,8 @@ def unseen_columns(factors: FormFactors, force: Array, effects: Sequence[Effect]
     of a film that relaxes by a power law of time is, says how far the law goes on beyond the test, and not how far it
     is off.
     """
-    laws = [trace for effect, trace in zip(effects, traces, strict=True) if not effect.exact]
+    both = zip(effects, traces, strict=True)
+    laws = [trace for effect, trace in both if effect.remembers and not effect.exact]
     whole = max(float(np.linalg.norm(force)), 1e-300)
     sizes = [np.minimum(np.hypot(t, np.linalg.norm(t) / whole * force), np.abs(force)) for t in laws]
     return [size[:, None] * factors.progress for size in sizes]
