@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -340,17 +340,16 @@ def _ambiguous(found: Diagnosis) -> str:
     names = "; or ".join(_member(j, found) for j in told) + (
         f"; or one of {more} less probable sets" if more > 1 else "; or a less probable set" if more > 0 else ""
     )
-    names += _elsewhere(found)
+    names += elsewhere(found.probabilities, {set_name(j.candidate, found.null.names) for j in found.members})
     return (
         f"{_misses(found)}{_common(found)}this measurement cannot tell which of these it is: {names}. {_error(found)}"
         f"{_advice(found)}{_beside(found)}"
     )
 
 
-def _elsewhere(found: Diagnosis) -> str:
-    """What is told of sets beside those that the laws of the library lead to."""
-    own = {set_name(j.candidate, found.null.names) for j in found.members}
-    rest = sum(p for name, p in found.probabilities.effects.items() if name not in own)
+def elsewhere(p: Probabilities, members: Collection[str]) -> str:
+    """What is told of sets beside those that the laws of the library lead to, by their names."""
+    rest = sum(q for name, q in p.effects.items() if name not in members)
     return f"; or, by laws of its own, another set ({percent(rest)})" if rest > 1 - VERDICT.sure else ""
 
 

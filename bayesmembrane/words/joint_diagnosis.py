@@ -10,6 +10,7 @@ from bayesmembrane.diagnosis.joint.diagnose import DiagnosedTest, JointDiagnosis
 from bayesmembrane.diagnosis.thresholds import VERDICT, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words.diagnosis import (
+    elsewhere,
     foreign_sentence,
     percent,
     probabilities_told,
@@ -109,6 +110,7 @@ def _answer(found: JointDiagnosis) -> str:
         names = [_member(m, found) for m in found.members[: WORDS.listed_sets]]
         more = len(found.members) - len(names)
         rest = f"; or one of {more} less probable sets" if more > 0 else ""
+        rest += elsewhere(found.probabilities, {m.name for m in found.members})
         return f"{misses}: {_common(found)}these tests cannot tell which of these it is: {'; or '.join(names)}{rest}."
     if found.members:
         return f"{misses}: {_member(found.members[0], found)} is the most probable, yet leaves too much to be named."

@@ -5,7 +5,7 @@ import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
-from bayesmembrane.diagnosis.explanation.total import Probabilities
+from bayesmembrane.diagnosis.explanation.total import NOTHING, Probabilities
 from bayesmembrane.diagnosis.left.shape import residual_shape
 from bayesmembrane.diagnosis.result import Thinned, thinning
 from bayesmembrane.ground.parameters import Array
@@ -14,7 +14,7 @@ from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.base import Rig
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
-from bayesmembrane.words.diagnosis import percent, probabilities_told, thinning_sentence
+from bayesmembrane.words.diagnosis import elsewhere, percent, probabilities_told, thinning_sentence
 from bayesmembrane.words.shape import shape_in_words
 from bayesmembrane.words.sizes import flagged_size, units_of
 from bayesmembrane.words.units import SCALES, read_as, size_in_words
@@ -135,3 +135,10 @@ def test_what_is_in_nearly_all_sets_is_told_first() -> None:
     ]
     sets = {"viscoelastic": 0.97, "friction+viscoelastic": 0.03}
     assert probabilities_told(Probabilities(sets, {"yeoh": 1.0}, {"none": 1.0}))[0] == f"{relaxation} 97 %"
+
+
+def test_what_is_told_of_sets_that_no_law_leads_to_is_said_from_a_twentieth_on() -> None:
+    told = {"friction": 0.7, "mullins": 0.2, "tearing": 0.06, "rate": 0.04}
+    p = Probabilities(told, {"gent": 1.0}, {NOTHING: 1.0})
+    assert elsewhere(p, {"friction", "mullins"}) == "; or, by laws of its own, another set (10 %)"
+    assert elsewhere(p, {"friction", "mullins", "tearing"}) == ""
