@@ -17,8 +17,8 @@ def ruled_out_gain(posterior: Posterior | JointPosterior, x: Array, log_posterio
     """By how much ln p(x | y) is larger, at least, at a film that convexity rules out than at the best draw.
 
     x (..., k) are draws, with ``log_posterior`` (...). Films are tried around the best one, as far apart as the draws
-    are, then around the best of them as long as one is better, without the convexity prior. 0 if none is; None where
-    that prior asks nothing.
+    are, then around the best of them, without the convexity prior. 0 if none is better; None where that prior asks
+    nothing.
     """
     free = posterior.without_convexity
     if free is None:
@@ -33,9 +33,10 @@ def ruled_out_gain(posterior: Posterior | JointPosterior, x: Array, log_posterio
     for _ in range(ROUNDS):
         tried = best + rng.standard_normal((count, len(some))) @ apart
         tried = tried[~posterior.prior.surely_inside(tried)]  # of the others none is ruled out
-        lp = weighed(free, tried).log_posterior if len(tried) else np.full(1, -np.inf)
-        if not np.nanmax(lp) > highest:
-            break  # where the data ask for films beyond the edge, many of those next to it are better
-        best, highest = tried[int(np.nanargmax(lp))], float(np.nanmax(lp))
+        if not len(tried):
+            continue
+        lp = weighed(free, tried).log_posterior
+        if np.nanmax(lp) > highest:
+            best, highest = tried[int(np.nanargmax(lp))], float(np.nanmax(lp))
     allowed = bool(np.isfinite(weighed(posterior, best[None]).log_prior[0]))
     return 0.0 if allowed else highest - within

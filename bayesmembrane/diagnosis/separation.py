@@ -112,7 +112,7 @@ def _one(c: Candidate, search: Search, noise: OwnNoise, shown: tuple[Array, Arra
 def _forms(trial: OnFilm, c: Candidate, search: Search, factors: FormFactors, force: Array) -> Array:
     """(M, q) N: what the form errors of a rival, as large as it has shown them, could make of the further test."""
     forward = Forward(c.hypothesis, trial.measurement, trial.deflection, search.quick)
-    trace = traces(forward, c.x, force[None, :])[0]
+    trace = traces(forward, c.x, force[None, :], changing=True)[0]
     sizes = iter(np.exp(c.theta[1:]).tolist())
     columns = form_columns(factors, force, c.hypothesis.effects, trace)
     return np.column_stack([(1.0 if size is None else next(sizes)) * part for size, part in columns])

@@ -36,7 +36,7 @@ def in_step(asked: Sequence[Asked], sensitivities: bool = True) -> list[Predicti
 
 def traces_in_step(asked: Sequence[tuple[Forward, Array, Array]]) -> list[Array]:
     """`form_error.traces` (E, N) N of each at one point x (k,), where its force is (N,) N."""
-    missing = [rows_without(f.hypothesis, x[None, :]) for f, x, _ in asked]
+    missing = [rows_without(f.hypothesis, x[None, :], changing=True) for f, x, _ in asked]
     pairs = [
         (f, np.concatenate([row for _, row in rows])) for (f, _, _), rows in zip(asked, missing, strict=True) if rows
     ]

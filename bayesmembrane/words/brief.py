@@ -272,7 +272,7 @@ def _improbable(d: Diagnosis) -> str:
 def _ambiguous(course: Course) -> str:
     d = course.telling
     sure, among = _certain(d), _in_all(d) if course.detail.sums else ""
-    which = f"only {sure} certain" if sure else f"{among}this curve cannot tell which"
+    which = f"only {sure} nearly certain" if sure else f"{among}this curve cannot tell which"
     first = "the first" if course.detail.told > 1 else "it"
     size = (
         ", yet at a size that is hardly met" if d.members and hardly_met(d.members[0].candidate, d.measurement) else ""
@@ -295,7 +295,7 @@ def _in_all(d: Diagnosis) -> str:
 def _unknown(course: Course) -> str:
     d = course.telling
     sure, further = _certain(d), " further" if course.before else ""
-    start = f"{sure} certain, yet " if sure else ""
+    start = f"{sure} nearly certain, yet " if sure else ""
     if (strange := _strange(d)) is not None:
         beside = listed(effect_title(n) for n in strange.base.names)
         return f"{start}{_foreign(strange, d.measurement)}{f', beside {beside}' if beside and not sure else ''}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -348,9 +348,17 @@ def _ambiguous(found: Diagnosis) -> str:
 
 
 def elsewhere(p: Probabilities, members: Collection[str]) -> str:
-    """What is told of sets beside those that the laws of the library lead to, by their names."""
+    """What is told of other sets than the ``members`` of an ambiguous answer, by their names."""
     rest = sum(q for name, q in p.effects.items() if name not in members)
-    return f"; or, by laws of its own, another set ({percent(rest)})" if rest > 1 - VERDICT.sure else ""
+    return f"; or another set ({percent(rest)})" if rest > 1 - VERDICT.sure else ""
+
+
+def shared(p: Probabilities, sets: Iterable[Collection[str]]) -> str:
+    """``friction (93 %) is at work in each of these``: what is in all ``sets`` of an ambiguous answer, or ""."""
+    names = sorted(set.intersection(*map(set, sets)))
+    if not names:
+        return ""
+    return f"{set_title('+'.join(names))} ({percent(p.of_effect(*names))}) {_is_at_work(names)} each of these"
 
 
 def _advice(found: Diagnosis) -> str:
@@ -365,18 +373,20 @@ def _advice(found: Diagnosis) -> str:
 
 
 def _common(found: Diagnosis) -> str:
-    """What is in every set of an ambiguous answer, for that much is sure."""
-    sets = [set(j.candidate.names) for j in found.members]
-    shared = sorted(set.intersection(*sets) - set(found.null.names))
-    if shared:
-        return f"{_at_work(shared)} each of them, yet "
-    p = found.probabilities
+    """What is in every set of an ambiguous answer, or in most of all that is told."""
+    p, given = found.probabilities, set(found.null.names)
+    if together := shared(p, [set(j.candidate.names) - given for j in found.members]):
+        return f"{together}, yet "
     likely = [f"{set_title(n)} ({percent(p.of_effect(n))})" for n in p.likely(WORDS.likely)]
     return f"{listed(likely)} {'is' if len(likely) == 1 else 'are'} in most of them, yet " if likely else ""
 
 
 def _at_work(names: Sequence[str]) -> str:
-    return f"{set_title('+'.join(names))} {'is' if len(names) == 1 else 'are'} at work in"
+    return f"{set_title('+'.join(names))} {_is_at_work(names)}"
+
+
+def _is_at_work(names: Sequence[str]) -> str:
+    return f"{'is' if len(names) == 1 else 'are'} at work in"
 
 
 def _beside(found: Diagnosis) -> str:

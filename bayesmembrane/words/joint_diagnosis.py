@@ -16,6 +16,7 @@ from bayesmembrane.words.diagnosis import (
     probabilities_told,
     set_aside_sentence,
     set_title,
+    shared,
     thinning_sentence,
 )
 from bayesmembrane.words.hypothesis import effect_title, material_title
@@ -121,10 +122,9 @@ def _answer(found: JointDiagnosis) -> str:
 
 
 def _common(found: JointDiagnosis) -> str:
-    """What is in all that is probable of an ambiguous answer."""
-    shared = found.probabilities.sure()
-    is_there = "is" if len(shared) == 1 else "are"
-    return f"{set_title('+'.join(shared))} {is_there} in all that is probable, yet " if shared else ""
+    """What is in every set of an ambiguous answer."""
+    together = shared(found.probabilities, [set(m.name.split("+")) - {NOTHING} for m in found.members])
+    return f"{together}, yet " if together else ""
 
 
 def _member(member: JointMember, found: JointDiagnosis) -> str:

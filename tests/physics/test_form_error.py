@@ -7,10 +7,15 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.form_error import (
+    CHANGE,
+    ENERGY,
+    LAW,
+    LOCAL,
     PROGRESS_LENGTHS,
     SPEED_ERROR,
     STATE_LENGTHS,
     error_at_another_speed,
+    form_columns,
     form_factors,
     joint_factors,
     progress,
@@ -159,3 +164,20 @@ def test_a_test_that_ends_in_a_hold_is_steady_there() -> None:
     deflection = np.concatenate([np.linspace(0.0, 0.02, 11), np.full(20, 0.02)])
     m = Measurement(deflection, 100.0 * deflection, Annulus(0.010, 0.035), Specimen("film", 5e-5))
     assert not {29, 30} & set(unsteady(m).tolist())
+
+
+@pytest.mark.parametrize("name", ["prestretch", "zero_offset"])
+def test_what_may_change_during_a_test_has_a_trace_where_it_is_asked_for(name: str) -> None:
+    """And an error that is expected to be much smaller than that of a law; nothing is inferred of it in a run."""
+    m, h = cyclic(24), hypothesis("neo_hookean", [name])
+    effect, forward = h.effects[0], Forward(h, m, m.deflection)
+    x = np.array([[np.log(15.0), *effect.typical]])
+    force = forward(x, reached=False).force
+    assert not np.any(traces(forward, x, force))
+    shown = traces(forward, x, force, changing=True)[0]
+    alone = Forward(hypothesis("neo_hookean"), m, m.deflection)(x[:, :1], reached=False).force
+    np.testing.assert_allclose(shown[0], force[0] - alone[0], atol=1e-6 * np.max(force))
+    sizes = [p for p, _ in form_columns(form_factors(m), force[0], h.effects, shown)]
+    assert sizes == [ENERGY, CHANGE, LOCAL]
+    assert CHANGE.prior.quantile(0.5) < LAW.prior.quantile(0.05)
+    assert not unseen_columns(form_factors(m), force[0], h.effects, shown)

@@ -12,40 +12,44 @@ from collections.abc import Mapping, Sequence
 Set = frozenset[str]
 
 NEGLIGIBLE = 1e-5
-"""Of all that is told; sets that have less are left out."""
+"""Of all that is told; sets that have less give nothing away, and receive nothing if they were not summed."""
 
 
 def spread(p: Mapping[Set, float], visible: Sequence[str], most: int, share: float, further: float) -> dict[Set, float]:
     """(1 - share) p + share (1 - further) p K + share further p K K, with the sum that p has.
 
     K takes a set to every one of ``visible`` effects, ``most`` at the most, that differs from it by one that is added,
-    left out or exchanged, with the same probability. No effect keeps what it has, for it is of laws that too much is
-    said.
+    left out or exchanged, with the same probability. No effect is left as it is, for it is of laws that too much is
+    said, and so is a set that nothing is next to.
     """
-    if share == 0.0:
-        return dict(p)
-    one = _stepped(p, visible, most)
-    two = _stepped(one, visible, most)
-    near = {names: (1 - further) * one.get(names, 0.0) + further * two.get(names, 0.0) for names in {*one, *two}}
-    out = {names: (1 - share) * p.get(names, 0.0) + share * near.get(names, 0.0) for names in {*p, *near}}
     whole = sum(p.values())
-    told = {names: q for names, q in out.items() if q > NEGLIGIBLE * whole}
-    return {names: q * whole / sum(told.values()) for names, q in told.items()}
+    if share == 0.0 or whole <= 0.0:
+        return dict(p)
+    least = NEGLIGIBLE * whole
+    one = _stepped(p, visible, most, least)
+    two = _stepped(one, visible, most, least)
+    near = {n: (1 - further) * one.get(n, 0.0) + further * two.get(n, 0.0) for n in dict.fromkeys([*one, *two])}
+    out = {n: (1 - share) * p.get(n, 0.0) + share * near.get(n, 0.0) for n in dict.fromkeys([*p, *near])}
+    told = {n: q for n, q in out.items() if n in p or q > least}
+    kept = whole / sum(told.values())
+    return {n: q * kept for n, q in told.items()}
 
 
-def _stepped(p: Mapping[Set, float], visible: Sequence[str], most: int) -> dict[Set, float]:
-    """p K."""
+def _stepped(p: Mapping[Set, float], visible: Sequence[str], most: int, least: float) -> dict[Set, float]:
+    """p K, but for what is next to nothing."""
     out = defaultdict[Set, float](float)
     for names, q in p.items():
-        near = _next_to(names, visible, most) if names else [names]
+        near = (_next_to(names, visible, most) if q > least else []) or [names]
         for other in near:
             out[other] += q / len(near)
     return out
 
 
 def _next_to(names: Set, visible: Sequence[str], most: int) -> list[Set]:
-    """All sets that differ by one effect; the order of names does not hang on that of a hash."""
+    """All sets of some effects that differ by one, in an order that hangs on no hash."""
+    if not names:
+        return []
     rest = [v for v in visible if v not in names]
-    more = [names | {v} for v in rest] if len(names) < most else []
     less = [names - {own} for own in sorted(names)]
-    return more + less + [part | {v} for part in less for v in rest]
+    more = [names | {v} for v in rest] if len(names) < most else []
+    return more + [part for part in less if part] + [part | {v} for part in less for v in rest]

@@ -81,7 +81,7 @@ class Probabilities:
     @property
     def anything_foreign(self) -> float:
         """Of something foreign, of whatever kind."""
-        return 1.0 - self.foreign.get(NOTHING, 1.0)
+        return 1.0 - self.foreign.get(NOTHING, 0.0)
 
     @property
     def something_found(self) -> float:

@@ -32,7 +32,8 @@ class Verdict:
 
     verdict : "adequate", "named", "ambiguous", "material" or "unknown"
     members : the hypotheses that it rests on, each with one energy of its set of effects (`_first_of_each_set`): the
-        fewest that hold `VERDICT.sure` together by the laws of the library
+        most probable, as many as hold `VERDICT.sure` together by the laws of the library; of these, those that were
+        fitted
     ranking : every hypothesis that was fitted, the most probable first
     probabilities : summed
     foreign : what was found that is foreign, where it is not sure that there is nothing
@@ -110,10 +111,12 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     best, told = _first_of_each_set(total.ranking, given), _smallest(total.by_laws)
     if case.sees_nothing and undoubted(p) and NOTHING in best:
         return Verdict("adequate", (best[NOTHING],), total.ranking, p, strange)
-    fitted = [name for name in total.by_laws if name in best]
     # What was never fitted is no member; that one alone is left of several, or of what is told, does not make it sure.
-    sure = p.effects.get(told[0], 0.0) >= VERDICT.sure
-    count = max(sum(name in best for name in told), 1 if sure else 2)
+    fitted = [name for name in p.effects if name in best]
+    count = max(sum(name in best for name in told), 1)
+    sure = count == 1 and bool(fitted) and p.effects[fitted[0]] >= VERDICT.sure
+    if count == 1 and not sure:
+        count = sum(p.effects[name] >= VERDICT.least_member for name in fitted[:2])
     members = tuple(best[name] for name in fitted[:count])
     unknown = Verdict("unknown", (), total.ranking, p, strange)
     if not members or (len(members) > VERDICT.most_members and not _worth_telling(total)):
@@ -121,11 +124,11 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     first = members[0]
     if strange is not None and p.something_found > 0.5 and _carries(strange, first, given):
         return unknown
-    if [set_name(m.candidate, given) for m in members] == [NOTHING]:
+    if sure and fitted[0] == NOTHING:
         return unknown if p.anything_foreign > 1 - VERDICT.sure else _without_effects(case, total, members)
     if carried(first.candidate, given) or p.foreign.get(ANOTHER_LAW, 0.0) > 0.5:
         return unknown
-    return Verdict("named" if len(members) == 1 else "ambiguous", members, total.ranking, p, strange)
+    return Verdict("named" if sure else "ambiguous", members, total.ranking, p, strange)
 
 
 def _worth_telling(total: Total) -> bool:

@@ -76,6 +76,7 @@ def in_tests(name: str, parts: Sequence[tuple[int, Effect]], one_clock: bool = T
             "signature": first.signature,
             "coordinates": coordinates,
             "exact": first.exact,
+            "may_change": first.may_change,
             "second": first.second if len(parts) == 1 else None,
             "odds": first.odds,
             "remembers": first.remembers,

@@ -43,7 +43,7 @@ def continued(
     assert new.sensitivity is not None
     complete = bool(np.all(np.isfinite(new.force)) and np.all(np.isfinite(new.sensitivity)))
     force, slopes = np.nan_to_num(new.force[0]), np.nan_to_num(new.sensitivity[0])
-    trace = traces(forward, fit.x[None, :], force[None, :])[0]
+    trace = traces(forward, fit.x[None, :], force[None, :], changing=True)[0]
     forms = form_columns(factors, force, fit.hypothesis.effects, trace)
     columns = np.column_stack([slopes * part.steepness(fit), *(c for _, c in forms)])
     mean, covariance = part.linear(fit).coefficients(fit.theta)

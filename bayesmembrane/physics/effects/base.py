@@ -103,7 +103,8 @@ class Effect(ABC):
     needs_return : True if a test that only goes one way shows nothing of it that an energy could not: not sought there
     shows_at_rest : True if a hold shows it as well as a return does
     absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
-    exact : True if it has no law that could be off, nor a size that changes during a test: an offset is an offset
+    exact : True if it has no law that could be off: an offset is an offset
+    may_change : True of one that is exact, and whose size may all the same become another one while a test is made
     remembers : False if it changes the curve by a function of the deflection alone, alike on every leg
     scales_with_modulus : True if forces stay proportional to the modulus, which is relied on; False costs time only
     of_the_material : True if all tests of one material have it, or none of them
@@ -135,6 +136,7 @@ class Effect(ABC):
     shows_at_rest: ClassVar[bool] = False
     absorbed: ClassVar[str] = ""
     exact: ClassVar[bool] = False
+    may_change: ClassVar[bool] = False
     remembers: ClassVar[bool] = True
     scales_with_modulus: ClassVar[bool] = False
     of_the_material: ClassVar[bool] = False

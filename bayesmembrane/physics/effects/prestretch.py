@@ -21,6 +21,8 @@ class Prestretch(Geometry):
         "deflections, fades at large ones, and is alike on all legs."
     )
     needs_clamp: ClassVar[bool] = True
+    exact: ClassVar[bool] = True
+    may_change: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("stretch", "-", "equibiaxial stretch before clamping", HalfNormal(0.03, 1.0), (1.0, 1.3), 1.0),

@@ -20,6 +20,8 @@ class ZeroOffset(Deflection):
     signature: ClassVar[str] = (
         "The whole curve lies to the right (or left): the residual follows the slope of the curve, alike on all legs."
     )
+    exact: ClassVar[bool] = True
+    may_change: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(

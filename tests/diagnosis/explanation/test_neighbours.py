@@ -37,10 +37,30 @@ def test_two_steps_are_one_after_the_other() -> None:
     assert all(both[n] == pytest.approx(q) for n, q in twice.items())
 
 
-def test_every_set_is_two_steps_from_one_or_nearer() -> None:
+def test_every_set_of_some_effects_is_two_steps_from_one_or_nearer() -> None:
+    """No effect is none of them: how far that is behind does not hang on the laws of effects."""
     found = spread({sets("ab"): 1.0}, EFFECTS, 2, 0.5, 0.5)
-    every = {frozenset(c) for size in range(3) for c in itertools.combinations(EFFECTS, size)}
-    assert set(found) == every
+    assert set(found) == {frozenset(c) for size in (1, 2) for c in itertools.combinations(EFFECTS, size)}
+
+
+def test_one_effect_that_can_be_seen_has_nothing_next_to_it() -> None:
+    p = {sets("a"): 0.8, sets(""): 0.2}
+    assert spread(p, "a", 3, 0.5, 0.3) == pytest.approx(p)
+
+
+@pytest.mark.parametrize("whole", [0.0, 5e-324, 1e-180])
+def test_what_is_next_to_impossible_stays_so(whole: float) -> None:
+    """Beside something foreign that is thousands of nats ahead."""
+    found = spread({sets("a"): whole, sets("b"): 0.0}, EFFECTS, 3, 0.2, 0.3)
+    assert sum(found.values()) == pytest.approx(whole, rel=1e-9, abs=0.0)
+    assert found
+
+
+def test_the_order_of_sets_is_that_in_which_they_are_met() -> None:
+    p = {sets("ab"): 0.6, sets("c"): 0.4}
+    found = list(spread(p, EFFECTS, 3, 0.2, 0.3))
+    assert found[:2] == list(p)
+    assert found[2:4] == [sets("abc"), sets("abd")]
 
 
 def test_no_effect_keeps_what_it_has() -> None:

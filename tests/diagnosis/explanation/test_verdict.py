@@ -30,10 +30,16 @@ def candidate(effects: str, energy_error: float = 1e-3, material: str = "gent") 
 
 
 def total(
-    sets: dict[str, float], strange: float = 0.0, takes: float = 0.5, left: float = 0.01, best: Candidate | None = None
+    sets: dict[str, float],
+    strange: float = 0.0,
+    takes: float = 0.5,
+    left: float = 0.01,
+    best: Candidate | None = None,
+    by_laws: dict[str, float] | None = None,
 ) -> Total:
     """A sum over sets of effects, with something sudden beside the first of the probability ``strange``, which takes
-    the part ``takes`` of the part ``left`` of the squares that the effects leave.
+    the part ``takes`` of the part ``left`` of the squares that the effects leave. ``by_laws`` : sets before some of it
+    was told of others; as ``sets`` by itself.
     """
     chosen = {name: best if best is not None and i == 0 else candidate(name) for i, name in enumerate(sets)}
     ranking = tuple(Judged(chosen[n], p, 0.0, 1.0 if n == NOTHING else left, 1.0) for n, p in sets.items())
@@ -45,7 +51,7 @@ def total(
         ranking,
         Probabilities(sets, {"gent": 1.0}, dict(sorted(kinds.items(), key=lambda i: -i[1]))),
         dict(sorted(joint.items(), key=lambda i: -i[1])),
-        sets,
+        sets if by_laws is None else by_laws,
         (foreign,) if strange else (),
     )
 
@@ -66,6 +72,18 @@ def test_a_set_is_named_from_the_probability_on_that_is_asked_for() -> None:
 
 def test_an_ambiguous_answer_holds_the_fewest_sets_that_are_enough() -> None:
     assert verdict({"friction": 0.6, "mullins": 0.36, "tearing": 0.04})[1] == ["friction", "mullins"]
+
+
+def test_an_answer_has_as_many_sets_as_the_laws_ask_for_and_the_most_probable_ones() -> None:
+    laws, told = {"friction": 0.6, NOTHING: 0.36, "mullins": 0.04}, {NOTHING: 0.37, "friction": 0.36, "mullins": 0.27}
+    assert verdict(told, by_laws=laws)[:2] == ("ambiguous", ["", "friction"])
+
+
+@pytest.mark.parametrize(("told", "named"), [(0.951, "named"), (0.949, "ambiguous"), (0.6, "ambiguous")])
+def test_a_set_that_is_sure_by_the_laws_alone_gets_no_name(told: float, named: str) -> None:
+    """And what is next to impossible does not stand beside it; the rest is told of sets that nobody fitted."""
+    laws = {"friction": 1 - 1e-9, "mullins": 1e-9}
+    assert verdict({"friction": told, "mullins": 0.005}, by_laws=laws)[:2] == (named, ["friction"])
 
 
 def test_where_no_test_sees_a_misfit_nothing_is_missing_unless_that_is_doubted() -> None:

@@ -123,7 +123,7 @@ def test_what_explains_no_more_than_what_is_left_is_told_apart_from_what_is_firm
     apart = "which explains hardly more than what is left and may stand in for something else"
     start = "friction in the guide is at work in all that is probable, and so is Mullins softening"
     assert f"{start}, {apart}, yet " in finding_sentence(some)
-    assert of_diagnosis(some).verdict.startswith("friction in the guide is certain, yet ")
+    assert of_diagnosis(some).verdict.startswith("friction in the guide is nearly certain, yet ")
     for plain in (replace(some, firm=()), replace(some, firm=("friction", "mullins"))):
         assert "friction in the guide and Mullins softening are at work in all" in finding_sentence(plain)
         assert "certain" not in of_diagnosis(plain).verdict

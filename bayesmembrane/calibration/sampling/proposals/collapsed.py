@@ -65,7 +65,7 @@ class Collapsed:
     def at(self, x: Array) -> Evaluation:
         """As `Posterior.evaluate` of x (B, k), from curves for Gd = 1: those that are remembered are not solved again.
 
-        The same to the last digit whether they are. Films that are not possible have no likelihood.
+        The same to round-off whether they are. Films that are not possible have no likelihood.
         """
         kept = [self.posterior.known.get(key) for key in _shapes(x)]
         new = np.array([force is None for force in kept], dtype=bool)
