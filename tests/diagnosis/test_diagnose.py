@@ -227,6 +227,9 @@ def test_points_as_few_as_a_model_with_an_effect_has_coordinates_are_diagnosed()
             "",
         ),
         ({"friction": 0.5, "mullins": 0.5}, ("friction", "mullins"), True, (), ""),
+        # Nine in ten are enough, for a part is told of other sets whatever is seen; less are not.
+        ({"friction": 0.6, "friction+mullins": 0.31, "rate": 0.09}, ("friction",), True, ("friction",), ""),
+        ({"friction": 0.6, "friction+mullins": 0.29, "rate": 0.11}, ("friction",), True, (), ""),
     ],
 )
 def test_a_strange_rest_leaves_the_name_to_what_is_firm_where_it_is_a_trifle(
