@@ -173,7 +173,7 @@ class Posterior:
         return nodes_of(self.forward)
 
     @cached_property
-    def known(self) -> dict[bytes, Array]:
+    def unit_curves(self) -> dict[bytes, Array]:
         """Curves (N,) for Gd = 1 of films that were solved, by their shapes (`Collapsed.remember`)."""
         return {}
 

@@ -138,8 +138,8 @@ def _firm(search: Search, found: Verdict, left: Remaining) -> tuple[str, ...]:
     if at_a_turn(found.members[0].candidate, search.measurement) is not None:
         return ()
     p = found.probabilities
-    names = sorted(left.firm(p.sure()), key=p.of_effect, reverse=True)
-    while names and p.of_effect(*names) < VERDICT.certain:
+    names = sorted(left.firm(p.nearly_certain()), key=p.of_effect, reverse=True)
+    while names and p.of_effect(*names) < VERDICT.nearly_certain:
         names.pop()
     return tuple(sorted(names))
 

@@ -433,7 +433,7 @@ class VerdictThresholds:
     """From which an answer is given; sets of an ambiguous one hold as much together."""
     least_member: float = 0.01
     """Of a set that stands beside one which has next to all by the laws of the library, and is not told to be sure."""
-    certain: float = 0.9
+    nearly_certain: float = 0.9
     """Of an effect, whatever else is at work, from which it is in all that is probable, as far as can be said beside
     what is told of sets next to those of the sum (`Beliefs.elsewhere`)."""
     doubted: float = 0.85

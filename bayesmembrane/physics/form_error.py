@@ -248,7 +248,7 @@ def form_columns(
     mix = [(None, float(mixed(force, np.array(laws))) * force[:, None] * factors.state)] if laws else []
     return [
         (ENERGY, force[:, None] * factors.state),
-        *((law_size(e), trace[:, None] * factors.progress) for e, trace in both if law_size(e) is not None),
+        *((error_size(e), trace[:, None] * factors.progress) for e, trace in both if error_size(e) is not None),
         *mix,
         *local,
     ]
@@ -283,8 +283,8 @@ def mixed(force: Array, traces: Array) -> Array:
     return np.asarray(np.minimum(MIXED * np.sqrt(square), MOST_MIXED))
 
 
-def law_size(effect: Effect) -> Parameter | None:
-    """How far its law may be off, or its size change; None if neither."""
+def error_size(effect: Effect) -> Parameter | None:
+    """ln of how far its law may be off, or its size change, with its prior; None if neither may."""
     return LAW if not effect.exact else CHANGE if effect.may_change else None
 
 

@@ -20,9 +20,9 @@ from bayesmembrane.diagnosis.result import Diagnosis
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.words import language
 from bayesmembrane.words.diagnosis import (
-    certain,
     foreign_told,
     laws_off,
+    nearly_certain,
     other_energy,
     percent,
     set_title,
@@ -321,7 +321,7 @@ def _strange(d: Diagnosis) -> Foreign | None:
 
 def _certain(d: Diagnosis) -> str:
     """``friction is``: of effects in all that is probable; "" if there is none, or nothing else is probable anyway."""
-    sure = certain(d)
+    sure = nearly_certain(d)
     if not sure or d.probabilities.effects.get("+".join(sure), 0.0) >= VERDICT.sure:
         return ""
     return f"{listed(map(effect_title, sure))} {'is' if len(sure) == 1 else 'are'}"

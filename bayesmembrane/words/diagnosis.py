@@ -475,7 +475,7 @@ def why_not(found: Diagnosis) -> str:
 
 def _certain(found: Diagnosis) -> str:
     """Effects that are in all that is probable: what is known where the whole is not."""
-    sure, doubts = certain(found), doubtful(found)
+    sure, doubts = nearly_certain(found), doubtful(found)
     if not sure:
         return ""
     are, explain = ("is", "explains") if len(doubts) == 1 else ("are", "explain")
@@ -484,18 +484,18 @@ def _certain(found: Diagnosis) -> str:
     return f"{_at_work(sure)} all that is probable{so}, yet "
 
 
-def certain(found: Diagnosis) -> list[str]:
+def nearly_certain(found: Diagnosis) -> list[str]:
     """Effects that are in all that is probable, but for the `doubtful`, and one that comes where the test turns."""
     turned = at_a_turn(found.ranking[0].candidate, found.measurement) if found.ranking else None
     doubts = doubtful(found)
-    return [n for n in found.probabilities.sure() if n not in doubts and (turned is None or n != turned.name)]
+    return [n for n in found.probabilities.nearly_certain() if n not in doubts and (turned is None or n != turned.name)]
 
 
 def doubtful(found: Diagnosis) -> list[str]:
     """Effects in all of an `unknown` answer that explain hardly more than what is left, beside others that do."""
     if not found.firm or found.verdict != "unknown":
         return []
-    return [n for n in found.probabilities.sure() if n not in found.firm]
+    return [n for n in found.probabilities.nearly_certain() if n not in found.firm]
 
 
 _ANSWERS = {

@@ -115,7 +115,7 @@ def _answer(found: JointDiagnosis) -> str:
         return f"{misses}: {_common(found)}these tests cannot tell which of these it is: {'; or '.join(names)}{rest}."
     if found.members:
         return f"{misses}: {_member(found.members[0], found)} is the most probable, yet leaves too much to be named."
-    sure = found.probabilities.sure()
+    sure = found.probabilities.nearly_certain()
     are = "is" if len(sure) == 1 else "are"
     beside = f" beside {set_title('+'.join(sure))}, which {are} in all that is probable" if sure else ""
     return f"{misses}, and no effect of the library, no energy and no small error of their forms does{beside}."

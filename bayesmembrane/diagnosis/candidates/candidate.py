@@ -12,7 +12,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect
-from bayesmembrane.physics.form_error import law_size
+from bayesmembrane.physics.form_error import error_size
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.reach import reach_of
 
@@ -62,7 +62,7 @@ class Candidate:
     @property
     def law_errors(self) -> dict[str, float]:
         """{effect: eta_e, the relative error of its law, or change of its size}, of those that could be off."""
-        own = [e.name for e in self.hypothesis.effects if law_size(e) is not None]
+        own = [e.name for e in self.hypothesis.effects if error_size(e) is not None]
         return {name: float(np.exp(t)) for name, t in zip(own, self.theta[2:], strict=False)}
 
     def law_errors_beyond(self, given: Collection[str]) -> dict[str, float]:

@@ -21,7 +21,7 @@ from bayesmembrane.ground.lately import Lately
 from bayesmembrane.ground.parameters import Array, Normal, Parameter
 from bayesmembrane.ground.symmetric import eigh
 from bayesmembrane.physics.effects.base import Effect
-from bayesmembrane.physics.form_error import LARGEST, LOCAL, law_size
+from bayesmembrane.physics.form_error import LARGEST, LOCAL, error_size
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 ROUND_OFF = 1e-11
@@ -441,7 +441,7 @@ def starts_with(
 
 def _law_errors(candidate: Candidate, capped: bool) -> dict[str, float]:
     """Of a search from a candidate, the sizes that it knows of its laws' errors."""
-    laws = {e.name: law_size(e) for e in candidate.hypothesis.effects}
+    laws = {e.name: error_size(e) for e in candidate.hypothesis.effects}
     usual = {name: float(np.exp(_moments(law)[0])) for name, law in laws.items() if law is not None}
     return {name: min(e, usual[name]) if capped else e for name, e in candidate.law_errors.items()}
 

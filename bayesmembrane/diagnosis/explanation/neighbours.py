@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 
-Set = frozenset[str]
+from bayesmembrane.diagnosis.explanation.twins import Set
 
 NEGLIGIBLE = 1e-5
 """Of all that is told; sets that have less give nothing away, and receive nothing if they were not summed."""
 
 
-def spread(p: Mapping[Set, float], visible: Sequence[str], most: int, share: float, further: float) -> dict[Set, float]:
-    """(1 - share) p + share (1 - further) p K + share further p K K, with the sum that p has.
+def spread(p: Mapping[Set, float], visible: Sequence[str], most: int, share: float, farther: float) -> dict[Set, float]:
+    """(1 - share) p + share (1 - farther) p K + share farther p K K, with the sum that p has.
 
     K takes a set to every one of ``visible`` effects, ``most`` at the most, that differs from it by one that is added,
     left out or exchanged, with the same probability. No effect is left as it is, for it is of laws that too much is
@@ -28,7 +28,7 @@ def spread(p: Mapping[Set, float], visible: Sequence[str], most: int, share: flo
     least = NEGLIGIBLE * whole
     one = _stepped(p, visible, most, least)
     two = _stepped(one, visible, most, least)
-    near = {n: (1 - further) * one.get(n, 0.0) + further * two.get(n, 0.0) for n in dict.fromkeys([*one, *two])}
+    near = {n: (1 - farther) * one.get(n, 0.0) + farther * two.get(n, 0.0) for n in dict.fromkeys([*one, *two])}
     out = {n: (1 - share) * p.get(n, 0.0) + share * near.get(n, 0.0) for n in dict.fromkeys([*p, *near])}
     told = {n: q for n, q in out.items() if n in p or q > least}
     kept = whole / sum(told.values())

@@ -69,9 +69,9 @@ class Probabilities:
         """Of an effect, or of several together, whatever else is at work."""
         return float(sum(p for key, p in self.effects.items() if set(names) <= set(key.split("+"))))
 
-    def sure(self) -> list[str]:
+    def nearly_certain(self) -> list[str]:
         """Effects that are in all that is probable, by name: what is known even where the whole set is not."""
-        return self.likely(VERDICT.certain)
+        return self.likely(VERDICT.nearly_certain)
 
     def likely(self, least: float = 0.5) -> list[str]:
         """Effects whose probability is ``least`` or more, by name."""
@@ -165,18 +165,18 @@ def summed(grown: Grown) -> Total:
         joint[name, NOTHING] += q
     for i, (c, kind, _) in enumerate(terms):
         if kind == NOTHING and carried(c, given) and not _described(grown, c, given):
-            name, elsewhere = set_name(c, given), BELIEFS.another_law * float(p[i])
-            joint[name, NOTHING] -= elsewhere
-            joint[name, ANOTHER_LAW] += elsewhere
-            p[i] -= elsewhere
+            name, moved = set_name(c, given), BELIEFS.another_law * float(p[i])
+            joint[name, NOTHING] -= moved
+            joint[name, ANOTHER_LAW] += moved
+            p[i] -= moved
     flat = _flattened(joint)
-    both = _beside(flat, [e.name for e in case.visible if e.name not in given])
+    both = _with_neighbours(flat, [e.name for e in case.visible if e.name not in given])
     judged = []
     for (c, kind, _), q in zip(terms, p[: len(terms)].tolist(), strict=True):
         if kind == NOTHING:
             key = set_name(c, given), NOTHING
             of_set = q / joint[key] if q > 0 else 0.0
-            judged.append(_judged(grown, c, of_set * both.get(key, 0.0), grown.believed(c)))
+            judged.append(_judged(grown, c, of_set * both[key], grown.believed(c)))
     judged.sort(key=lambda j: -j.probability)
     marginal = Probabilities(_summed_out(both, 0), _falling(BELIEFS.energies_flattened(energies)), _summed_out(both, 1))
     return Total(tuple(judged), marginal, both, _summed_out(flat, 0), tuple(found))
@@ -205,7 +205,7 @@ def _flattened(joint: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], 
     return _falling({key: q / whole for key, q in out.items()})
 
 
-def _beside(joint: Mapping[tuple[str, str], float], visible: Sequence[str]) -> dict[tuple[str, str], float]:
+def _with_neighbours(joint: Mapping[tuple[str, str], float], visible: Sequence[str]) -> dict[tuple[str, str], float]:
     """With a part of what sets have beside each kind of what is foreign told of those next to them, as far as none
     stands out by known laws.
     """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,27 +108,35 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     """
     p, given = total.probabilities, case.null.names
     strange = _strange(total, given)
-    best, told = _first_of_each_set(total.ranking, given), _smallest(total.by_laws)
+    best = _first_of_each_set(total.ranking, given)
     if case.sees_nothing and undoubted(p) and NOTHING in best:
         return Verdict("adequate", (best[NOTHING],), total.ranking, p, strange)
-    # What was never fitted is no member; that one alone is left of several, or of what is told, does not make it sure.
-    fitted = [name for name in p.effects if name in best]
-    count = max(sum(name in best for name in told), 1)
-    sure = count == 1 and bool(fitted) and p.effects[fitted[0]] >= VERDICT.sure
-    if count == 1 and not sure:
-        count = sum(p.effects[name] >= VERDICT.least_member for name in fitted[:2])
-    members = tuple(best[name] for name in fitted[:count])
+    names = _told(total, best)
+    members, sure = tuple(best[name] for name in names), len(names) == 1 and p.effects[names[0]] >= VERDICT.sure
     unknown = Verdict("unknown", (), total.ranking, p, strange)
     if not members or (len(members) > VERDICT.most_members and not _worth_telling(total)):
         return unknown
     first = members[0]
     if strange is not None and p.something_found > 0.5 and _carries(strange, first, given):
         return unknown
-    if sure and fitted[0] == NOTHING:
+    if sure and names[0] == NOTHING:
         return unknown if p.anything_foreign > 1 - VERDICT.sure else _without_effects(case, total, members)
     if carried(first.candidate, given) or p.foreign.get(ANOTHER_LAW, 0.0) > 0.5:
         return unknown
     return Verdict("named" if sure else "ambiguous", members, total.ranking, p, strange)
+
+
+def _told(total: Total, fitted: Collection[str]) -> list[str]:
+    """The most probable sets that were ``fitted``, as many as are needed by the laws; one that is not told to be sure
+    has the next one beside it.
+
+    That one alone is left of several of which others were never fitted does not make it sure.
+    """
+    p = total.probabilities.effects
+    names, count = [name for name in p if name in fitted], sum(name in fitted for name in _smallest(total.by_laws))
+    if count <= 1 and names and p[names[0]] < VERDICT.sure:
+        return [name for name in names[:2] if p[name] >= VERDICT.least_member]
+    return names[: max(count, 1)]
 
 
 def _worth_telling(total: Total) -> bool:

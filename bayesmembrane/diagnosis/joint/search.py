@@ -20,7 +20,7 @@ from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.ground.lately import Lately
 from bayesmembrane.ground.parameters import Array, Parameter
 from bayesmembrane.physics.effects.base import Effect
-from bayesmembrane.physics.form_error import ENERGY, LOCAL, law_size
+from bayesmembrane.physics.form_error import ENERGY, LOCAL, error_size
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 MADE = 200
@@ -169,7 +169,7 @@ class JointSearch(Weighing):
         laws: list[list[tuple[int, tuple[Parameter | None, Array]]]] = [[] for _ in effects]
         rest: list[tuple[int, tuple[Parameter | None, Array]]] = []
         for i, (at, inner, columns) in enumerate(each):
-            open_laws = [k for k, e in zip(at, inner, strict=True) if law_size(e) is not None]
+            open_laws = [k for k, e in zip(at, inner, strict=True) if error_size(e) is not None]
             for k, column in zip(open_laws, columns[1:], strict=False):
                 laws[k].append((i, column))
             rest += [(i, c) for c in columns[1 + len(open_laws) :]]

@@ -58,7 +58,7 @@ class Collapsed:
 
     def remember(self, x: Array, force: Array) -> None:
         """Curves (B, N) for Gd = 1 of films x (B, k) that are possible, for `at`; as long as they are not too many."""
-        known = self.posterior.known
+        known = self.posterior.unit_curves
         if (len(known) + len(x)) * self.readings <= AT_ONCE:
             known.update(zip(_shapes(x), force, strict=True))
 
@@ -67,7 +67,7 @@ class Collapsed:
 
         The same to round-off whether they are. Films that are not possible have no likelihood.
         """
-        kept = [self.posterior.known.get(key) for key in _shapes(x)]
+        kept = [self.posterior.unit_curves.get(key) for key in _shapes(x)]
         new = np.array([force is None for force in kept], dtype=bool)
         force, outcome = np.empty((len(x), self.readings)), np.full(len(x), Outcome.OK, dtype=np.int8)
         log_prior, log_likelihood = self.posterior.prior.log_density(x), np.full(len(x), -np.inf)
