@@ -128,7 +128,7 @@ def _predicting(found: Verdict, validation: HeldOut | None) -> Verdict:
         return found
     if validation.covered_after >= VERDICT.least_coverage:
         return found
-    return replace(found, verdict="unknown")
+    return replace(found, verdict="unknown", rivals=())
 
 
 def _firm(search: Search, found: Verdict, left: Remaining) -> tuple[str, ...]:
@@ -167,8 +167,7 @@ def _validated(case: OpenCase, search: Search, found: Verdict) -> HeldOut | None
 
 def _experiments(search: Search, found: Verdict, null: Candidate) -> tuple[Experiment, ...]:
     """What to measure next, where rivals are left."""
-    if found.verdict != "ambiguous" or len(found.members) < 2:
+    if found.verdict not in ("ambiguous", "unknown") or len(found.rivals) < 2:
         return ()
     given, p = null.names, found.probabilities
-    told = found.members[: VERDICT.most_members]
-    return tuple(experiments(search, [(j.candidate, p.effects[set_name(j.candidate, given)]) for j in told]))
+    return tuple(experiments(search, [(j.candidate, p.effects[set_name(j.candidate, given)]) for j in found.rivals]))

@@ -447,6 +447,8 @@ def _use_as_it_is(d: Diagnosis) -> str:
 
 def _when_unknown(d: Diagnosis) -> str:
     strange = _strange(d)
+    if strange is None and d.experiments:
+        return _tell_apart(d)
     if strange is None:
         return "Repeat the test, and do not extrapolate with this model."
     advice = {

@@ -438,8 +438,8 @@ def _unknown(found: Diagnosis) -> str:
     if far := too_far(found):
         return f"{_misses(found)}{_certain(found)}what fits best is no explanation, for {far}. {shape}"
     return (
-        f"{_misses(found)}{_certain(found)}more explanations are about as probable than this measurement can part. "
-        f"{shape}"
+        f"{_misses(found)}{_certain(found)}more explanations are about as probable than this measurement can part."
+        f"{_advice(found)} {shape}"
     )
 
 

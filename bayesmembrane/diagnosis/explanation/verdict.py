@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,8 @@ class Verdict:
     ranking : every hypothesis that was fitted, the most probable first
     probabilities : summed
     foreign : what was found that is foreign, where it is not sure that there is nothing
+    rivals : the most probable of the members, or of more sets than can be told, one or none of which is right: what
+        another test would have to tell apart
     """
 
     verdict: str
@@ -44,6 +46,7 @@ class Verdict:
     ranking: tuple[Judged, ...]
     probabilities: Probabilities
     foreign: Foreign | None = None
+    rivals: tuple[Judged, ...] = ()
 
 
 def adequate(case: DiagnosisCase) -> Verdict:
@@ -113,9 +116,9 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
         return Verdict("adequate", (best[NOTHING],), total.ranking, p, strange)
     names = _told(total, best)
     members, sure = tuple(best[name] for name in names), len(names) == 1 and p.effects[names[0]] >= VERDICT.sure
-    unknown = Verdict("unknown", (), total.ranking, p, strange)
+    unknown, rivals = Verdict("unknown", (), total.ranking, p, strange), members[: VERDICT.most_members]
     if not members or (len(members) > VERDICT.most_members and not _worth_telling(total)):
-        return unknown
+        return replace(unknown, rivals=rivals)
     first = members[0]
     if strange is not None and p.something_found > 0.5 and _carries(strange, first, given):
         return unknown
@@ -123,7 +126,9 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
         return unknown if p.anything_foreign > 1 - VERDICT.sure else _without_effects(case, total, members)
     if carried(first.candidate, given) or p.foreign.get(ANOTHER_LAW, 0.0) > 0.5:
         return unknown
-    return Verdict("named" if sure else "ambiguous", members, total.ranking, p, strange)
+    if sure:
+        return Verdict("named", members, total.ranking, p, strange)
+    return Verdict("ambiguous", members, total.ranking, p, strange, rivals)
 
 
 def _told(total: Total, fitted: Collection[str]) -> list[str]:

@@ -14,6 +14,7 @@ from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, Foreign
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, Total
 from bayesmembrane.diagnosis.explanation.verdict import decided
+from bayesmembrane.diagnosis.thresholds import VERDICT
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import hypothesis
 
@@ -77,6 +78,17 @@ def test_an_ambiguous_answer_holds_the_fewest_sets_that_are_enough() -> None:
 def test_an_answer_has_as_many_sets_as_the_laws_ask_for_and_the_most_probable_ones() -> None:
     laws, told = {"friction": 0.6, NOTHING: 0.36, "mullins": 0.04}, {NOTHING: 0.37, "friction": 0.36, "mullins": 0.27}
     assert verdict(told, by_laws=laws)[:2] == ("ambiguous", ["", "friction"])
+
+
+def test_more_sets_than_can_be_told_are_rivals_that_a_further_test_would_have_to_tell_apart() -> None:
+    names = ["friction", "mullins", "tearing", "clamp_slip", "zero_offset", "prestretch", "force_drift", "viscoelastic"]
+    case = cast(OpenCase, SimpleNamespace(null=candidate(NOTHING), sees_nothing=False))
+    crowd = decided(case, total(dict.fromkeys(names, 1 / len(names))))
+    assert (crowd.verdict, crowd.members) == ("unknown", ())
+    assert ["+".join(j.candidate.names) for j in crowd.rivals] == names[: VERDICT.most_members]
+    few = decided(case, total({"friction": 0.6, "mullins": 0.4}))
+    assert few.rivals == few.members
+    assert decided(case, total({"friction": 0.96, "mullins": 0.04})).rivals == ()
 
 
 @pytest.mark.parametrize(("told", "named"), [(0.951, "named"), (0.949, "ambiguous"), (0.6, "ambiguous")])
