@@ -142,6 +142,7 @@ def fit(
     Raises `SettingsError` for fewer points than parameters, a loss that is unknown or lacks a noise, and a material
     whose films cannot reach the data.
     """
+    hypothesis = hypothesis.with_frame(measurement)
     enough_points(hypothesis, measurement)
     few = shortened(measurement, MANY)
     objective = Objective(hypothesis, few, loss, solve)

@@ -205,7 +205,7 @@ def sample(
     Raises `SettingsError` for hypotheses that the data cannot reach, `StorageError` if the folder cannot be written,
     is worked on by another process, belongs to something else, or holds a walk that would not go on alike.
     """
-    how = how or RunSettings()
+    how, hypothesis = how or RunSettings(), hypothesis.with_frame(measurement)
     start = None if how.fork is None else origin(how.fork, hypothesis)
     asked = describe(measurement, hypothesis, how.sampling, how.seed, None if start is None else start.described)
     work = _Work(how, asked, Posterior(hypothesis, measurement, solve), start, progress, stop)

@@ -98,7 +98,9 @@ def compare_ranges(
     """`compare` on several measurements, by name, in one queue of jobs: that of ``submit``, if there is one already."""
     labels = _labels(hypotheses)
     jobs: dict[Key, Job] = {
-        (name, label): Job(", ".join(n for n in (label, name) if n), r.measurement, h, judging, r.whole)
+        (name, label): Job(
+            ", ".join(n for n in (label, name) if n), r.measurement, h.with_frame(r.measurement), judging, r.whole
+        )
         for name, r in ranges.items()
         for label, h in zip(labels, hypotheses, strict=True)
     }

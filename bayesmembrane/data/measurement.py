@@ -73,6 +73,7 @@ class Measurement:
     motion : how the disc was moved, also past points that were left out; the film remembers those too
     places : (N,) where the points lie on it
     across : (N,) stretch across the direction of pull where it was measured (biaxial tests), or None
+    blank : (M, 2) m and N, how far the crosshead went on a rigid dummy under which force: the frame alone; or None
 
     Raises `DataError` for shapes that do not agree, values that are not finite, a standard deviation that is not
     positive, and a covariance that is not symmetric and positive definite. With a covariance, `force_sd` is the root
@@ -91,6 +92,7 @@ class Measurement:
     motion: Motion | None = None
     places: NDArray[np.int64] | None = None
     across: Array | None = None
+    blank: Array | None = None
 
     def __post_init__(self) -> None:
         n = np.size(self.deflection)
@@ -98,6 +100,7 @@ class Measurement:
         for name in ("deflection", "force", "time", "force_sd", "across"):
             self._freeze(name, (n,))
         self._freeze("covariance", (n, n))
+        self._freeze("blank", (0 if self.blank is None else np.size(self.blank) // 2, 2))
         if n == 0:
             raise DataError("a measurement needs at least one point")
         if self.time is not None and np.any(np.diff(self.time) <= 0):
@@ -161,12 +164,13 @@ class Measurement:
 
     @cached_property
     def data_hash(self) -> str:
-        """SHA-256 of everything that a likelihood depends on: arrays, noise, rig, thickness and full range."""
+        """SHA-256 of everything that a likelihood depends on: arrays, noise, rig, its frame, thickness, full range."""
         digest = hashlib.sha256(f"{self.rig!r} {self.specimen.thickness!r} {self.full_range!r}".encode())
         for array in (self.deflection, self.force, self.time, self.force_sd, self.covariance):
             digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
-        if self.across is not None:
-            digest.update(np.ascontiguousarray(self.across).tobytes())
+        for more in (self.across, self.blank):
+            if more is not None:
+                digest.update(np.ascontiguousarray(more).tobytes())
         if self.motion is not None:
             for array in (self.motion.deflection, self.motion.time, self.on_path.astype(float)):
                 digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())

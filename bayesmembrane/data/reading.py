@@ -27,6 +27,8 @@ THINNEST = 1e-8  # m
 RIG_SIZES = (1e-6, 1.0)  # m
 LARGEST_LIFT = 20.0  # largest deflection relative to the size of the rig
 LEAST_SD = 1e-12  # N
+BLANK_READINGS = 4
+BLANK_REACHES = 0.8  # of the largest force of the test: below that it is told, for the frame is extrapolated
 _USUAL = {FORCE: "N", STRESS: "MPa", LENGTH: "mm"}
 PHASES = MappingProxyType({"cycle": RATIO, "direction": RATIO})
 """Columns by which whoever measured says cycles (1, 2, ...) and legs (1 loading, -1 unloading)."""
@@ -55,6 +57,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     _check_size(deflection, table, rig)
     single = _stated(options, rig, specimen.thickness)
     sd, covariance, covariance_file = _noise(options, single, found.get("force_sd"), force.size)
+    blank, blank_notes = _blank_run(options, rig, force)
     origin = [options.text("origin"), root.section("origin", required=False).all_text()]
     understood = root.section("import", required=False)  # how an export was understood, for people
     understood.all_text()
@@ -67,13 +70,22 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
         specimen_toml.name,
         covariance_file,
         "; ".join(o for o in origin if o),
-        (*notes, *rig.remarks(found), *(contradicted(motion) if motion else ())),
+        (*notes, *blank_notes, *rig.remarks(found), *(contradicted(motion) if motion else ())),
     )
     if sd is not None and np.min(sd) < LEAST_SD:
         fault = f"a standard deviation of {np.min(sd):g} N looks like a wrong unit"
         raise DataError(fault, options.where, "check the unit of the noise")
     measured = Measurement(
-        deflection, force, rig, specimen, found.get("time"), sd, covariance, provenance, across=across
+        deflection,
+        force,
+        rig,
+        specimen,
+        found.get("time"),
+        sd,
+        covariance,
+        provenance,
+        across=across,
+        blank=blank,
     )
     return of_few(measured if motion is None else replace(measured, motion=motion, places=np.arange(force.size)), READ)
 
@@ -230,3 +242,29 @@ def _noise(
         fault = "the diagonal of the covariance is not the square of the column force_sd"
         raise DataError(fault, str(path), "it must be in N^2 and in the order of the curve")
     return np.sqrt(np.diag(covariance)), covariance, path.name
+
+
+def _blank_run(options: TomlSection, rig: Fixture, force: Array) -> tuple[Array | None, tuple[str, ...]]:
+    """((M, 2) m and N of a run on a rigid dummy that the specimen file names, or None; a note on how far it goes).
+
+    Raises `DataError` where the film's travel is not read, and for a run that shows no frame that yields to a force.
+    """
+    name = options.text("blank_run")
+    if name is None:
+        return None, ()
+    if dict(rig.columns) != dict(Fixture.columns):
+        fault = f'a rig of the kind "{rig.name}" does not read its travel and force, which a blank run corrects'
+        raise DataError(fault, options.where, "remove blank_run")
+    path = Path(options.file).parent / name
+    table = parse_table(read_text(path), str(path))
+    columns, _ = curve_columns(table)
+    travel, pull = columns["deflection"], columns["force"]
+    if np.unique(pull).size < BLANK_READINGS:
+        fault = f"a blank run needs at least {BLANK_READINGS} readings at different forces"
+        raise DataError(fault, str(path), "load the rigid dummy up to the forces of the test")
+    if np.max(pull) <= 0 or np.polyfit(pull, travel, 1)[0] < 0:
+        fault = "the crosshead goes the less the larger the force is, and a frame yields the other way"
+        raise DataError(fault, str(path), "change the sign of a column")
+    reached, asked = float(np.max(pull)), float(np.max(force))
+    far = f"the blank run ({path.name}) goes to {reached:.3g} N, the test to {asked:.3g} N"
+    return np.column_stack([travel, pull]), (far,) if reached < BLANK_REACHES * asked else ()

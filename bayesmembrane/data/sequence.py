@@ -61,6 +61,7 @@ def one_after_another(tests: Sequence[Measurement], rest: float = 0.0) -> Measur
         full_range=full_range,
         motion=Motion(deflection, time, full_range, None, *said),
         places=places,
+        blank=first.blank,
     )
 
 

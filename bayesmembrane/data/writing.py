@@ -13,7 +13,7 @@ from bayesmembrane.ground.parameters import Array
 
 
 def write_measurement(measurement: Measurement, curve_csv: str | Path, specimen_toml: str | Path) -> None:
-    """Write what `read_measurement` reads back: mm, N and s to 15 digits, the covariance in a file of its own.
+    """Write what `read_measurement` reads back: in mm, N and s; covariance and blank run in files of their own.
 
     Raises `StorageError` if a file exists already or cannot be written; nothing is overwritten.
     """
@@ -30,6 +30,10 @@ def write_measurement(measurement: Measurement, curve_csv: str | Path, specimen_
         beside = specimen_toml.parent / f"{curve_csv.stem}_covariance.csv"
         options["covariance"] = beside.name
         texts[beside] = "".join(",".join(f"{v:.17g}" for v in row) + "\n" for row in measurement.covariance)
+    if measurement.blank is not None:
+        beside = specimen_toml.parent / f"{curve_csv.stem}_blank_run.csv"
+        options["blank_run"] = beside.name
+        texts[beside] = csv_text({"deflection_mm": 1e3 * measurement.blank[:, 0], "force_N": measurement.blank[:, 1]})
     lengths = {f"{k}_mm": float(f"{1e3 * v:.15g}") for k, v in measurement.rig.lengths.items()}
     content = {
         "specimen": {

@@ -15,11 +15,14 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array, Natural, Parameter
 from bayesmembrane.ground.registry import component, material
 from bayesmembrane.physics.convexity import REACHED, ConvexityMode, mode
-from bayesmembrane.physics.effects.base import Effect
+from bayesmembrane.physics.effects.base import Compliance, Effect
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.noise.base import Noise, force_scale
 from bayesmembrane.physics.noise.white import White
 from bayesmembrane.physics.reach import reach_of
+
+FRAME = "machine_compliance"
+"""The effect that a blank run measures."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +59,18 @@ class Hypothesis:
         return tuple(replace(p, name=f"{block}.{p.name}") for block, ps in blocks for p in ps)
 
     def on(self, measurement: Measurement) -> Self:
-        """The same with the priors of its effects in parts of what the measurement reached."""
+        """The same with the priors of its effects in parts of what the measurement reached, or as a blank run shows."""
         if not self.effects:
             return self
         reach = reach_of(measurement)
-        if all(e.reach == reach for e in self.effects):
+        effects = tuple((e if e.reach == reach else e.on(reach)).shown_by(measurement) for e in self.effects)
+        return self if effects == self.effects else replace(self, effects=effects)
+
+    def with_frame(self, measurement: Measurement) -> Self:
+        """The same with the frame of a measurement that has a blank run: what is known is not in question."""
+        if measurement.blank is None or any(isinstance(e, Compliance) for e in self.effects):
             return self
-        return replace(self, effects=tuple(e.on(reach) for e in self.effects))
+        return replace(self, effects=(*self.effects, component("effects", FRAME)())).on(measurement)
 
     @property
     def names(self) -> tuple[str, ...]:

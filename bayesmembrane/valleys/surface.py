@@ -140,7 +140,7 @@ class Surface:
     def __init__(
         self, hypothesis: Hypothesis, measurement: Measurement, solve: Solve = unaided, loss: str = "euclidean"
     ) -> None:
-        self.objective = Objective(hypothesis, measurement, loss, solve)
+        self.objective = Objective(hypothesis.with_frame(measurement), measurement, loss, solve)
         self.hypothesis, self.measurement = self.objective.hypothesis, measurement
         self.chart = Chart(self.hypothesis)
 

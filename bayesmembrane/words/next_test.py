@@ -43,7 +43,7 @@ def spoken_test(test: FurtherTest, present: Fixture | None = None) -> str:
         case Kind.OTHER_SIZE:
             return f"the same test {test.change}"
         case Kind.BLANK:
-            return "a blank run on a rigid dummy, which shows the frame's yielding alone"
+            return "a blank run on a rigid dummy, which shows how the frame yields (its curve goes in as blank_run)"
 
 
 def _stretch(deflection: float, rig: Fixture | None) -> str:

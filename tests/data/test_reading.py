@@ -333,6 +333,43 @@ def test_fault_of_the_covariance(files: Files, matrix: str, said: str) -> None:
     assert said in files.fault(specimen=SPECIMEN + '[measurement]\ncovariance = "cov.csv"\n')
 
 
+BLANK = SPECIMEN + '[measurement]\nblank_run = "blank.csv"\n'
+FRAME = "deflection_um,force_mN\n0,0\n2,250\n4,500\n7,900\n"
+
+
+def test_a_blank_run_is_read_beside_the_curve_and_its_reach_is_told(files: Files) -> None:
+    (files.folder / "blank.csv").write_text(FRAME)
+    m = files.read(specimen=BLANK)
+    assert m.blank == pytest.approx(np.array([[0, 0], [2e-6, 0.25], [4e-6, 0.5], [7e-6, 0.9]]))
+    assert m.provenance.notes == ()
+    assert m.data_hash != files.read().data_hash
+    stronger = files.read(CURVE.replace("0.95", "2.5"), BLANK)
+    assert stronger.provenance.notes == ("the blank run (blank.csv) goes to 0.9 N, the test to 2.5 N",)
+
+
+@pytest.mark.parametrize(
+    ("run", "said"),
+    [
+        (None, "blank.csv: there is no such file"),
+        ("deflection_um,force_mN\n0,0\n2,250\n4,500\n4,500\n", "blank.csv: a blank run needs at least 4 readings"),
+        ("deflection_um,force_mN\n0,0\n-2,250\n-4,500\n-6,800\n", "blank.csv: the crosshead goes the less"),
+        ("deflection_um,force_mN\n0,0\n-2,-250\n-4,-500\n-6,-800\n", "a frame yields the other way; change the sign"),
+        ("deflection_um,force_mN\n0,0\n2,x\n", "blank.csv, line 3, column force_mN"),
+        ("force_mN\n0\n2\n", "blank.csv"),
+    ],
+)
+def test_fault_of_a_blank_run(files: Files, run: str | None, said: str) -> None:
+    if run is not None:
+        (files.folder / "blank.csv").write_text(run)
+    assert said in files.fault(specimen=BLANK)
+
+
+def test_a_rig_that_reads_stretches_has_no_blank_run(files: Files) -> None:
+    strip = '[specimen]\nthickness_um = 50.0\n[rig]\nkind = "uniaxial"\n[measurement]\nblank_run = "blank.csv"\n'
+    (files.folder / "blank.csv").write_text(FRAME)
+    assert "does not read its travel and force" in files.fault("stretch,nominal_stress_MPa\n1.1,0.1\n1.2,0.2\n", strip)
+
+
 # ---- rubbish ---------------------------------------------------------------------------------------------------------
 
 rubbish = settings(deadline=None, max_examples=120, suppress_health_check=[HealthCheck.function_scoped_fixture])

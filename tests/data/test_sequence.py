@@ -122,5 +122,14 @@ def test_files_are_read_one_after_another_at_the_command_line(tmp_path: Path) ->
     assert read.time[9] - read.time[8] == pytest.approx(8.0 + 60.0)  # 16 mm at 2 mm/s, and the rest
 
 
+def test_tests_of_one_rig_share_its_blank_run() -> None:
+    frame = np.array([[0.0, 0.0], [1e-6, 0.5], [2e-6, 1.0], [3e-6, 1.5]])
+    first, second = (measured(UP, None, blank=frame) for _ in range(2))
+    joined = one_after_another([first, second])
+    assert joined.blank is not None
+    assert np.array_equal(joined.blank, frame)
+    assert np.array_equal(joined.select(np.arange(5)).blank, frame)  # type: ignore[arg-type]
+
+
 def _halves(whole: Measurement) -> tuple[slice, slice]:
     return slice(0, 21), slice(21, len(whole))

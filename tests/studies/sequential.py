@@ -1,9 +1,10 @@
 """Do proposed tests end the doubt: ambiguous answers, the test that each proposes made, and all of it diagnosed again.
 
 `python -m tests.studies.sequential --count 60` goes through the single effects, pairs and triples of the calibration
-half of `make study-reliability`. Where the answer is ambiguous, the first proposed motion of the same film on the same
-rig is made by the generator, on the film that remembers, read behind what there is, and diagnosed with it; twice at
-most. One line of JSON a case, so that the study goes on where it was; docs/studies/sequential.md is its table.
+half of `make study-reliability`. Where the answer is ambiguous, or more explanations share it than can be told, the
+first proposed motion of the same film on the same rig is made by the generator, on the film that remembers, read behind
+what there is, and diagnosed with it; or a blank run of the generator's frame is read beside it. Twice at most. One line
+of JSON a case, so that the study goes on where it was; docs/studies/sequential.md is its table.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from bayesmembrane.ground.errors import BayesmembraneError
 from bayesmembrane.next_test.further import Kind, OnFilm, other_motions
 from bayesmembrane.words.diagnosis import document
 from tests.generator.datasets import Dataset
-from tests.generator.distortions import Active, response
+from tests.generator.distortions import Active, give, response
 from tests.generator.film import NoSolutionError
 from tests.generator.noise import Noise
 from tests.generator.protocols import Path as Way
@@ -41,14 +42,21 @@ TESTS = 2
 READINGS = 480
 """Of a further test, at most: evenly among those that it was simulated with."""
 SAME_RIG = (Kind.UNLOADING, Kind.CYCLES, Kind.FASTER, Kind.HOLD)
+FRAME = "machine_compliance"
+BLANK_READINGS = 60
+TRAVEL_SD = 1e-6
+"""m, of the crosshead's position in a blank run."""
+CLEAR = 3.0
+"""Standard deviations from which on a blank run says that a frame yields."""
 
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """What was done to a film so far, and what is in it: ``before`` is the way for which the sizes are meant."""
+    """What was done to a film so far, and what is in it; ``blank``: what a run without it showed of the frame."""
 
     data: Dataset
     path: Way
+    blank: np.ndarray | None = None
 
     def measurement(self, rng: np.random.Generator) -> Measurement:
         """All of it as an instrument writes it."""
@@ -63,7 +71,18 @@ class Film:
             force_N=noise.rounded(force),
         )
         with tempfile.TemporaryDirectory() as folder:
-            return read_measurement(*told.write(Path(folder)))
+            return replace(read_measurement(*told.write(Path(folder))), blank=self.blank)
+
+    def with_blank_run(self, rng: np.random.Generator) -> Film:
+        """The same after the frame was pulled without a film, up and down, as hard as the film pulled it."""
+        most = 1.05 * float(np.max(self.data.force_N))
+        force = most * np.concatenate([np.linspace(0, 1, BLANK_READINGS // 2), np.linspace(1, 0, BLANK_READINGS // 2)])
+        yields = self.data.at_work.get(FRAME)
+        travel = np.zeros_like(force) if yields is None else give(yields, force)
+        noise = Noise(**self.data.truth["noise"])
+        travel = travel + TRAVEL_SD * rng.standard_normal(force.size)
+        read = force + noise.sd * rng.standard_normal(force.size)
+        return replace(self, blank=np.column_stack([travel, read]))
 
     def _at_work(self) -> dict[str, Active]:
         """The effects, as large on the first test as they were: laws that end with the way know the longer one."""
@@ -92,7 +111,7 @@ class Film:
         speed = np.where(last >= 0, speed[last], done.speed[-1])
         peak = np.array([max(np.max(where[leg == n]), where[leg == n][0]) for n in leg])
         joined = [np.concatenate(pair) for pair in zip(_arrays(done), (when, where, leg, speed, peak), strict=True)]
-        return Film(self.data, Way(*joined))
+        return replace(self, path=Way(*joined))
 
 
 def _scaled(active: Active, factor: float) -> Active:
@@ -130,35 +149,51 @@ def run_case(case: Case) -> Row:
             return row | {"error": str(error)}
         answer = answer_row(document(found))
         row["answers"].append({k: answer[k] for k in ("verdict", "effects", "coverage", "sentence")})
-        trial = proposed(found, measurement) if answer["verdict"] == "ambiguous" and turn < TESTS else None
+        row["answers"][-1]["shown"] = shown(found)
+        trial = proposed(found, measurement) if turn < TESTS else None
         if trial is None:
             break
-        row["tests"].append(trial.test.kind.value)
+        row["tests"].append(trial.value if isinstance(trial, Kind) else trial.test.kind.value)
+        rng = np.random.default_rng([case.seed, 91, turn])
         try:
-            film = film.moved(trial)
-            measurement = film.measurement(np.random.default_rng([case.seed, 91, turn]))
+            film = film.with_blank_run(rng) if isinstance(trial, Kind) else film.moved(trial)
+            measurement = replace(measurement, blank=film.blank) if isinstance(trial, Kind) else film.measurement(rng)
         except NoSolutionError as error:
             return row | {"error": str(error)}
     return row
 
 
-def proposed(found: Diagnosis, measurement: Measurement) -> OnFilm | None:
-    """The best proposed motion of the same film on the same rig, with a clock."""
+def proposed(found: Diagnosis, measurement: Measurement) -> OnFilm | Kind | None:
+    """The best proposed motion of the same film on the same rig, with a clock, or a blank run."""
     if measurement.time is None:
         return None
     trials = {t.test: t for t in other_motions(measurement)}
-    chosen = [e.test for e in found.experiments if e.test.kind in SAME_RIG]
-    return trials[chosen[0]] if chosen else None
+    chosen = [e.test for e in found.experiments if e.test.kind in (*SAME_RIG, Kind.BLANK)]
+    if not chosen:
+        return None
+    return Kind.BLANK if chosen[0].kind is Kind.BLANK else trials[chosen[0]]
+
+
+def shown(found: Diagnosis) -> list[str]:
+    """Effects that a blank run shows by itself."""
+    known = [e for e in found.null.hypothesis.effects if e.size.null is None]
+    return [e.name for e in known if e.size.prior.mean_sd[0] > CLEAR * e.size.prior.mean_sd[1]]
 
 
 def judged(row: Row) -> list[str]:
-    """Of each answer: "right", "wrong", "ambiguous with the truth", "ambiguous without it", or its verdict."""
+    """Of each answer: "right", "wrong", "ambiguous with the truth", "ambiguous without it", or its verdict.
+
+    What a blank run shows belongs to the answer.
+    """
     out = []
     for answer in row["answers"]:
-        one = row | answer
+        known = answer.get("shown", [])
+        one = row | answer | {"truth": [e for e in row["truth"] if e not in known]}
         kind = answer["verdict"]
         if kind == "named":
             kind = "right" if right_name(one) else "wrong"
+        elif kind == "adequate" and known:
+            kind = "wrong" if one["truth"] else "right"
         elif kind == "ambiguous":
             kind += " with the truth" if inside(one) else " without it"
         out.append(kind)
@@ -167,15 +202,16 @@ def judged(row: Row) -> list[str]:
 
 def table(rows: list[Row], command: str) -> str:
     """Markdown: what became of ambiguous answers after one and after two proposed tests."""
-    shown = [r for r in rows if r.get("answers")]
-    doubt = [r for r in shown if r["answers"][0]["verdict"] == "ambiguous"]
+    asked = [r for r in rows if r.get("answers")]
+    doubt = [r for r in asked if r["tests"] or r["answers"][0]["verdict"] == "ambiguous"]
     tested = [r for r in doubt if r["tests"]]
     lines = [
         "# Do proposed tests end the doubt",
         "",
-        f"`{command}`: {len(shown)} measurements with one to three effects of the library, no energy "
-        f"declared, {len(doubt)} answers ambiguous; for {len(tested)} of them a motion of the same film is proposed, "
-        f"made by the generator and diagnosed with what was there, {TESTS} at most. An effect whose own trace is below "
+        f"`{command}`: {len(asked)} measurements with one to three effects of the library, no energy "
+        f"declared, {len(doubt)} answers ambiguous, or of more sets than can be told; for {len(tested)} of them a "
+        "motion of the same film is proposed, made by the generator and diagnosed with what was there, or a blank run "
+        f"of the frame, {TESTS} at most; what that shows belongs to the answer. An effect whose own trace is below "
         "3 standard deviations of the noise in the first test is no truth.",
         "",
         "| after | right | wrong | ambiguous with the truth | ambiguous without it | other |",

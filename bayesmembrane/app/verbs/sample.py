@@ -54,7 +54,7 @@ def verb(
         raise typer.Exit(INTERRUPTED)
     title = f"{claim.material.title} on {curve.shown}"
     shown = whole.rig.shown(whole.specimen.thickness)
-    answer(found.document, output.as_json, lambda: show(found.document, title, claim, shown))
+    answer(found.document, output.as_json, lambda: show(found.document, title, found.result.hypothesis, shown))
 
 
 def jointly(

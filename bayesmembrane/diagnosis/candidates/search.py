@@ -107,6 +107,8 @@ class Search(Weighing):
         nulls = [e.null for e in hypothesis.effects]
         out = [np.concatenate([x, *nulls]) for x in found]
         for i, effect in enumerate(hypothesis.effects):
+            if effect.size.null is None:  # known from another run
+                continue
             for own in starts_with([np.empty(0)], effect, self.expected_sizes(effect)):
                 out.append(np.concatenate([found[0], *nulls[:i], own, *nulls[i + 1 :]]))
         return out

@@ -314,7 +314,9 @@ def _plausible(candidate: Candidate, search: Weighing) -> bool:
     for e in candidate.hypothesis.effects:
         for i, expected in zip(e.sizes, search.expected_sizes(e).tolist(), strict=True):
             p, name = e.coordinates[i], f"{e.name}.{e.coordinates[i].name}"
-            size = abs(candidate.parameters[name] - (p.null or 0.0))
+            if p.null is None:  # known from another run
+                continue
+            size = abs(candidate.parameters[name] - p.null)
             if name in candidate.at_bound or not TWINS.least * expected < size < TWINS.usual * expected:
                 return False
     return True

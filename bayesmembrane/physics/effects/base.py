@@ -23,6 +23,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from bayesmembrane.data.fixture import Fixture
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, Parameter, Prior
 from bayesmembrane.physics.reach import Reach
@@ -160,6 +161,13 @@ class Effect(ABC):
     def on(self, reach: Reach) -> Self:
         """The same in a test that goes so far."""
         return replace(self, reach=reach)
+
+    def shown_by(self, measurement: Measurement) -> Self:
+        """The same with what another run of the rig says of it (`Measurement.blank`); itself where none says anything.
+
+        Then its coordinates have values with an error, and none at which it vanishes.
+        """
+        return self
 
     @property
     def null(self) -> Array:
