@@ -72,8 +72,9 @@ class MachineCompliance(Compliance):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.blank is not None:
-            object.__setattr__(self, "coordinates", (_known(self.blank),))
-            object.__setattr__(self, "title", "the frame of its blank run")
+            own = {"coordinates": (_known(self.blank),), "title": "the frame of its blank run", "exact": True}
+            for name, value in own.items():
+                object.__setattr__(self, name, value)
 
     def shown_by(self, measurement: Measurement) -> Self:
         if measurement.blank is None:
