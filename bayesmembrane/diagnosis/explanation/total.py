@@ -25,6 +25,8 @@ Named = TypeVar("Named")
 
 NOTHING = "none"
 """No effect; nothing foreign."""
+OF_A_FALL = 3
+"""Parameters: how far the force falls, when, and how soon."""
 ANOTHER_LAW = "another_law"
 """A kind of what is foreign: what no law, or no energy, of the library follows."""
 
@@ -146,9 +148,10 @@ def summed(grown: Grown) -> Total:
     # What the data do not speak for is neither seen nor excluded.
     told = [f for f in found if f.counted(counts) > BELIEFS.supported]
     strange = [own(f.base) - counts * _undone(f) + f.counted(counts) + BELIEFS.log_foreign(kinds) for f in told]
-    least = [_like_a_tear(f, every, weight) for f in told]
-    for f, w in zip(told, strange, strict=True):
-        for c in _tears(f, every):
+    tears = [_tears(f, every, grown.search) for f in told]
+    least = [_like_a_tear(f, some, weight, grown.search) for f, some in zip(told, tears, strict=True)]
+    for w, some in zip(strange, tears, strict=True):
+        for c in some:
             raised[frozenset(c.names)] += max(w - float(np.log(BELIEFS.apart)) - weight(c) - nothing, 0.0)
     every.sort(key=weight, reverse=True)
     terms = [(c, NOTHING, weight(c) + nothing) for c in every]
@@ -220,32 +223,38 @@ def _with_neighbours(joint: Mapping[tuple[str, str], float], visible: Sequence[s
     return _falling(out)
 
 
-def _like_a_tear(f: Foreign, every: Sequence[Candidate], weight: Callable[[Candidate], float]) -> float:
+def _like_a_tear(
+    f: Foreign, tears: Sequence[Candidate], weight: Callable[[Candidate], float], search: Weighing
+) -> float:
     """ln of the least weight of a force that falls at some moment: a part of that of an effect which comes so.
 
-    Where it stands nearly as well as the same energy with a tear beside the same set, neither is told to be more than
-    `BELIEFS.apart` times as probable: what warms up, or a cell whose zero moves, leaves the same trace.
+    Where it fits nearly as well as the same energy with one of the ``tears`` beside the same set, neither is told to be
+    more than `BELIEFS.apart` times as probable: what warms up, or a cell whose zero moves, leaves the same trace.
     """
-    tears = [weight(c) for c in _tears(f, every) if c.log_evidence - _stands(f) < TWINS.behind]
-    return max(tears, default=-np.inf) - float(np.log(BELIEFS.apart))
+    near = [weight(c) for c in tears if _fits_better(c, f, search) < TWINS.behind]
+    return max(near, default=-np.inf) - float(np.log(BELIEFS.apart))
 
 
-def _tears(f: Foreign, every: Sequence[Candidate]) -> list[Candidate]:
-    """The same energy and set as beside a fall, with an effect that comes so; not far behind it."""
+def _tears(f: Foreign, every: Sequence[Candidate], search: Weighing) -> list[Candidate]:
+    """The same energy and set as beside a fall, with an effect that comes so; fitting not much worse."""
     return [
         c
         for c in every
         if f.falls
         and c.hypothesis.material is f.base.hypothesis.material
-        and _stands(f) - c.log_evidence < TWINS.behind
         and len(c.names) == len(f.base.names) + 1
         and all(e.sudden or e.name in f.base.names for e in c.hypothesis.effects)
+        and -_fits_better(c, f, search) < TWINS.behind
     ]
 
 
-def _stands(f: Foreign) -> float:
-    """ln Z with it, where it was found."""
-    return f.base.log_evidence + f.gain - f.chance
+def _fits_better(c: Candidate, f: Foreign, search: Weighing) -> float:
+    """ln of the likelihood by which ``c`` is ahead of a fall, at their best: a tear has many parameters whose priors
+    count against it, and a fall has few, and fits no worse for that.
+    """
+    noise = f.base.residual.size - f.base.x.size
+    left = (1 - f.share) * (search.excess(f.base) + noise) - (noise - OF_A_FALL)
+    return 0.5 * (max(left, 0.0) - search.excess(c))
 
 
 def _untried(grown: Grown, every: Sequence[Candidate], joint: Mapping[tuple[str, str], float]) -> dict[str, float]:

@@ -180,17 +180,29 @@ def test_a_further_effect_that_nobody_fitted_is_not_excluded(monkeypatch: pytest
     assert [sum(p.values()) for p in found.values()] == pytest.approx([1.0, 1.0])
 
 
+def a_fall(base: Candidate, left: float, **more: Any) -> Foreign:
+    """One that leaves so much beyond noise of the `LEFT` squares that are beside the base."""
+    noise = base.residual.size - base.x.size
+    share = 1 - (left + noise - total.OF_A_FALL) / (LEFT + noise)
+    return Foreign(SUDDEN, base, more.pop("gain", 24.0), -1.0, share=share, **more)
+
+
 def test_a_fall_that_stays_is_at_most_twelve_times_less_probable_than_a_tear_that_leaves_its_trace() -> None:
-    """Beside the same effects, with the same energy, and where it stands nearly as well."""
+    """Beside the same effects, with the same energy, and where it fits nearly as well, whatever their priors say."""
     base, torn = candidate("friction", log_evidence=-50.0), candidate("friction", "tearing", log_evidence=-20.0)
-    softer = candidate("friction", "mullins", log_evidence=-20.0)
+    softer, other = candidate("friction", "mullins", log_evidence=-20.0), replace(torn, log_evidence=-45.0)
+    far = TWINS.behind
 
-    def least(gain: float, size: float, *others: Candidate) -> float:
-        return total._like_a_tear(Foreign(SUDDEN, base, gain, -5.0, size=size), [base, *others], lambda c: 3.0)
+    def least(left: float, size: float, *others: Candidate) -> float:
+        search = cast(Search, SimpleNamespace(excess=lambda c: LEFT if c is base else 30.0))
+        fall = a_fall(base, left, size=size)
+        return total._like_a_tear(fall, total._tears(fall, [base, *others], search), lambda c: 3.0, search)
 
-    assert least(25.0, -0.1, torn) == pytest.approx(3.0 - np.log(BELIEFS.apart))
-    for gain, size, other in ((25.0, 0.1, torn), (25.0 - 1.01 * TWINS.behind, -0.1, torn), (25.0, -0.1, softer)):
-        assert least(gain, size, other) == -np.inf
+    for some in (torn, other):
+        for left in (30.0, 30.0 + 1.9 * far, 30.0 - 1.2 * far):
+            assert least(left, -0.1, some) == pytest.approx(3.0 - np.log(BELIEFS.apart))
+    for left, size, one in ((30.0, 0.1, torn), (30.0 + 2.1 * far, -0.1, torn), (30.0, -0.1, softer)):
+        assert least(left, size, one) == -np.inf
 
 
 @pytest.mark.parametrize(("size", "behind", "held"), [(-0.1, 0.9, True), (0.1, 0.9, False), (-0.1, 1.1, False)])
@@ -200,7 +212,7 @@ def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_li
     by_likelihood_alone(monkeypatch)
     monkeypatch.setattr(total, "BELIEFS", told())
     base = candidate("friction", log_evidence=-60.0)
-    torn = candidate("friction", "tearing", log_evidence=-35.0 - behind * TWINS.behind)
+    torn = candidate("friction", "tearing", log_evidence=-60.0)
     case = SimpleNamespace(
         null=candidate(log_evidence=-90.0),
         plain={"gent": base},
@@ -208,7 +220,7 @@ def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_li
         question=SimpleNamespace(energy=None),
         sees_nothing=True,
         twins=lambda: frozenset(),
-        foreign=lambda *_: [Foreign(SUDDEN, base, 24.0, -1.0, size=size)],
+        foreign=lambda *_: [a_fall(base, LEFT - 2 * behind * TWINS.behind, size=size)],
         tell=lambda _: None,
     )
     grown = grown_of(case)
