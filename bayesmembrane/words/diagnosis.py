@@ -444,15 +444,17 @@ def _unknown(found: Diagnosis) -> str:
 
 
 def too_far(found: Diagnosis) -> str:
-    """Which forms of the most probable explanation are too far off for it to be one, as a clause; "" if none is."""
-    fitted = {set_name(j.candidate, found.null.names): j.candidate for j in reversed(found.ranking)}
-    first = next((fitted[name] for name in found.probabilities.effects if name in fitted), None)
-    if first is None:
+    """Why the most probable explanation is none, as a clause: which of its forms are too far off; "" if it may be one."""
+    fitted = {set_name(j.candidate, found.null.names): j for j in reversed(found.ranking)}
+    told = next((fitted[name] for name in found.probabilities.effects if name in fitted), None)
+    if told is None:
         return ""
+    first = told.candidate
     far = laws_off(first.law_errors_beyond(found.null.names), VERDICT.law_carried)
     if first.energy_error > VERDICT.carried:
         far.insert(0, f"the energy {100 * first.energy_error:.2g} %")
-    return f"it holds only with {listed(far)} off" if far else ""
+    worse = "by its own laws it leaves more than no effect does" if told.worse else ""
+    return f"it holds only with {listed(far)} off" if far else worse
 
 
 def laws_off(errors: Mapping[str, float], least: float) -> list[str]:

@@ -14,7 +14,7 @@ from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown, key_of
-from bayesmembrane.diagnosis.explanation.neighbours import spread
+from bayesmembrane.diagnosis.explanation.neighbours import NEGLIGIBLE, spread
 from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
 from bayesmembrane.diagnosis.explanation.unfitted import Key, unfitted
@@ -40,6 +40,7 @@ class Judged:
     unexplained : part of the squares beyond noise that the null model leaves, which this one leaves
     reduced_chi2 : of what it leaves, its form error not taken away
     believed : ln of its probability before the data
+    worse : True if it leaves clearly more than the null model at its best: errors of its laws explain the curve, not it
     """
 
     candidate: Candidate
@@ -48,6 +49,11 @@ class Judged:
     unexplained: float
     reduced_chi2: float
     believed: float = 0.0
+    worse: bool = False
+
+    def carried(self, given: Sequence[str]) -> bool:
+        """True if it is errors of forms that explain the curve (`carried`)."""
+        return self.worse or carried(self.candidate, given)
 
     @property
     def log_evidence(self) -> float:
@@ -167,7 +173,9 @@ def summed(grown: Grown) -> Total:
     for name, q in _untried(grown, every, joint).items():
         joint[name, NOTHING] += q
     for i, (c, kind, _) in enumerate(terms):
-        if kind == NOTHING and carried(c, given) and not _described(grown, c, given):
+        if kind != NOTHING or p[i] < NEGLIGIBLE or _described(grown, c, given):
+            continue
+        if carried(c, given) or _worse(grown, c):
             name, moved = set_name(c, given), BELIEFS.another_law * float(p[i])
             joint[name, NOTHING] -= moved
             joint[name, ANOTHER_LAW] += moved
@@ -183,6 +191,18 @@ def summed(grown: Grown) -> Total:
     judged.sort(key=lambda j: -j.probability)
     marginal = Probabilities(_summed_out(both, 0), _falling(BELIEFS.energies_flattened(energies)), _summed_out(both, 1))
     return Total(tuple(judged), marginal, both, _summed_out(flat, 0), tuple(found))
+
+
+def _worse(grown: Grown, c: Candidate) -> bool:
+    """True if a set of effects leaves more than the null model by what tells two sets apart, both at their best."""
+    null = _null(grown)
+    beyond = set(c.names) - set(null.names)
+    return bool(beyond) and grown.search.excess(c) - grown.search.excess(null) > 2 * TWINS.behind
+
+
+def _null(grown: Grown) -> Candidate:
+    """The model as given."""
+    return grown.found[(grown.case.null.hypothesis.material.name, frozenset(grown.case.null.names))]
 
 
 def _described(grown: Grown, c: Candidate, given: Sequence[str]) -> bool:
@@ -305,8 +325,7 @@ def _raised(grown: Grown, weights: Mapping[int, float], others: Mapping[Key, flo
 
     ``weights`` : ln weight by the identity of a candidate; ``others`` : of what was not fitted.
     """
-    plain = grown.found[(grown.case.null.hypothesis.material.name, frozenset(grown.case.null.names))]
-    before = max(grown.search.excess(plain), 1e-300)
+    before = max(grown.search.excess(_null(grown)), 1e-300)
     total, stands = {}, {}
     for names in {names for _, names in grown.found}:
         same = [c for (_, own), c in grown.found.items() if own == names]
@@ -370,7 +389,7 @@ def _joined(names: frozenset[str]) -> str:
 
 
 def _judged(grown: Grown, c: Candidate, probability: float, believed: float) -> Judged:
-    null = grown.found[(grown.case.null.hypothesis.material.name, frozenset(grown.case.null.names))]
+    null = _null(grown)
     left, before = grown.search.excess(c), grown.search.excess(null)
     n = c.residual.size
     return Judged(
@@ -380,4 +399,5 @@ def _judged(grown: Grown, c: Candidate, probability: float, believed: float) -> 
         min(left / before, 1.0) if before > 0 else 0.0,
         (left + n - c.x.size) / max(n - c.x.size, 1),
         believed,
+        _worse(grown, c),
     )

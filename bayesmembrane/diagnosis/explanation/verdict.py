@@ -19,7 +19,6 @@ from bayesmembrane.diagnosis.explanation.total import (
     Judged,
     Probabilities,
     Total,
-    carried,
     set_name,
     summed,
 )
@@ -124,7 +123,7 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
         return unknown
     if sure and names[0] == NOTHING:
         return unknown if p.anything_foreign > 1 - VERDICT.sure else _without_effects(case, total, members)
-    if carried(first.candidate, given) or p.foreign.get(ANOTHER_LAW, 0.0) > 0.5:
+    if first.carried(given) or p.foreign.get(ANOTHER_LAW, 0.0) > 0.5:
         return unknown
     if sure:
         return Verdict("named", members, total.ranking, p, strange)
@@ -161,7 +160,7 @@ def _first_of_each_set(ranking: Sequence[Judged], given: Sequence[str]) -> dict[
         sets.setdefault(set_name(j.candidate, given), []).append(j)
     for name, same in sets.items():
         near = [j for j in same if j.probability * VERDICT.alike >= same[0].probability]
-        good = [j for j in near if not carried(j.candidate, given)]
+        good = [j for j in near if not j.carried(given)]
         if name != NOTHING and good:
             sets[name] = [min(good, key=lambda j: j.candidate.x.size)]
     return {name: same[0] for name, same in sets.items()}

@@ -357,3 +357,32 @@ def test_nothing_is_told_of_others_where_one_stands_out(monkeypatch: pytest.Monk
     far = summed_up(monkeypatch, 0.0, -9.0, elsewhere=0.2).probabilities
     moved = 1 - far.effects["friction"] / plain["friction"]
     assert moved == pytest.approx(0.4 * far.foreign[ANOTHER_LAW], abs=0.05)
+
+
+@pytest.mark.parametrize(("more", "moved"), [(0.0, 0.0), (0.9, 0.0), (1.1, BELIEFS.another_law)])
+def test_a_set_that_leaves_more_than_no_effect_does_is_mostly_something_foreign(
+    monkeypatch: pytest.MonkeyPatch, more: float, moved: float
+) -> None:
+    """It is errors of its laws that explain the curve, then: they are parts of traces larger than the misfit."""
+    by_likelihood_alone(monkeypatch)
+    monkeypatch.setattr(total, "BELIEFS", told())
+    slid = candidate("friction", log_evidence=-20.0)
+    case = SimpleNamespace(
+        null=candidate(log_evidence=-90.0),
+        plain={"gent": slid},
+        visible=TRIED,
+        question=SimpleNamespace(energy=None),
+        sees_nothing=False,
+        tested=lambda _: SimpleNamespace(adequate=False),
+        twins=lambda: frozenset(),
+        foreign=lambda *_: [],
+        tell=lambda _: None,
+    )
+    grown = grown_of(case)
+    for c in (case.null, slid):
+        grown.add(c)
+    cast(Any, grown.search).excess = lambda c: LEFT + (2 * more * TWINS.behind if c.names else 0.0)
+    found = total.summed(grown)
+    assert found.probabilities.foreign.get(ANOTHER_LAW, 0.0) == pytest.approx(moved, abs=1e-3)
+    first = found.ranking[0]
+    assert (first.worse, first.carried([])) == (bool(moved), bool(moved))
