@@ -444,7 +444,7 @@ def _unknown(found: Diagnosis) -> str:
 
 
 def too_far(found: Diagnosis) -> str:
-    """Why the most probable explanation is none, as a clause: which of its forms are too far off; "" if it may be one."""
+    """Why the most probable explanation is none, as a clause: which forms are too far off; "" if it may be one."""
     fitted = {set_name(j.candidate, found.null.names): j for j in reversed(found.ranking)}
     told = next((fitted[name] for name in found.probabilities.effects if name in fitted), None)
     if told is None:
