@@ -236,7 +236,8 @@ def valleys(
     Of more than `thinning.MOST` readings so many are used: a valley is mapped by thousands of films.
     """
     measurement = of_few(measurement, MOST)
-    how = valleys_beside if claim.effects else run_valleys
+    claim = claim.on(measurement)
+    how = run_valleys if all(e.known for e in claim.effects) else valleys_beside
     settings = {"seed": work.seed, "ends": list(ends), "rise": rise}
     what = asked("valleys", how, [measurement], [claim], settings)
     if (stored := held("valleys", what, work.out)) is not None:

@@ -137,16 +137,24 @@ def fit(
     Of more than `MANY` readings the valleys are looked for with that many of them (`data.thinning.shortened`), and the
     optimum is then that of all; the one under the convexity prior is that of the part, with the loss of all.
 
-    Standard errors are s^2 (J^T J)^-1 with s^2 = |r|^2 / (N - k): the misfit counts as noise.
+    Standard errors are s^2 (J^T J)^-1 with s^2 = |r|^2 / (N - k): the misfit counts as noise. A frame that a blank run
+    shows is held as that has it, and its error is in the others.
 
     Raises `SettingsError` for fewer points than parameters, a loss that is unknown or lacks a noise, and a material
     whose films cannot reach the data.
     """
-    hypothesis = hypothesis.with_frame(measurement)
+    claim = hypothesis.with_frame(measurement).on(measurement)
+    found = _fitted(measurement, claim.held, loss, seed, [np.asarray(s, dtype=float) for s in starts], solve)
+    return found if claim.held == claim else _released(found, claim, measurement, solve)
+
+
+def _fitted(
+    measurement: Measurement, hypothesis: Hypothesis, loss: str, seed: int, films: list[Array], solve: Solve
+) -> Fit:
+    """`fit` of a hypothesis all of whose coordinates are in question; ``films`` to start from, too."""
     enough_points(hypothesis, measurement)
     few = shortened(measurement, MANY)
     objective = Objective(hypothesis, few, loss, solve)
-    films = [np.asarray(s, dtype=float) for s in starts]
     pool, contained, (x, status) = _searched(objective, seed, films)
     search = objective
     if few is not measurement:
@@ -163,6 +171,34 @@ def fit(
         free = _result(objective, x, status) if lower < held.objective else held
         held = free if free.convex else held
     return replace(free, constrained=held)
+
+
+def _released(found: Fit, claim: Hypothesis, measurement: Measurement, solve: Solve) -> Fit:
+    """The same with what is known of the rig among the coordinates: at its value, and its error in all of them.
+
+    The covariance is s^2 (J^T J + s^2 P)^-1, with 1 / sd^2 of what is known on the diagonal of P.
+    """
+    objective = Objective(claim, measurement, found.loss, solve)
+    known = np.array([p.name in claim.known for p in objective.parameters])
+    values, sds = np.array([p.prior.mean_sd for p in objective.parameters]).T
+    x = np.where(known, values, 0.0)
+    x[~known] = found.coordinates
+    bound = np.isin([p.name for p in objective.parameters], found.at_bound)
+    covariance = np.full((x.size, x.size), np.nan)
+    if math.isfinite(found.objective):
+        r, jacobian = objective(x)
+        dof = max(len(r) - int(np.count_nonzero(~known & ~bound)), 1)
+        rows = np.diag(float(np.linalg.norm(r)) / math.sqrt(dof) / sds)[known]
+        covariance = _covariance(np.append(r, np.zeros(len(rows))), np.vstack([jacobian, rows]), bound)
+    inner = found.constrained
+    return replace(
+        found,
+        hypothesis=claim,
+        coordinates=x,
+        covariance=covariance,
+        parameters=_fitted_parameters(objective, x, covariance),
+        constrained=None if inner is None else _released(inner, claim, measurement, solve),
+    )
 
 
 def _searched(objective: Objective, seed: int, published: list[Array]) -> tuple[Array, list[Array], tuple[Array, str]]:

@@ -96,7 +96,8 @@ def compare_ranges(
     submit: Submit | None = None,
 ) -> dict[str, Comparison]:
     """`compare` on several measurements, by name, in one queue of jobs: that of ``submit``, if there is one already."""
-    labels = _labels(hypotheses)
+    first = next(iter(ranges.values())).measurement
+    labels = _labels([h.with_frame(first) for h in hypotheses])
     jobs: dict[Key, Job] = {
         (name, label): Job(
             ", ".join(n for n in (label, name) if n), r.measurement, h.with_frame(r.measurement), judging, r.whole

@@ -86,6 +86,8 @@ def prior_widths(
     worth = min(1.0, effective / len(draws))
     found = []
     for i, p in enumerate(parameters):
+        if p.name in posterior.hypothesis.known:  # its width is no choice
+            continue
         for factor in factors:
             wider = scaled(p.prior, factor)
             if wider is None or (isinstance(p.prior, Uniform) and factor > 1):

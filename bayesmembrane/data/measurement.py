@@ -168,9 +168,10 @@ class Measurement:
         digest = hashlib.sha256(f"{self.rig!r} {self.specimen.thickness!r} {self.full_range!r}".encode())
         for array in (self.deflection, self.force, self.time, self.force_sd, self.covariance):
             digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
-        for more in (self.across, self.blank):
-            if more is not None:
-                digest.update(np.ascontiguousarray(more).tobytes())
+        if self.across is not None:
+            digest.update(np.ascontiguousarray(self.across).tobytes())
+        if self.blank is not None:
+            digest.update(b"blank" + np.ascontiguousarray(self.blank).tobytes())
         if self.motion is not None:
             for array in (self.motion.deflection, self.motion.time, self.on_path.astype(float)):
                 digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())

@@ -27,7 +27,9 @@ THINNEST = 1e-8  # m
 RIG_SIZES = (1e-6, 1.0)  # m
 LARGEST_LIFT = 20.0  # largest deflection relative to the size of the rig
 LEAST_SD = 1e-12  # N
-BLANK_READINGS = 4
+BLANK_READINGS = 3
+CLEAR, LEAST_TRAVEL = 3.0, 1e-7  # standard errors of a slope, and m: what is less is noise, and round-off
+MOST_OF_TRAVEL = 0.8  # of the test's: what yields as much is no frame, but a wrong unit, or the film itself
 BLANK_REACHES = 0.8  # of the largest force of the test: below that it is told, for the frame is extrapolated
 _USUAL = {FORCE: "N", STRESS: "MPa", LENGTH: "mm"}
 PHASES = MappingProxyType({"cycle": RATIO, "direction": RATIO})
@@ -57,7 +59,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     _check_size(deflection, table, rig)
     single = _stated(options, rig, specimen.thickness)
     sd, covariance, covariance_file = _noise(options, single, found.get("force_sd"), force.size)
-    blank, blank_notes = _blank_run(options, rig, force)
+    blank, blank_notes = _blank_run(options, rig, float(np.max(np.abs(deflection))), float(np.max(np.abs(force))))
     origin = [options.text("origin"), root.section("origin", required=False).all_text()]
     understood = root.section("import", required=False)  # how an export was understood, for people
     understood.all_text()
@@ -244,8 +246,10 @@ def _noise(
     return np.sqrt(np.diag(covariance)), covariance, path.name
 
 
-def _blank_run(options: TomlSection, rig: Fixture, force: Array) -> tuple[Array | None, tuple[str, ...]]:
+def _blank_run(options: TomlSection, rig: Fixture, went: float, asked: float) -> tuple[Array | None, tuple[str, ...]]:
     """((M, 2) m and N of a run on a rigid dummy that the specimen file names, or None; a note on how far it goes).
+
+    ``went`` m, ``asked`` N : the largest travel and force of the test.
 
     Raises `DataError` where the film's travel is not read, and for a run that shows no frame that yields to a force.
     """
@@ -259,12 +263,16 @@ def _blank_run(options: TomlSection, rig: Fixture, force: Array) -> tuple[Array 
     table = parse_table(read_text(path), str(path))
     columns, _ = curve_columns(table)
     travel, pull = columns["deflection"], columns["force"]
-    if np.unique(pull).size < BLANK_READINGS:
-        fault = f"a blank run needs at least {BLANK_READINGS} readings at different forces"
-        raise DataError(fault, str(path), "load the rigid dummy up to the forces of the test")
-    if np.max(pull) <= 0 or np.polyfit(pull, travel, 1)[0] < 0:
+    if np.unique(pull[pull > 0]).size < BLANK_READINGS:
+        fault = f"a blank run needs readings at {BLANK_READINGS} different forces above zero at least"
+        raise DataError(fault, str(path), "load the rigid dummy up to the forces of the test, in the sense of the test")
+    (slope, _), ((variance, _), _) = np.polyfit(pull, travel, 1, cov=True)
+    reached = float(np.max(pull))
+    if slope * reached < -max(CLEAR * float(np.sqrt(variance)) * reached, LEAST_TRAVEL):
         fault = "the crosshead goes the less the larger the force is, and a frame yields the other way"
         raise DataError(fault, str(path), "change the sign of a column")
-    reached, asked = float(np.max(pull)), float(np.max(force))
-    far = f"the blank run ({path.name}) goes to {reached:.3g} N, the test to {asked:.3g} N"
-    return np.column_stack([travel, pull]), (far,) if reached < BLANK_REACHES * asked else ()
+    if slope * asked > MOST_OF_TRAVEL * went:
+        fault = f"the frame alone would go {1e3 * slope * asked:.3g} mm under the {asked:.3g} N of the test"
+        raise DataError(f"{fault}, which goes {1e3 * went:.3g} mm with a film", str(path), "check the units of both")
+    short = f"the blank run ({path.name}) goes to {reached:.3g} N, the test to {asked:.3g} N: it is drawn on straight"
+    return np.column_stack([travel, pull]), (short,) if reached < BLANK_REACHES * asked else ()

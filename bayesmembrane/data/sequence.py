@@ -61,7 +61,7 @@ def one_after_another(tests: Sequence[Measurement], rest: float = 0.0) -> Measur
         full_range=full_range,
         motion=Motion(deflection, time, full_range, None, *said),
         places=places,
-        blank=first.blank,
+        blank=next((t.blank for t in tests if t.blank is not None), None),
     )
 
 
@@ -132,6 +132,8 @@ def _check(first: Measurement, test: Measurement, number: int) -> None:
             f"{1e6 * first.specimen.thickness:g} um in the test before: they are not the same",
             where,
         )
+    if test.blank is not None and first.blank is not None and not np.array_equal(test.blank, first.blank):
+        raise DataError("tests of the same film have one frame, and this one has another blank run", where)
     if (test.time is None) != (first.time is None):
         raise DataError("of tests made one after another all or none need times", where, "add a column time_s, or none")
     if (test.force_sd is None) != (first.force_sd is None):

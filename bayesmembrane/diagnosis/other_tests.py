@@ -86,12 +86,18 @@ def predicted(found: Diagnosis, other: Measurement, scatter: float = 0.0, seed: 
 
 
 def check(measurement: Measurement, other: Measurement, scatter: float) -> None:
-    """Raises `SettingsError` if ``other`` is on another kind of rig, or ``scatter`` negative."""
+    """Raises `SettingsError` if ``other`` is on another kind of rig, or another frame, or ``scatter`` negative."""
     if type(other.rig) is not type(measurement.rig):
         raise SettingsError(
             f"the test {_name(other)} is on another kind of rig than the one that was diagnosed",
             "--predict",
             "predict tests of the same kind",
+        )
+    if other.blank is not None and not np.array_equal(other.blank, measurement.blank):  # type: ignore[arg-type]
+        raise SettingsError(
+            f"the test {_name(other)} has another blank run than the one that was diagnosed",
+            "--predict",
+            "give both the blank run of their frame, if it is one frame, or leave it out of the test that is predicted",
         )
     if scatter < 0:
         raise SettingsError(f"a scatter of {scatter:g} is none", "--scatter", "write 0.05 for five per cent")

@@ -197,7 +197,7 @@ class Forward:
         count = self.hypothesis.curve_size + 1 if sensitivities else 1
         most = IN_CACHE if self.rig.closed_form else COMPOSED
         rows = max(1, most // (count * self.path.deflection.size))
-        parts = [self._batch(x[i : i + rows], sensitivities, reached, spare) for i in range(0, len(x), rows)]
+        parts = [self._batch(x[i : i + rows], sensitivities, reached, spare) for i in range(0, max(len(x), 1), rows)]
         if len(parts) == 1:
             return parts[0]
         names = [f.name for f in fields(Prediction) if f.name != "deflection"]

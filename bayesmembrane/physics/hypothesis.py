@@ -73,6 +73,17 @@ class Hypothesis:
         return replace(self, effects=(*self.effects, component("effects", FRAME)())).on(measurement)
 
     @property
+    def known(self) -> frozenset[str]:
+        """Full names of the coordinates of what another run of the rig has measured."""
+        return frozenset(f"{e.name}.{p.name}" for e in self.effects if e.known for p in e.coordinates)
+
+    @property
+    def held(self) -> Self:
+        """The same with what is known of the rig at its value, without coordinates; itself if nothing is."""
+        effects = tuple(e.as_held() for e in self.effects)
+        return self if effects == self.effects else replace(self, effects=effects)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Full names of the k coordinates."""
         return tuple(p.name for p in self.parameters)

@@ -55,9 +55,9 @@ def valleys_beside(
 
     Raises `SettingsError` if there are no effects, and what `valleys` raises.
     """
-    if not hypothesis.effects:
+    if all(e.known for e in hypothesis.effects):
         raise SettingsError(f"{hypothesis.label()} has no effects to be left out", remedy="name some, or ask `valleys`")
-    plain = replace(hypothesis, effects=())
+    plain = replace(hypothesis, effects=tuple(e for e in hypothesis.effects if e.known))
     with within("without"):
         without = valleys(measurement, plain, ranges, rise=rise, seed=seed, solve=solve)
     added = valleys(measurement, hypothesis, ranges, rise=rise, seed=seed, solve=solve)

@@ -134,13 +134,13 @@ class Chart:
 class Surface:
     """L(z) = |F(z) - y|_2 of one measurement (N points) over a `Chart`, with residuals and slopes for many z at once.
 
-    The convexity prior plays no part.
+    The convexity prior plays no part, and what is known of the rig is held.
     """
 
     def __init__(
         self, hypothesis: Hypothesis, measurement: Measurement, solve: Solve = unaided, loss: str = "euclidean"
     ) -> None:
-        self.objective = Objective(hypothesis.with_frame(measurement), measurement, loss, solve)
+        self.objective = Objective(hypothesis.with_frame(measurement).held, measurement, loss, solve)
         self.hypothesis, self.measurement = self.objective.hypothesis, measurement
         self.chart = Chart(self.hypothesis)
 

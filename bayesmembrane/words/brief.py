@@ -447,7 +447,7 @@ def _use_as_it_is(d: Diagnosis) -> str:
 
 def _when_unknown(d: Diagnosis) -> str:
     strange = _strange(d)
-    if strange is None and d.experiments:
+    if strange is None and d.experiments and d.experiments[0].separation >= NEXT_TEST.helps:
         return _tell_apart(d)
     if strange is None:
         return "Repeat the test, and do not extrapolate with this model."

@@ -21,6 +21,7 @@ from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.ground.registry import components
+from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.words.hypothesis import effect_title, material_title, spoken
 from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.next_test import spoken_test
@@ -60,12 +61,12 @@ def document(found: Diagnosis) -> dict[str, Any]:
         },
         "ranking": [
             {
-                "effect": "+".join(j.candidate.names) or j.candidate.hypothesis.material.name,
+                "effect": _in_question(j.candidate.hypothesis) or j.candidate.hypothesis.material.name,
                 "material": j.candidate.hypothesis.material.name,
                 "probability": j.probability,
                 "log_bayes_factor": j.gain,
-                "parameters": j.candidate.parameters,
-                "units": units_of(j.candidate.parameters),
+                "parameters": (own := _not_known(j.candidate)),
+                "units": units_of(own),
                 "unexplained": j.unexplained,
                 "energy_error": j.candidate.energy_error,
                 "law_errors": j.candidate.law_errors,
@@ -100,6 +101,16 @@ def document(found: Diagnosis) -> dict[str, Any]:
             for e in found.experiments
         ],
     }
+
+
+def _in_question(hypothesis: Hypothesis) -> str:
+    """Names of the effects that no other run of the rig has measured, joined by "+"."""
+    return "+".join(e.name for e in hypothesis.effects if not e.known)
+
+
+def _not_known(candidate: Candidate) -> dict[str, float]:
+    """Parameters of the effects of a candidate but those that another run of the rig has measured."""
+    return {k: v for k, v in candidate.parameters.items() if k not in candidate.hypothesis.known}
 
 
 def sentence(found: Diagnosis) -> str:

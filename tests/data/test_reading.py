@@ -344,16 +344,25 @@ def test_a_blank_run_is_read_beside_the_curve_and_its_reach_is_told(files: Files
     assert m.provenance.notes == ()
     assert m.data_hash != files.read().data_hash
     stronger = files.read(CURVE.replace("0.95", "2.5"), BLANK)
-    assert stronger.provenance.notes == ("the blank run (blank.csv) goes to 0.9 N, the test to 2.5 N",)
+    assert stronger.provenance.notes == (
+        "the blank run (blank.csv) goes to 0.9 N, the test to 2.5 N: it is drawn on straight",
+    )
 
 
 @pytest.mark.parametrize(
     ("run", "said"),
     [
         (None, "blank.csv: there is no such file"),
-        ("deflection_um,force_mN\n0,0\n2,250\n4,500\n4,500\n", "blank.csv: a blank run needs at least 4 readings"),
+        ("deflection_um,force_mN\n0,0\n2,250\n4,500\n4,500\n", "blank.csv: a blank run needs readings at 3 different"),
         ("deflection_um,force_mN\n0,0\n-2,250\n-4,500\n-6,800\n", "blank.csv: the crosshead goes the less"),
-        ("deflection_um,force_mN\n0,0\n-2,-250\n-4,-500\n-6,-800\n", "a frame yields the other way; change the sign"),
+        (
+            "deflection_um,force_mN\n0,0\n-2,-250\n-4,-500\n-6,-800\n",
+            "load the rigid dummy up to the forces of the test",
+        ),
+        (
+            "deflection_mm,force_mN\n0,0\n5,250\n10,500\n15,800\n",
+            "17.9 mm under the 0.95 N of the test, which goes 20 mm",
+        ),
         ("deflection_um,force_mN\n0,0\n2,x\n", "blank.csv, line 3, column force_mN"),
         ("force_mN\n0\n2\n", "blank.csv"),
     ],

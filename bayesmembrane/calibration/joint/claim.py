@@ -89,6 +89,11 @@ class Joint:
                 )
 
     @property
+    def held(self) -> Joint:
+        """The same with what is known of each rig at its value, without coordinates."""
+        return replace(self, parts=tuple(replace(p, hypothesis=p.hypothesis.held) for p in self.parts))
+
+    @property
     def labels(self) -> tuple[str, ...]:
         """What the tests are called."""
         return tuple(part.label for part in self.parts)

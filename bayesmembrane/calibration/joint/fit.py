@@ -127,10 +127,11 @@ def fit_jointly(joint: Joint, *, seed: int = 0, solve: Solve = api.solve) -> Joi
     A test that states none is weighed by its own root mean square residual, which maximises its likelihood. Starts that
     are good for one test are looked at in all, and from the best of them, and from neo-Hookean films, all descend at
     once with exact derivatives; of very long tests with some of their readings first. Standard errors are
-    s^2 (J^T J)^-1 with s^2 = |r|^2 / (N - K').
+    s^2 (J^T J)^-1 with s^2 = |r|^2 / (N - K'). What a blank run shows of a frame is held.
 
     Raises `SettingsError` for a test of fewer points than parameters, and a material that does not reach all of them.
     """
+    joint = joint.held
     for part in joint.parts:
         enough_points(part.hypothesis, part.measurement)
     few = with_fewer_readings(joint)

@@ -100,14 +100,14 @@ class Search(Weighing):
 
         The plain model bends the material until it imitates what is missing: searches must not only start there.
         """
-        plain = replace(hypothesis, effects=())
+        plain = replace(hypothesis, effects=tuple(e.as_held() for e in hypothesis.effects if e.known))
         objective = Objective(plain, self._few, "euclidean", self.quick)
         pool, _ = objective.pool(np.random.default_rng(self.seed), SEARCH.draws)
         found = separated(pool, objective.spread, SEARCH.material_starts)
         nulls = [e.null for e in hypothesis.effects]
         out = [np.concatenate([x, *nulls]) for x in found]
         for i, effect in enumerate(hypothesis.effects):
-            if effect.size.null is None:  # known from another run
+            if effect.known:
                 continue
             for own in starts_with([np.empty(0)], effect, self.expected_sizes(effect)):
                 out.append(np.concatenate([found[0], *nulls[:i], own, *nulls[i + 1 :]]))

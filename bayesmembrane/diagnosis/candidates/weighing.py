@@ -226,9 +226,18 @@ class Weighing(ABC):
 
         By least squares: what a user would call the best fit of this model.
         """
-        white = self.noise.white(np.column_stack([candidate.slopes, candidate.residual]))
+        return self._adapted(candidate.slopes, candidate.residual)
+
+    def squares(self, candidate: Candidate, trace: Array | None = None) -> float:
+        """Squares of its best fit, in variances of the noise; with a ``trace`` (N,) N of something else beside it."""
+        slopes = candidate.slopes if trace is None else np.column_stack([candidate.slopes, trace])
+        white = self.noise.white(self._adapted(slopes, candidate.residual))
+        return float(white @ white)
+
+    def _adapted(self, slopes: Array, residual: Array) -> Array:
+        white = self.noise.white(np.column_stack([slopes, residual]))
         taken = np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=SEARCH.rank)[0]
-        return np.asarray(candidate.residual - candidate.slopes @ taken)
+        return np.asarray(residual - slopes @ taken)
 
     def excess(self, candidate: Candidate) -> float:
         """Squares of its best fit beyond those of noise, in variances of the noise; 0 or more."""

@@ -40,7 +40,7 @@ class Judged:
     unexplained : part of the squares beyond noise that the null model leaves, which this one leaves
     reduced_chi2 : of what it leaves, its form error not taken away
     believed : ln of its probability before the data
-    worse : True if it leaves clearly more than the null model at its best: errors of its laws explain the curve, not it
+    worse : True if it leaves clearly more than its energy does without effects: errors of its laws explain the curve
     """
 
     candidate: Candidate
@@ -173,7 +173,7 @@ def summed(grown: Grown) -> Total:
     for name, q in _untried(grown, every, joint).items():
         joint[name, NOTHING] += q
     for i, (c, kind, _) in enumerate(terms):
-        if kind != NOTHING or p[i] < NEGLIGIBLE or _described(grown, c, given):
+        if kind != NOTHING or p[i] < NEGLIGIBLE or _described(grown, c, given):  # what has nothing can lose nothing
             continue
         if carried(c, given) or _worse(grown, c):
             name, moved = set_name(c, given), BELIEFS.another_law * float(p[i])
@@ -194,10 +194,13 @@ def summed(grown: Grown) -> Total:
 
 
 def _worse(grown: Grown, c: Candidate) -> bool:
-    """True if a set of effects leaves more than the null model by what tells two sets apart, both at their best."""
-    null = _null(grown)
-    beyond = set(c.names) - set(null.names)
-    return bool(beyond) and grown.search.excess(c) - grown.search.excess(null) > 2 * TWINS.behind
+    """True if effects leave more than their energy does without them, or the null model where that was not fitted, both
+    at their best, by what tells two sets apart.
+    """
+    given = frozenset(grown.case.null.names)
+    plain = grown.found.get((c.hypothesis.material.name, given), _null(grown))
+    beyond = set(c.names) - given
+    return bool(beyond) and grown.search.excess(c) - grown.search.excess(plain) > 2 * TWINS.behind
 
 
 def _null(grown: Grown) -> Candidate:
@@ -269,12 +272,11 @@ def _tears(f: Foreign, every: Sequence[Candidate], search: Weighing) -> list[Can
 
 
 def _fits_better(c: Candidate, f: Foreign, search: Weighing) -> float:
-    """ln of the likelihood by which ``c`` is ahead of a fall, at their best: a tear has many parameters whose priors
-    count against it, and a fall has few, and fits no worse for that.
+    """(S_f + k_f - S_c - k_c) / 2, ln of the likelihood by which ``c`` is ahead of a fall, each leaving squares S by k
+    parameters: a tear has many, whose priors count against it, and a fall few, and neither fits worse for that.
     """
-    noise = f.base.residual.size - f.base.x.size
-    left = (1 - f.share) * (search.excess(f.base) + noise) - (noise - OF_A_FALL)
-    return 0.5 * (max(left, 0.0) - search.excess(c))
+    fall = search.squares(f.base, f.trace) + f.base.x.size + OF_A_FALL
+    return 0.5 * (fall - search.squares(c) - c.x.size)
 
 
 def _untried(grown: Grown, every: Sequence[Candidate], joint: Mapping[tuple[str, str], float]) -> dict[str, float]:
@@ -339,12 +341,10 @@ def _raised(grown: Grown, weights: Mapping[int, float], others: Mapping[Key, flo
 
 def _plausible(candidate: Candidate, search: Weighing) -> bool:
     """True if every effect of it is of a size that occurs, is there at all, and away from its bound."""
-    for e in candidate.hypothesis.effects:
+    for e in (e for e in candidate.hypothesis.effects if not e.known):
         for i, expected in zip(e.sizes, search.expected_sizes(e).tolist(), strict=True):
             p, name = e.coordinates[i], f"{e.name}.{e.coordinates[i].name}"
-            if p.null is None:  # known from another run
-                continue
-            size = abs(candidate.parameters[name] - p.null)
+            size = abs(candidate.parameters[name] - (p.null or 0.0))
             if name in candidate.at_bound or not TWINS.least * expected < size < TWINS.usual * expected:
                 return False
     return True

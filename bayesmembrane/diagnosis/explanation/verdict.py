@@ -116,9 +116,11 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
     names = _told(total, best)
     members, sure = tuple(best[name] for name in names), len(names) == 1 and p.effects[names[0]] >= VERDICT.sure
     unknown, rivals = Verdict("unknown", (), total.ranking, p, strange), members[: VERDICT.most_members]
-    if not members or (len(members) > VERDICT.most_members and not _worth_telling(total)):
-        return replace(unknown, rivals=rivals)
+    if not members:
+        return unknown
     first = members[0]
+    if len(members) > VERDICT.most_members and not _worth_telling(total):
+        return unknown if first.carried(given) else replace(unknown, rivals=rivals)
     if strange is not None and p.something_found > 0.5 and _carries(strange, first, given):
         return unknown
     if sure and names[0] == NOTHING:

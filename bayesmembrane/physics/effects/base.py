@@ -163,10 +163,16 @@ class Effect(ABC):
         return replace(self, reach=reach)
 
     def shown_by(self, measurement: Measurement) -> Self:
-        """The same with what another run of the rig says of it (`Measurement.blank`); itself where none says anything.
+        """The same with what another run of the rig says of it (`Measurement.blank`), and no other."""
+        return self
 
-        Then its coordinates have values with an error, and none at which it vanishes.
-        """
+    @property
+    def known(self) -> bool:
+        """True if another run of the rig has measured it: its size has a value with an error, and no null value."""
+        return False
+
+    def as_held(self) -> Self:
+        """One that is `known`, without coordinates, as the other run has it; any other one as it is."""
         return self
 
     @property
@@ -222,7 +228,7 @@ class Effect(ABC):
 
     def within_bounds(self, p: Array) -> Array:
         """Parameters (B, k), moved to the nearest bound of what means anything where they lie outside."""
-        low, high = np.array([c.sense for c in self.coordinates]).T
+        low, high = np.array([c.sense for c in self.coordinates]).reshape(-1, 2).T
         return np.clip(p, low, high)
 
 

@@ -3,42 +3,67 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import ClassVar, Self
 
 import numpy as np
-from scipy.optimize import least_squares
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import isotonic_regression
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.ground.parameters import Array, Lomax, Normal
+from bayesmembrane.ground.parameters import Array, HalfNormal, Lomax, Normal
 from bayesmembrane.physics.effects.base import Compliance, EffectParameter
 
 NEWTON = 1.0  # N: the force at which the compliance is what its name says, whatever the exponent
 SMALLEST = 1e-9  # N: below it a power less than one has no slope
+Rows = NDArray[np.intp]
 REPEATED = 0.01
 """Relative: no better does a frame yield as it did in its blank run, for a film is clamped in between."""
-BENT = 0.3
-"""Standard deviation of the part by which the compliance changes over a test beyond what its exponent says."""
-LEAST_BENT = -0.25
-"""Of that part: a frame that yields less the larger the force is none."""
-REFITS = 20
+RESOLVED = 1e-7
+"""m: no crosshead's travel is known better."""
+KNOTS = 20
+"""Of a blank run's curve, at most; its readings are averaged between them."""
+AT_REST = 1e-3
+"""Of the largest force: readings below it say where the run began."""
+NEAR_ZERO = 4.0
+"""Times the force of the first knot: up to there a straight line through knots says so where no reading does."""
+CLEAR = 3.0
+"""Standard deviations: a frame that yields less has no shape that could be seen, and is taken for a spring."""
 FAR = 4.0
 """Standard deviations: farther from what the blank run says no frame is looked for."""
-REMEMBERS_AT_MOST = 0.98
-"""Correlation of neighbouring residuals of a blank run."""
 
 
 @dataclass(frozen=True)
 class FrameCurve:
-    """What a blank run says of a frame: ``compliance`` +- ``sd`` m/N, and the shape of its curve.
+    """lost = C F_m g(|F| / F_m) sign(F), C = ``compliance`` +- ``sd`` m/N at the largest force F_m of a blank run.
 
-    It yields by compliance F |F / 1 N|^(exponent - 1) (1 + bend |F|), bend in 1/N.
+    g, one at F_m, is a monotone cubic through zero and the knots of the run: ``part`` (M,) of F_m, and ``lost`` (M,) of
+    the travel there; straight on beyond. F. N. Fritsch, R. E. Carlson, SIAM J. Numer. Anal. 17 (1980) 238.
+
+    most : F_m, N
     """
 
+    part: tuple[float, ...]
+    lost: tuple[float, ...]
+    most: float
     compliance: float
     sd: float
-    exponent: float
-    bend: float
+
+    @cached_property
+    def _law(self) -> tuple[PchipInterpolator, PchipInterpolator, float]:
+        """g, its derivative, and its slope beyond the last knot."""
+        x, y = np.array([0.0, *self.part]), np.array([0.0, *self.lost])
+        g = PchipInterpolator(x, y)
+        return g, g.derivative(), float((y[-1] - y[-2]) / (x[-1] - x[-2]))
+
+    def at(self, force: Array) -> tuple[Array, Array]:
+        """(lost / C, its derivative), in N and 1, at forces of any shape (N)."""
+        g, slope, beyond = self._law
+        x = np.abs(force) / self.most
+        inside, further = np.minimum(x, 1.0), np.maximum(x - 1.0, 0.0)
+        lost = self.most * (g(inside) + beyond * further)
+        return np.asarray(np.sign(force) * lost), np.where(further > 0, beyond, slope(inside))
 
 
 @dataclass(frozen=True)
@@ -51,10 +76,14 @@ class MachineCompliance(Compliance):
     differ by orders of magnitude: a prior that falls like a normal one would rather let the film be softer than the
     frame.
 
-    Where ``blank`` is what a blank run says, the compliance is known but for its sd, and the shape is the run's.
+    Where a blank run shows the frame, delta_film = delta - compliance F_m g(F / F_m) with the run's curve g up to its
+    largest force F_m: there is no exponent then, and the compliance is the run's, but for its error.
+
+    blank : what the run shows; held : True for no parameter at all, the compliance being that of the run
     """
 
     blank: FrameCurve | None = None
+    held: bool = False
 
     name: ClassVar[str] = "machine_compliance"
     title: ClassVar[str] = "compliance of the machine"
@@ -72,61 +101,87 @@ class MachineCompliance(Compliance):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.blank is not None:
-            own = {"coordinates": (_known(self.blank),), "title": "the frame of its blank run", "exact": True}
-            for name, value in own.items():
+            own = {"coordinates": () if self.held else (_measured(self.blank),), "title": "the frame of its blank run"}
+            for name, value in (own | {"exact": True}).items():
                 object.__setattr__(self, name, value)
 
+    @property
+    def known(self) -> bool:
+        return self.blank is not None
+
     def shown_by(self, measurement: Measurement) -> Self:
-        if measurement.blank is None:
-            return self
-        reached = float(np.max(np.abs(measurement.force)))
-        return replace(self, blank=_curve_of(measurement.blank.tobytes(), reached))
+        shown = None if measurement.blank is None else _curve_of(measurement.blank.tobytes())
+        return self if shown == self.blank else replace(self, blank=shown, held=self.held and shown is not None)
+
+    def as_held(self) -> Self:
+        return replace(self, held=self.known)
 
     def yielding(self, p: Array, force: Array) -> tuple[Array, Array]:
-        size = np.maximum(np.abs(force), SMALLEST)
         if self.blank is None:
+            size = np.maximum(np.abs(force), SMALLEST)
             secant = p[:, :1] * (size / NEWTON) ** (p[:, 1:2] - 1)
             return secant * force, p[:, 1:2] * secant
-        secant, bent = p[:, :1] * (size / NEWTON) ** (self.blank.exponent - 1), self.blank.bend * size
-        return secant * (1 + bent) * force, secant * (self.blank.exponent * (1 + bent) + bent)
+        compliance = np.full((len(force), 1), self.blank.compliance) if self.held else p[:, :1]
+        lost, slope = self.blank.at(force)
+        return compliance * lost, compliance * slope
 
 
-def _known(blank: FrameCurve) -> EffectParameter:
+def _measured(blank: FrameCurve) -> EffectParameter:
     """The compliance of a frame that was measured: no size that may be nothing, but a value with its error."""
-    declared = MachineCompliance.coordinates[0]
-    wide = (max(blank.compliance - FAR * blank.sd, 0.0), blank.compliance + FAR * blank.sd)
-    return replace(declared, prior=Normal(blank.compliance, blank.sd), bounds=wide, null=None)
+    value, sd = blank.compliance, blank.sd
+    clear = value > FAR * sd
+    return EffectParameter(
+        "compliance",
+        "m/N",
+        "travel lost per newton at the largest force of the blank run",
+        Normal(value, sd) if clear else HalfNormal(float(np.hypot(value, sd))),
+        (value - FAR * sd if clear else 0.0, value + FAR * sd),
+    )
 
 
 @lru_cache(maxsize=64)
-def _curve_of(run: bytes, reached: float) -> FrameCurve:
-    """From a blank run (M, 2), m and N, as bytes: least squares of
+def _curve_of(run: bytes) -> FrameCurve:
+    """From a blank run (M, 2), m and N, as bytes: means of its readings between forces, closer where these are small.
 
-        delta = delta_0 + lost y^exponent (1 + bend y) / (1 + bend),    y = F / reached.
-
-    ``reached`` N, the largest force of the test, is where the error counts. It is that of the scatter about the law,
-    neighbours of which are correlated (a frame that has play, or yields another way back), with priors of the exponent
-    and of the bend, and at least `REPEATED`.
+    The error of the compliance is that of half a loop, as where the frame has play or yields another way back, however
+    many readings show it; that of a mean by the scatter about the curve; and `REPEATED` of it.
     """
     travel, force = np.frombuffer(run).reshape(-1, 2).T
-    part, usual = force / reached, MachineCompliance.coordinates[1]
-    middle, spread = usual.prior.mean_sd
-    slope, start = np.polyfit(part, travel, 1)
+    most = float(np.max(force))
+    rows = _between_knots(force / most)
+    at, gone = (np.array([np.mean(v[some]) for some in rows]) for v in (force / most, travel))
+    resting = np.abs(force) <= AT_REST * most
+    begun = float(np.mean(travel[resting])) if np.any(resting) else _at_zero(at, gone)
+    gone = isotonic_regression(np.maximum(gone - begun, 0.0), weights=[some.size for some in rows]).x
+    top = float(gone[-1] + (gone[-1] - gone[-2]) / (at[-1] - at[-2]) * (1.0 - at[-1]))
+    loop = _half_of_a_loop(travel, int(np.argmax(force)), rows)
+    shape = (gone[at < 1] / max(top, RESOLVED)).tolist()
+    curve = FrameCurve((*at[at < 1].tolist(), 1.0), (*shape, 1.0), most, top / most, 0.0)
+    off = travel - begun - curve.compliance * curve.at(force)[0]
+    scatter = float(np.sqrt(np.mean(off**2) * len(rows) / off.size))
+    sd = float(np.sqrt(loop**2 + scatter**2 + (REPEATED * top) ** 2 + RESOLVED**2))
+    if top < CLEAR * sd:
+        curve = replace(curve, part=(1.0,), lost=(1.0,))
+    return replace(curve, sd=sd / most)
 
-    def off(p: Array, sd: float) -> Array:
-        way = np.sign(part) * np.abs(part) ** p[2] * (1 + p[3] * np.abs(part)) / (1 + p[3])
-        return np.append((p[0] + p[1] * way - travel) / sd, [(p[2] - middle) / spread, p[3] / BENT])
 
-    sd = lost = max(float(slope), 1e-15)
-    ends = ([-np.inf, 0.0, usual.bounds[0], LEAST_BENT], [np.inf, np.inf, usual.bounds[1], 4 * BENT])
-    p, scale = np.array([start, lost, middle, 0.0]), np.array([lost, lost, 1.0, 1.0])
-    for _ in range(REFITS):  # the scatter is that of the fit, and how much the priors of the shape count hangs on it
-        found = least_squares(off, p, bounds=ends, args=(sd,), x_scale=scale)
-        p, rest = found.x, off(found.x, 1.0)[:-2]
-        sd = max(float(np.sqrt(rest @ rest / max(rest.size - 4, 1))), 1e-9 * p[1], 1e-15)
-    rho = min(max(float(rest[1:] @ rest[:-1]) / max(float(rest @ rest), 1e-300), 0.0), REMEMBERS_AT_MOST)
-    slopes = np.asarray(found.jac)
-    lost_sd = float(np.sqrt(np.linalg.inv(slopes.T @ slopes)[1, 1] * (1 + rho) / (1 - rho)))
-    at_first = (NEWTON / reached) ** p[2] / (1 + p[3])
-    lost_sd = float(np.hypot(lost_sd, REPEATED * p[1]))
-    return FrameCurve(float(p[1] * at_first), lost_sd * float(at_first), float(p[2]), float(p[3]) / reached)
+def _between_knots(part: Array) -> list[Rows]:
+    """Numbers of the readings in each of the cells of a blank run whose forces are ``part`` (M,) of the largest."""
+    loaded = np.flatnonzero(part > AT_REST)
+    count = int(np.clip(loaded.size // 2, 2, KNOTS))
+    cell = np.minimum((np.sqrt(part[loaded]) * count).astype(int), count - 1)
+    found = [loaded[cell == k] for k in range(count) if np.any(cell == k)]
+    return found if len(found) > 1 else [loaded[:1], loaded[1:]]
+
+
+def _at_zero(at: Array, gone: Array) -> float:
+    """m, where the run began: the straight line through its first knots, at no force."""
+    near = max(int(np.count_nonzero(at <= NEAR_ZERO * at[0])), 2)
+    return float(np.polyval(np.polyfit(at[:near], gone[:near], 1), 0.0))
+
+
+def _half_of_a_loop(travel: Array, top: int, rows: list[Rows]) -> float:
+    """m, root mean square over the cells in which there are readings up to the ``top`` one, and after it; 0 without."""
+    both = [(travel[some[some <= top]], travel[some[some > top]]) for some in rows]
+    wide = [float(np.mean(a) - np.mean(b)) for a, b in both if a.size and b.size]
+    return 0.5 * float(np.sqrt(np.mean(np.square(wide)))) if wide else 0.0

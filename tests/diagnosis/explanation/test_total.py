@@ -180,11 +180,9 @@ def test_a_further_effect_that_nobody_fitted_is_not_excluded(monkeypatch: pytest
     assert [sum(p.values()) for p in found.values()] == pytest.approx([1.0, 1.0])
 
 
-def a_fall(base: Candidate, left: float, **more: Any) -> Foreign:
-    """One that leaves so much beyond noise of the `LEFT` squares that are beside the base."""
-    noise = base.residual.size - base.x.size
-    share = 1 - (left + noise - total.OF_A_FALL) / (LEFT + noise)
-    return Foreign(SUDDEN, base, more.pop("gain", 24.0), -1.0, share=share, **more)
+def leaving(base: Candidate, fall: float, tear: float) -> Any:
+    """By what a fall leaves beside the ``base``, and any other hypothesis by itself, parameters counted."""
+    return lambda c, trace=None: fall - base.x.size - total.OF_A_FALL if c is base else tear - c.x.size
 
 
 def test_a_fall_that_stays_is_at_most_twelve_times_less_probable_than_a_tear_that_leaves_its_trace() -> None:
@@ -194,8 +192,8 @@ def test_a_fall_that_stays_is_at_most_twelve_times_less_probable_than_a_tear_tha
     far = TWINS.behind
 
     def least(left: float, size: float, *others: Candidate) -> float:
-        search = cast(Search, SimpleNamespace(excess=lambda c: LEFT if c is base else 30.0))
-        fall = a_fall(base, left, size=size)
+        search = cast(Search, SimpleNamespace(squares=leaving(base, left, 30.0)))
+        fall = Foreign(SUDDEN, base, 24.0, -1.0, size=size)
         return total._like_a_tear(fall, total._tears(fall, [base, *others], search), lambda c: 3.0, search)
 
     for some in (torn, other):
@@ -220,12 +218,13 @@ def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_li
         question=SimpleNamespace(energy=None),
         sees_nothing=True,
         twins=lambda: frozenset(),
-        foreign=lambda *_: [a_fall(base, LEFT - 2 * behind * TWINS.behind, size=size)],
+        foreign=lambda *_: [Foreign(SUDDEN, base, 24.0, -1.0, size=size)],
         tell=lambda _: None,
     )
     grown = grown_of(case)
     for c in (case.null, base, torn):
         grown.add(c)
+    cast(Any, grown.search).squares = leaving(base, LEFT, LEFT + 2 * behind * TWINS.behind)
     joint = total.summed(grown).joint
     ratio = joint["friction", SUDDEN] / joint["friction+tearing", NOTHING]
     assert (ratio == pytest.approx(BELIEFS.apart)) is held
