@@ -176,7 +176,7 @@ def proposed(found: Diagnosis, measurement: Measurement) -> OnFilm | Kind | None
 
 def shown(found: Diagnosis) -> list[str]:
     """Effects that a blank run shows by itself."""
-    known = [e for e in found.null.hypothesis.effects if e.size.null is None]
+    known = [e for e in found.null.hypothesis.effects if e.known]
     return [e.name for e in known if e.size.prior.mean_sd[0] > CLEAR * e.size.prior.mean_sd[1]]
 
 
