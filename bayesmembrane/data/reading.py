@@ -253,10 +253,11 @@ def _blank_run(options: TomlSection, rig: Fixture, went: float, asked: float) ->
 
     Raises `DataError` where the film's travel is not read, and for a run that shows no frame that yields to a force.
     """
-    name = options.text("blank_run")
+    lifted = dict(rig.columns) == dict(Fixture.columns)
+    name = options.text("blank_run") if lifted or "blank_run" in options.table else None
     if name is None:
         return None, ()
-    if dict(rig.columns) != dict(Fixture.columns):
+    if not lifted:
         fault = f'a rig of the kind "{rig.name}" does not read its travel and force, which a blank run corrects'
         raise DataError(fault, options.where, "remove blank_run")
     path = Path(options.file).parent / name
