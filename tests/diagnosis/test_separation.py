@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from bayesmembrane.diagnosis.separation import apart
+from bayesmembrane.diagnosis.separation import Experiment, apart, in_order
+from bayesmembrane.next_test.further import FurtherTest, Kind
 
 
 def test_two_rivals_lie_as_far_apart_as_their_own_confusion_says() -> None:
@@ -25,3 +26,15 @@ def test_nothing_is_left_where_every_pair_is_parted() -> None:
 def test_rivals_that_say_the_same_are_not_apart() -> None:
     weight = np.random.default_rng(1).uniform(size=15)
     assert apart(weight, np.ones(15)) == 0.0
+
+
+@pytest.mark.parametrize(("blank", "first"), [(2.1, Kind.BLANK), (1.9, Kind.CYCLES), (float("inf"), Kind.BLANK)])
+def test_a_blank_run_that_helps_comes_first_for_it_costs_no_film(blank: float, first: Kind) -> None:
+    found = [
+        Experiment(FurtherTest(Kind.HOLD), 3.0),
+        Experiment(FurtherTest(Kind.BLANK), blank),
+        Experiment(FurtherTest(Kind.CYCLES), 4.0),
+    ]
+    ordered = in_order(found)
+    assert ordered[0].test.kind is first
+    assert [e.separation for e in ordered if e.test.kind is not Kind.BLANK] == [4.0, 3.0]
