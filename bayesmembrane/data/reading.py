@@ -247,7 +247,7 @@ def _noise(
 
 
 def _blank_run(options: TomlSection, rig: Fixture, went: float, asked: float) -> tuple[Array | None, tuple[str, ...]]:
-    """((M, 2) m and N of a run on a rigid dummy that the specimen file names, or None; a note on how far it goes).
+    """((M, 2) m and N of a run on a rigid dummy that the specimen file names, or None; a note on it).
 
     ``went`` m, ``asked`` N : the largest travel and force of the test.
 
@@ -275,5 +275,7 @@ def _blank_run(options: TomlSection, rig: Fixture, went: float, asked: float) ->
     if slope * asked > MOST_OF_TRAVEL * went:
         fault = f"the frame alone would go {1e3 * slope * asked:.3g} mm under the {asked:.3g} N of the test"
         raise DataError(f"{fault}, which goes {1e3 * went:.3g} mm with a film", str(path), "check the units of both")
-    short = f"the blank run ({path.name}) goes to {reached:.3g} N, the test to {asked:.3g} N: it is drawn on straight"
-    return np.column_stack([travel, pull]), (short,) if reached < BLANK_REACHES * asked else ()
+    note = f"the frame is that of {path.name}, {travel.size} readings up to {reached:.3g} N"
+    if reached < BLANK_REACHES * asked:
+        note += f"; the test goes to {asked:.3g} N: its curve is drawn on straight"
+    return np.column_stack([travel, pull]), (note,)

@@ -341,11 +341,11 @@ def test_a_blank_run_is_read_beside_the_curve_and_its_reach_is_told(files: Files
     (files.folder / "blank.csv").write_text(FRAME)
     m = files.read(specimen=BLANK)
     assert m.blank == pytest.approx(np.array([[0, 0], [2e-6, 0.25], [4e-6, 0.5], [7e-6, 0.9]]))
-    assert m.provenance.notes == ()
+    assert m.provenance.notes == ("the frame is that of blank.csv, 4 readings up to 0.9 N",)
     assert m.data_hash != files.read().data_hash
     stronger = files.read(CURVE.replace("0.95", "2.5"), BLANK)
     assert stronger.provenance.notes == (
-        "the blank run (blank.csv) goes to 0.9 N, the test to 2.5 N: it is drawn on straight",
+        "the frame is that of blank.csv, 4 readings up to 0.9 N; the test goes to 2.5 N: its curve is drawn on straight",
     )
 
 
