@@ -345,7 +345,8 @@ def test_a_blank_run_is_read_beside_the_curve_and_its_reach_is_told(files: Files
     assert m.data_hash != files.read().data_hash
     stronger = files.read(CURVE.replace("0.95", "2.5"), BLANK)
     assert stronger.provenance.notes == (
-        "the frame is that of blank.csv, 4 readings up to 0.9 N; the test goes to 2.5 N: its curve is drawn on straight",
+        "the frame is that of blank.csv, 4 readings up to 0.9 N; "
+        "the test goes to 2.5 N: its curve is drawn on straight",
     )
 
 
