@@ -19,6 +19,8 @@ from bayesmembrane.ground.text import file_name, showable
 
 ROUND_OFF = 1e-13
 """Of the largest deflection."""
+BLANK_READINGS = 3
+CLEAR, LEAST_TRAVEL = 3.0, 1e-7  # standard errors of a slope, and m: what is less is noise, and round-off
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,8 @@ class Measurement:
             raise DataError("a measurement needs at least one point")
         if self.time is not None and np.any(np.diff(self.time) <= 0):
             raise DataError("the time must increase from each point to the next")
+        if self.blank is not None:
+            check_blank_run(self.blank)
         if self.covariance is not None:
             check_covariance(self.covariance)
             self._set("force_sd", np.sqrt(np.diag(self.covariance)))
@@ -240,6 +244,19 @@ def without_round_off(deflection: ArrayLike) -> Array:
     size = float(np.max(np.abs(d), initial=0.0))
     d[np.abs(d) <= ROUND_OFF * size] = 0.0
     return d
+
+
+def check_blank_run(blank: Array, where: str | None = None) -> None:
+    """Raise `DataError` unless the (M, 2) m and N of a blank run say how a frame yields to a force that grows."""
+    travel, force = blank.T
+    if np.unique(force[force > 0]).size < BLANK_READINGS:
+        fault = f"a blank run needs readings at {BLANK_READINGS} different forces above zero at least"
+        raise DataError(fault, where, "load the rigid dummy up to the forces of the test, in the sense of the test")
+    (slope, _), ((variance, _), _) = np.polyfit(force, travel, 1, cov=True)
+    reached = float(np.max(force))
+    if slope * reached < -max(CLEAR * float(np.sqrt(variance)) * reached, LEAST_TRAVEL):
+        fault = "the crosshead goes the less the larger the force is, and a frame yields the other way"
+        raise DataError(fault, where, "change the sign of a column")
 
 
 def check_covariance(covariance: Array, where: str | None = None) -> None:

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from bayesmembrane.data.fixture import Fixture
-from bayesmembrane.data.measurement import Measurement, Provenance, Specimen, check_covariance
+from bayesmembrane.data.measurement import Measurement, Provenance, Specimen, check_blank_run, check_covariance
 from bayesmembrane.data.motion import Motion, contradicted
 from bayesmembrane.data.settings import TomlSection, load_specimen
 from bayesmembrane.data.tables import TextTable, parse_table, read_matrix, read_text
@@ -27,8 +27,6 @@ THINNEST = 1e-8  # m
 RIG_SIZES = (1e-6, 1.0)  # m
 LARGEST_LIFT = 20.0  # largest deflection relative to the size of the rig
 LEAST_SD = 1e-12  # N
-BLANK_READINGS = 3
-CLEAR, LEAST_TRAVEL = 3.0, 1e-7  # standard errors of a slope, and m: what is less is noise, and round-off
 MOST_OF_TRAVEL = 0.8  # of the test's: what yields as much is no frame, but a wrong unit, or the film itself
 BLANK_REACHES = 0.8  # of the largest force of the test: below that it is told, for the frame is extrapolated
 _USUAL = {FORCE: "N", STRESS: "MPa", LENGTH: "mm"}
@@ -263,19 +261,13 @@ def _blank_run(options: TomlSection, rig: Fixture, went: float, asked: float) ->
     path = Path(options.file).parent / name
     table = parse_table(read_text(path), str(path))
     columns, _ = curve_columns(table)
-    travel, pull = columns["deflection"], columns["force"]
-    if np.unique(pull[pull > 0]).size < BLANK_READINGS:
-        fault = f"a blank run needs readings at {BLANK_READINGS} different forces above zero at least"
-        raise DataError(fault, str(path), "load the rigid dummy up to the forces of the test, in the sense of the test")
-    (slope, _), ((variance, _), _) = np.polyfit(pull, travel, 1, cov=True)
-    reached = float(np.max(pull))
-    if slope * reached < -max(CLEAR * float(np.sqrt(variance)) * reached, LEAST_TRAVEL):
-        fault = "the crosshead goes the less the larger the force is, and a frame yields the other way"
-        raise DataError(fault, str(path), "change the sign of a column")
+    blank = np.column_stack([columns["deflection"], columns["force"]])
+    check_blank_run(blank, str(path))
+    slope, reached = float(np.polyfit(blank[:, 1], blank[:, 0], 1)[0]), float(np.max(blank[:, 1]))
     if slope * asked > MOST_OF_TRAVEL * went:
         fault = f"the frame alone would go {1e3 * slope * asked:.3g} mm under the {asked:.3g} N of the test"
         raise DataError(f"{fault}, which goes {1e3 * went:.3g} mm with a film", str(path), "check the units of both")
-    note = f"the frame is that of {path.name}, {travel.size} readings up to {reached:.3g} N"
+    note = f"the frame is that of {path.name}, {len(blank)} readings up to {reached:.3g} N"
     if reached < BLANK_REACHES * asked:
         note += f"; the test goes to {asked:.3g} N: its curve is drawn on straight"
-    return np.column_stack([travel, pull]), (note,)
+    return blank, (note,)

@@ -171,7 +171,7 @@ def _between_knots(part: Array) -> list[Rows]:
     count = int(np.clip(loaded.size // 2, 2, KNOTS))
     cell = np.minimum((np.sqrt(part[loaded]) * count).astype(int), count - 1)
     found = [loaded[cell == k] for k in range(count) if np.any(cell == k)]
-    return found if len(found) > 1 else [loaded[:1], loaded[1:]]
+    return found if len(found) > 1 else np.array_split(loaded[np.argsort(part[loaded])], 2)
 
 
 def _at_zero(at: Array, gone: Array) -> float:

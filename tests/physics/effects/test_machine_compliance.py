@@ -109,6 +109,13 @@ def test_a_rigid_frame_is_one_that_hardly_yields(travel: np.ndarray) -> None:
     assert held == pytest.approx(plain, rel=1e-3)
 
 
+def test_a_few_readings_in_any_order_are_a_curve() -> None:
+    force = np.array([1.9, 1.5, 2.0, 1.7])
+    found = frame(hypothesis("gent").with_frame(measured_with(np.column_stack([1e-4 * force + 3e-5, force]))))
+    lost, _ = found.yielding(np.array([[1e-4]]), np.array([[0.5, 2.0]]))
+    assert lost == pytest.approx(np.array([[0.5e-4, 2e-4]]), rel=0.05)
+
+
 def test_play_and_another_way_back_make_the_error_larger() -> None:
     blank = run(np.random.default_rng(3), 1e-6)
     loose = blank + np.outer(np.where(np.arange(80) < 40, 0.0, 3e-5), [1.0, 0.0])
