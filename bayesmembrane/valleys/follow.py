@@ -87,6 +87,8 @@ def valleys_of(
     if not 0 < rise < np.inf:
         raise SettingsError(f"the loss cannot rise by {rise:g} of itself", remedy="give a positive number, such as 0.1")
     surfaces = [Surface(hypothesis, m, solve) for m in measurements]
+    if draws is not None:
+        draws = [d if d is None else _in_question(hypothesis, m, d) for d, m in zip(draws, measurements, strict=True)]
     found = []
     for i, surface in enumerate(surfaces):
         with within(str(i)):
@@ -96,6 +98,12 @@ def valleys_of(
         found = [replace(v, coarse=g) for v, g in zip(found, coarse, strict=True)]
     pairs = tuple(between(a, b) for a, b in combinations(found, 2))
     return Valleys(hypothesis, tuple(found), pairs)
+
+
+def _in_question(hypothesis: Hypothesis, measurement: Measurement, draws: Array) -> Array:
+    """Coordinates (B, k) of a run without those of what was known of the rig, which a surface holds."""
+    claim = hypothesis.with_frame(measurement)
+    return draws[:, [p.name not in claim.known for p in claim.parameters[: draws.shape[1]]]]
 
 
 def _valley(surface: Surface, rise: float, seed: int, draws: Array | None) -> Valley:

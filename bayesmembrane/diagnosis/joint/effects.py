@@ -26,6 +26,10 @@ class EffectInTests(Effect):
     stage: ClassVar[str] = ""
 
     @property
+    def known(self) -> bool:
+        return all(effect.known for _, effect in self.parts)
+
+    @property
     def sizes(self) -> tuple[int, ...]:
         return tuple(dict.fromkeys(begin for begin, _ in self.places.values()))
 

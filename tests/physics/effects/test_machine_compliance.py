@@ -12,10 +12,13 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.explanation.case import Question
+from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.physics.effects.machine_compliance import MachineCompliance
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import Hypothesis, from_settings, hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.valleys.beside import valleys_beside
+from bayesmembrane.valleys.follow import valleys_of
 from bayesmembrane.words.diagnosis import document
 from bayesmembrane.words.hypothesis import spoken
 from tests.generator.datasets import generate
@@ -174,3 +177,16 @@ def test_what_a_blank_run_shows_is_not_asked_of_the_film(tmp_path: Path) -> None
     assert c1.sd is not None
     assert abs(c1.value - truth) < 4.4 * c1.sd
     assert abs(plain.parameters["neo_hookean.c1"].value - truth) > 10 * c1.sd
+
+
+def test_a_valley_holds_the_frame_and_takes_the_draws_of_a_run_that_has_it() -> None:
+    claim, plain = hypothesis("neo_hookean"), measured_with(run(np.random.default_rng(5), 1e-6))
+    whole = claim.with_frame(plain)
+    rng, at = np.random.default_rng(2), np.array([2.9, whole.parameters[1].prior.mean_sd[0], -6.0])
+    force = Forward(whole, plain, plain.deflection)(at[None, :2]).force[0]
+    m = replace(plain, force=force + 1e-3 * rng.standard_normal(force.size))
+    draws = at + np.array([1e-3, whole.parameters[1].prior.mean_sd[1], 0.1]) * rng.standard_normal((400, 3))
+    found = valleys_of([m], claim, draws=[draws])
+    assert found.ranges[0].hypothesis.held.parameters == claim.parameters
+    with pytest.raises(SettingsError, match="no effects to be left out"):
+        valleys_beside(m, claim.with_frame(m))
