@@ -212,7 +212,8 @@ def _test(m: Measurement, test: FurtherTest, deflection: Array) -> Measurement:
     if m.path.time is not None:
         moving = np.maximum(steps, 1e-9) / (test.speed * _speed(m))
         time = np.cumsum(np.where(steps > 0, moving, np.maximum(moving, test.hold / WAIT)))
-    return Measurement(deflection, np.ones(deflection.size), m.rig, m.specimen, time=time, full_range=m.full_range)
+    force, reach = np.ones(deflection.size), m.full_range
+    return Measurement(deflection, force, m.rig, m.specimen, time=time, full_range=reach, blank=m.blank)
 
 
 def _speed(m: Measurement) -> float:
