@@ -236,8 +236,7 @@ def valleys(
     Of more than `thinning.MOST` readings so many are used: a valley is mapped by thousands of films.
     """
     measurement = of_few(measurement, MOST)
-    claim = claim.on(measurement)
-    how = run_valleys if all(e.known for e in claim.effects) else valleys_beside
+    how = valleys_beside if claim.with_frame(measurement).in_question else run_valleys
     settings = {"seed": work.seed, "ends": list(ends), "rise": rise}
     what = asked("valleys", how, [measurement], [claim], settings)
     if (stored := held("valleys", what, work.out)) is not None:

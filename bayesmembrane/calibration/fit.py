@@ -143,7 +143,7 @@ def fit(
     Raises `SettingsError` for fewer points than parameters, a loss that is unknown or lacks a noise, and a material
     whose films cannot reach the data.
     """
-    claim = hypothesis.with_frame(measurement).on(measurement)
+    claim = hypothesis.with_frame(measurement)
     found = _fitted(measurement, claim.held, loss, seed, [np.asarray(s, dtype=float) for s in starts], solve)
     return found if claim.held == claim else _released(found, claim, measurement, solve)
 
@@ -179,7 +179,7 @@ def _released(found: Fit, claim: Hypothesis, measurement: Measurement, solve: So
     The covariance is s^2 (J^T J + s^2 P)^-1, with 1 / sd^2 of what is known on the diagonal of P.
     """
     objective = Objective(claim, measurement, found.loss, solve)
-    known = np.array([p.name in claim.known for p in objective.parameters])
+    known = np.array([p.name in claim.known_coordinates for p in objective.parameters])
     values, sds = np.array([p.prior.mean_sd for p in objective.parameters]).T
     x = np.where(known, values, 0.0)
     x[~known] = found.coordinates

@@ -20,7 +20,7 @@ from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.ground.registry import component
 
 MOTION = ("deflection", "time", "across", "said_leg", "said_cycle")
-OPTIONAL = ("time", "force_sd", "covariance", "across", "blank")
+OPTIONAL = ("time", "force_sd", "covariance", "across", "blank_run")
 
 
 def inference_data(measurement: Measurement, walk: Mapping[str, Array] | None = None, **groups: Any) -> Any:
@@ -44,7 +44,7 @@ def inference_data(measurement: Measurement, walk: Mapping[str, Array] | None = 
         **groups,
         observed_data={"force": measurement.force},
         constant_data=constant,
-        dims={**dims, "covariance": ["point", "point_2"], "blank": ["blank_point", "blank_column"]},
+        dims={**dims, "covariance": ["point", "point_2"], "blank_run": ["blank_point", "blank_column"]},
     )
     p = measurement.provenance
     about = {

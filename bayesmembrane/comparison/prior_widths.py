@@ -86,7 +86,7 @@ def prior_widths(
     worth = min(1.0, effective / len(draws))
     found = []
     for i, p in enumerate(parameters):
-        if p.name in posterior.hypothesis.known:  # its width is no choice
+        if p.name in posterior.hypothesis.known_coordinates:  # its width is no choice
             continue
         for factor in factors:
             wider = scaled(p.prior, factor)

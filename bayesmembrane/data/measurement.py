@@ -20,7 +20,7 @@ from bayesmembrane.ground.text import file_name, showable
 ROUND_OFF = 1e-13
 """Of the largest deflection."""
 BLANK_READINGS = 3
-CLEAR, LEAST_TRAVEL = 3.0, 1e-7  # standard errors of a slope, and m: what is less is noise, and round-off
+FALLS, LEAST_TRAVEL = 3.0, 1e-7  # standard errors of a slope, and m: a fall by less is noise, and round-off
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Measurement:
     motion : how the disc was moved, also past points that were left out; the film remembers those too
     places : (N,) where the points lie on it
     across : (N,) stretch across the direction of pull where it was measured (biaxial tests), or None
-    blank : (M, 2) m and N, how far the crosshead went on a rigid dummy under which force: the frame alone; or None
+    blank_run : (M, 2) m and N, how far the crosshead went on a rigid dummy under which force: the frame alone; or None
 
     Raises `DataError` for shapes that do not agree, values that are not finite, a standard deviation that is not
     positive, and a covariance that is not symmetric and positive definite. With a covariance, `force_sd` is the root
@@ -94,7 +94,7 @@ class Measurement:
     motion: Motion | None = None
     places: NDArray[np.int64] | None = None
     across: Array | None = None
-    blank: Array | None = None
+    blank_run: Array | None = None
 
     def __post_init__(self) -> None:
         n = np.size(self.deflection)
@@ -102,13 +102,13 @@ class Measurement:
         for name in ("deflection", "force", "time", "force_sd", "across"):
             self._freeze(name, (n,))
         self._freeze("covariance", (n, n))
-        self._freeze("blank", (0 if self.blank is None else np.size(self.blank) // 2, 2))
+        self._freeze("blank_run", (0 if self.blank_run is None else np.size(self.blank_run) // 2, 2))
         if n == 0:
             raise DataError("a measurement needs at least one point")
         if self.time is not None and np.any(np.diff(self.time) <= 0):
             raise DataError("the time must increase from each point to the next")
-        if self.blank is not None:
-            check_blank_run(self.blank)
+        if self.blank_run is not None:
+            check_blank_run(self.blank_run)
         if self.covariance is not None:
             check_covariance(self.covariance)
             self._set("force_sd", np.sqrt(np.diag(self.covariance)))
@@ -174,8 +174,8 @@ class Measurement:
             digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
         if self.across is not None:
             digest.update(np.ascontiguousarray(self.across).tobytes())
-        if self.blank is not None:
-            digest.update(b"blank" + np.ascontiguousarray(self.blank).tobytes())
+        if self.blank_run is not None:
+            digest.update(b"blank run" + np.ascontiguousarray(self.blank_run).tobytes())
         if self.motion is not None:
             for array in (self.motion.deflection, self.motion.time, self.on_path.astype(float)):
                 digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
@@ -254,7 +254,7 @@ def check_blank_run(blank: Array, where: str | None = None) -> None:
         raise DataError(fault, where, "load the rigid dummy up to the forces of the test, in the sense of the test")
     (slope, _), ((variance, _), _) = np.polyfit(force, travel, 1, cov=True)
     reached = float(np.max(force))
-    if slope * reached < -max(CLEAR * float(np.sqrt(variance)) * reached, LEAST_TRAVEL):
+    if slope * reached < -max(FALLS * float(np.sqrt(variance)) * reached, LEAST_TRAVEL):
         fault = "the crosshead goes the less the larger the force is, and a frame yields the other way"
         raise DataError(fault, where, "change the sign of a column")
 

@@ -57,7 +57,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     _check_size(deflection, table, rig)
     single = _stated(options, rig, specimen.thickness)
     sd, covariance, covariance_file = _noise(options, single, found.get("force_sd"), force.size)
-    blank, blank_notes = _blank_run(options, rig, float(np.max(np.abs(deflection))), float(np.max(np.abs(force))))
+    blank_run, blank_notes = _blank_run(options, rig, float(np.max(np.abs(deflection))), float(np.max(np.abs(force))))
     origin = [options.text("origin"), root.section("origin", required=False).all_text()]
     understood = root.section("import", required=False)  # how an export was understood, for people
     understood.all_text()
@@ -85,7 +85,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
         covariance,
         provenance,
         across=across,
-        blank=blank,
+        blank_run=blank_run,
     )
     return of_few(measured if motion is None else replace(measured, motion=motion, places=np.arange(force.size)), READ)
 

@@ -61,7 +61,7 @@ def one_after_another(tests: Sequence[Measurement], rest: float = 0.0) -> Measur
         full_range=full_range,
         motion=Motion(deflection, time, full_range, None, *said),
         places=places,
-        blank=next((t.blank for t in tests if t.blank is not None), None),
+        blank_run=next((t.blank_run for t in tests if t.blank_run is not None), None),
     )
 
 
@@ -118,6 +118,11 @@ def _after(last: _Stations, before: Measurement, test: Measurement, rest: float)
     return _Stations(way, time, places, last.end)
 
 
+def _differ(a: Array | None, b: Array | None) -> bool:
+    """True if there are both, and not the same."""
+    return a is not None and b is not None and not np.array_equal(a, b)
+
+
 def _check(first: Measurement, test: Measurement, number: int) -> None:
     where = test.provenance.curve or f"test {number}"
     if repr(test.rig) != repr(first.rig):
@@ -132,7 +137,7 @@ def _check(first: Measurement, test: Measurement, number: int) -> None:
             f"{1e6 * first.specimen.thickness:g} um in the test before: they are not the same",
             where,
         )
-    if test.blank is not None and first.blank is not None and not np.array_equal(test.blank, first.blank):
+    if _differ(test.blank_run, first.blank_run):
         raise DataError("tests of the same film have one frame, and this one has another blank run", where)
     if (test.time is None) != (first.time is None):
         raise DataError("of tests made one after another all or none need times", where, "add a column time_s, or none")

@@ -30,10 +30,12 @@ def write_measurement(measurement: Measurement, curve_csv: str | Path, specimen_
         beside = specimen_toml.parent / f"{curve_csv.stem}_covariance.csv"
         options["covariance"] = beside.name
         texts[beside] = "".join(",".join(f"{v:.17g}" for v in row) + "\n" for row in measurement.covariance)
-    if measurement.blank is not None:
+    if measurement.blank_run is not None:
         beside = specimen_toml.parent / f"{curve_csv.stem}_blank_run.csv"
         options["blank_run"] = beside.name
-        texts[beside] = csv_text({"deflection_mm": 1e3 * measurement.blank[:, 0], "force_N": measurement.blank[:, 1]})
+        texts[beside] = csv_text(
+            {"deflection_mm": 1e3 * measurement.blank_run[:, 0], "force_N": measurement.blank_run[:, 1]}
+        )
     lengths = {f"{k}_mm": float(f"{1e3 * v:.15g}") for k, v in measurement.rig.lengths.items()}
     content = {
         "specimen": {

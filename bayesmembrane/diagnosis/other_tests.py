@@ -93,7 +93,7 @@ def check(measurement: Measurement, other: Measurement, scatter: float) -> None:
             "--predict",
             "predict tests of the same kind",
         )
-    if other.blank is not None and not np.array_equal(other.blank, measurement.blank):  # type: ignore[arg-type]
+    if other.blank_run is not None and not np.array_equal(other.blank_run, measurement.blank_run):  # type: ignore[arg-type]
         raise SettingsError(
             f"the test {_name(other)} has another blank run than the one that was diagnosed",
             "--predict",

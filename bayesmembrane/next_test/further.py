@@ -213,7 +213,7 @@ def _test(m: Measurement, test: FurtherTest, deflection: Array) -> Measurement:
         moving = np.maximum(steps, 1e-9) / (test.speed * _speed(m))
         time = np.cumsum(np.where(steps > 0, moving, np.maximum(moving, test.hold / WAIT)))
     force, reach = np.ones(deflection.size), m.full_range
-    return Measurement(deflection, force, m.rig, m.specimen, time=time, full_range=reach, blank=m.blank)
+    return Measurement(deflection, force, m.rig, m.specimen, time=time, full_range=reach, blank_run=m.blank_run)
 
 
 def _speed(m: Measurement) -> float:

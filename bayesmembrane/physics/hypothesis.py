@@ -67,13 +67,18 @@ class Hypothesis:
         return self if effects == self.effects else replace(self, effects=effects)
 
     def with_frame(self, measurement: Measurement) -> Self:
-        """The same with the frame of a measurement that has a blank run: what is known is not in question."""
-        if measurement.blank is None or any(isinstance(e, Compliance) for e in self.effects):
-            return self
+        """`on` it, with the frame that its blank run shows, if there is one: what is known is not in question."""
+        if measurement.blank_run is None or any(isinstance(e, Compliance) for e in self.effects):
+            return self.on(measurement)
         return replace(self, effects=(*self.effects, component("effects", FRAME)())).on(measurement)
 
     @property
-    def known(self) -> frozenset[str]:
+    def in_question(self) -> tuple[Effect, ...]:
+        """The effects that no other run of the rig has measured."""
+        return tuple(e for e in self.effects if not e.known)
+
+    @property
+    def known_coordinates(self) -> frozenset[str]:
         """Full names of the coordinates of what another run of the rig has measured."""
         return frozenset(f"{e.name}.{p.name}" for e in self.effects if e.known for p in e.coordinates)
 

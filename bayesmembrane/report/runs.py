@@ -212,7 +212,7 @@ class Shown:
         if not len(self.prior):
             return found
         for i, p in enumerate(self.hypothesis.parameters[: self.hypothesis.curve_size]):
-            if p.name in self.hypothesis.known:  # what was measured before is known that well
+            if p.name in self.hypothesis.known_coordinates:  # what was measured before is known that well
                 continue
             wide = float(np.subtract(*np.quantile(self.prior[:, i], (0.95, 0.05))))
             ratio = float(np.subtract(*np.quantile(self.x[:, i], (0.95, 0.05)))) / wide if wide > 0 else 0.0

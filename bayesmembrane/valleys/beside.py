@@ -55,7 +55,8 @@ def valleys_beside(
 
     Raises `SettingsError` if there are no effects, and what `valleys` raises.
     """
-    if all(e.known for e in hypothesis.effects):
+    hypothesis = hypothesis.with_frame(measurement)
+    if not hypothesis.in_question:
         raise SettingsError(f"{hypothesis.label()} has no effects to be left out", remedy="name some, or ask `valleys`")
     plain = replace(hypothesis, effects=tuple(e for e in hypothesis.effects if e.known))
     with within("without"):

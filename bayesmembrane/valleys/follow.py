@@ -103,7 +103,7 @@ def valleys_of(
 def _in_question(hypothesis: Hypothesis, measurement: Measurement, draws: Array) -> Array:
     """Coordinates (B, k) of a run without those of what was known of the rig, which a surface holds."""
     claim = hypothesis.with_frame(measurement)
-    return draws[:, [p.name not in claim.known for p in claim.parameters[: draws.shape[1]]]]
+    return draws[:, [p.name not in claim.known_coordinates for p in claim.parameters[: draws.shape[1]]]]
 
 
 def _valley(surface: Surface, rise: float, seed: int, draws: Array | None) -> Valley:

@@ -27,7 +27,7 @@ from bayesmembrane.words.diagnosis import (
     percent,
     set_title,
     smallest_sizes,
-    too_far,
+    why_none,
     why_not,
 )
 from bayesmembrane.words.hypothesis import effect_title, spoken
@@ -303,7 +303,7 @@ def _unknown(course: Course) -> str:
         return f"{start if d.firm else ''}nothing{further} is named, for {why_not(d)}"
     if d.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{start}none of the energies has this form"
-    if far := too_far(d):
+    if far := why_none(d):
         return f"{start}nothing{further} is named, for {far}"
     return f"{start}too many explanations fit, and nothing{further} is named"
 

@@ -21,7 +21,6 @@ from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.ground.registry import components
-from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.words.hypothesis import effect_title, material_title, spoken
 from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.next_test import spoken_test
@@ -61,7 +60,8 @@ def document(found: Diagnosis) -> dict[str, Any]:
         },
         "ranking": [
             {
-                "effect": _in_question(j.candidate.hypothesis) or j.candidate.hypothesis.material.name,
+                "effect": "+".join(e.name for e in j.candidate.hypothesis.in_question)
+                or j.candidate.hypothesis.material.name,
                 "material": j.candidate.hypothesis.material.name,
                 "probability": j.probability,
                 "log_bayes_factor": j.gain,
@@ -103,14 +103,9 @@ def document(found: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _in_question(hypothesis: Hypothesis) -> str:
-    """Names of the effects that no other run of the rig has measured, joined by "+"."""
-    return "+".join(e.name for e in hypothesis.effects if not e.known)
-
-
 def _not_known(candidate: Candidate) -> dict[str, float]:
     """Parameters of the effects of a candidate but those that another run of the rig has measured."""
-    return {k: v for k, v in candidate.parameters.items() if k not in candidate.hypothesis.known}
+    return {k: v for k, v in candidate.parameters.items() if k not in candidate.hypothesis.known_coordinates}
 
 
 def sentence(found: Diagnosis) -> str:
@@ -446,7 +441,7 @@ def _unknown(found: Diagnosis) -> str:
         )
     if found.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
         return f"{_misses(found)}no effect is needed, and none of the energies has this form. {shape}"
-    if far := too_far(found):
+    if far := why_none(found):
         return f"{_misses(found)}{_certain(found)}what fits best is no explanation, for {far}. {shape}"
     return (
         f"{_misses(found)}{_certain(found)}more explanations are about as probable than this measurement can part."
@@ -454,7 +449,7 @@ def _unknown(found: Diagnosis) -> str:
     )
 
 
-def too_far(found: Diagnosis) -> str:
+def why_none(found: Diagnosis) -> str:
     """Why the most probable explanation is none, as a clause: which forms are too far off; "" if it may be one."""
     fitted = {set_name(j.candidate, found.null.names): j for j in reversed(found.ranking)}
     told = next((fitted[name] for name in found.probabilities.effects if name in fitted), None)

@@ -340,7 +340,7 @@ FRAME = "deflection_um,force_mN\n0,0\n2,250\n4,500\n7,900\n"
 def test_a_blank_run_is_read_beside_the_curve_and_its_reach_is_told(files: Files) -> None:
     (files.folder / "blank.csv").write_text(FRAME)
     m = files.read(specimen=BLANK)
-    assert m.blank == pytest.approx(np.array([[0, 0], [2e-6, 0.25], [4e-6, 0.5], [7e-6, 0.9]]))
+    assert m.blank_run == pytest.approx(np.array([[0, 0], [2e-6, 0.25], [4e-6, 0.5], [7e-6, 0.9]]))
     assert m.provenance.notes == ("the frame is that of blank.csv, 4 readings up to 0.9 N",)
     assert m.data_hash != files.read().data_hash
     stronger = files.read(CURVE.replace("0.95", "2.5"), BLANK)

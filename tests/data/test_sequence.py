@@ -124,11 +124,11 @@ def test_files_are_read_one_after_another_at_the_command_line(tmp_path: Path) ->
 
 def test_tests_of_one_rig_share_its_blank_run() -> None:
     frame = np.array([[0.0, 0.0], [1e-6, 0.5], [2e-6, 1.0], [3e-6, 1.5]])
-    first, second = (measured(UP, None, blank=frame) for _ in range(2))
+    first, second = (measured(UP, None, blank_run=frame) for _ in range(2))
     joined = one_after_another([first, second])
-    assert joined.blank is not None
-    assert np.array_equal(joined.blank, frame)
-    assert np.array_equal(joined.select(np.arange(5)).blank, frame)  # type: ignore[arg-type]
+    assert joined.blank_run is not None
+    assert np.array_equal(joined.blank_run, frame)
+    assert np.array_equal(joined.select(np.arange(5)).blank_run, frame)  # type: ignore[arg-type]
 
 
 def _halves(whole: Measurement) -> tuple[slice, slice]:

@@ -20,10 +20,10 @@ def test_what_is_written_is_read_back(tmp_path: Path, noise: str) -> None:
         "covariance": {"covariance": np.array([[2.0, 1 / 3, 0], [1 / 3, 1, 0], [0, 0, 1]])},
     }[noise]
     blank = None if noise == "sd" else np.array([[0.0, 1e-9], [1e-6, 0.1], [2e-6, 0.2], [1 / 3e5, 1 / 3]])
-    m = annulus_curve(x, time=np.array([0.0, 1.0, 2.5]), blank=blank, **given_noise)
+    m = annulus_curve(x, time=np.array([0.0, 1.0, 2.5]), blank_run=blank, **given_noise)
     write_measurement(m, tmp_path / "new" / "a.csv", tmp_path / "new" / "a.toml")
     again = read_measurement(tmp_path / "new" / "a.csv", tmp_path / "new" / "a.toml")
-    for name in ("deflection", "force", "time", "force_sd", "covariance", "blank"):
+    for name in ("deflection", "force", "time", "force_sd", "covariance", "blank_run"):
         before, after = getattr(m, name), getattr(again, name)
         assert (before is None) == (after is None)
         assert before is None or np.allclose(before, after, rtol=1e-14, atol=0)

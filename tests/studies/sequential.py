@@ -52,11 +52,11 @@ CLEAR = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """What was done to a film so far, and what is in it; ``blank``: what a run without it showed of the frame."""
+    """What was done to a film so far, and what is in it; ``blank_run``: what a run without it showed of the frame."""
 
     data: Dataset
     path: Way
-    blank: np.ndarray | None = None
+    blank_run: np.ndarray | None = None
 
     def measurement(self, rng: np.random.Generator) -> Measurement:
         """All of it as an instrument writes it."""
@@ -71,7 +71,7 @@ class Film:
             force_N=noise.rounded(force),
         )
         with tempfile.TemporaryDirectory() as folder:
-            return replace(read_measurement(*told.write(Path(folder))), blank=self.blank)
+            return replace(read_measurement(*told.write(Path(folder))), blank_run=self.blank_run)
 
     def with_blank_run(self, rng: np.random.Generator) -> Film:
         """The same after the frame was pulled without a film, up and down, as hard as the film pulled it."""
@@ -82,7 +82,7 @@ class Film:
         noise = Noise(**self.data.truth["noise"])
         travel = travel + TRAVEL_SD * rng.standard_normal(force.size)
         read = force + noise.sd * rng.standard_normal(force.size)
-        return replace(self, blank=np.column_stack([travel, read]))
+        return replace(self, blank_run=np.column_stack([travel, read]))
 
     def _at_work(self) -> dict[str, Active]:
         """The effects, as large on the first test as they were: laws that end with the way know the longer one."""
@@ -155,9 +155,13 @@ def run_case(case: Case) -> Row:
             break
         row["tests"].append(trial.value if isinstance(trial, Kind) else trial.test.kind.value)
         rng = np.random.default_rng([case.seed, 91, turn])
+        if isinstance(trial, Kind):
+            film = film.with_blank_run(rng)
+            measurement = replace(measurement, blank_run=film.blank_run)
+            continue
         try:
-            film = film.with_blank_run(rng) if isinstance(trial, Kind) else film.moved(trial)
-            measurement = replace(measurement, blank=film.blank) if isinstance(trial, Kind) else film.measurement(rng)
+            film = film.moved(trial)
+            measurement = film.measurement(rng)
         except NoSolutionError as error:
             return row | {"error": str(error)}
     return row

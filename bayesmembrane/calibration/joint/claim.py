@@ -46,7 +46,7 @@ class JointTest:
                 f'a test cannot be called "{self.label}"',
                 remedy=f"use letters, digits, - and _, as in strip-1, and not {WALK}",
             )
-        object.__setattr__(self, "hypothesis", self.hypothesis.on(self.measurement).with_frame(self.measurement))
+        object.__setattr__(self, "hypothesis", self.hypothesis.with_frame(self.measurement))
 
 
 @dataclass(frozen=True, eq=False)

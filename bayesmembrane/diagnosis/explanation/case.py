@@ -176,7 +176,7 @@ def opened(measurement: Measurement, question: Question, seed: int, solve: Solve
 
     Raises `SettingsError` if there are too few points to tell a misfit from noise, or no film reaches the data.
     """
-    question = replace(question, hypothesis=question.hypothesis.on(measurement).with_frame(measurement))
+    question = replace(question, hypothesis=question.hypothesis.with_frame(measurement))
     hypothesis = question.hypothesis
     _check_size(measurement, question)
     smooth = smooth_reference(measurement)

@@ -172,10 +172,11 @@ def summed(grown: Grown) -> Total:
         energies[energy] += q
     for name, q in _untried(grown, every, joint).items():
         joint[name, NOTHING] += q
+    worse = {id(c): _worse(grown, c) for c in every}
     for i, (c, kind, _) in enumerate(terms):
         if kind != NOTHING or p[i] < NEGLIGIBLE or _described(grown, c, given):  # what has nothing can lose nothing
             continue
-        if carried(c, given) or _worse(grown, c):
+        if carried(c, given) or worse[id(c)]:
             name, moved = set_name(c, given), BELIEFS.another_law * float(p[i])
             joint[name, NOTHING] -= moved
             joint[name, ANOTHER_LAW] += moved
@@ -187,7 +188,7 @@ def summed(grown: Grown) -> Total:
         if kind == NOTHING:
             key = set_name(c, given), NOTHING
             of_set = q / joint[key] if q > 0 else 0.0
-            judged.append(_judged(grown, c, of_set * both[key], grown.believed(c)))
+            judged.append(_judged(grown, c, of_set * both[key], worse[id(c)]))
     judged.sort(key=lambda j: -j.probability)
     marginal = Probabilities(_summed_out(both, 0), _falling(BELIEFS.energies_flattened(energies)), _summed_out(both, 1))
     return Total(tuple(judged), marginal, both, _summed_out(flat, 0), tuple(found))
@@ -341,7 +342,7 @@ def _raised(grown: Grown, weights: Mapping[int, float], others: Mapping[Key, flo
 
 def _plausible(candidate: Candidate, search: Weighing) -> bool:
     """True if every effect of it is of a size that occurs, is there at all, and away from its bound."""
-    for e in (e for e in candidate.hypothesis.effects if not e.known):
+    for e in candidate.hypothesis.in_question:
         for i, expected in zip(e.sizes, search.expected_sizes(e).tolist(), strict=True):
             p, name = e.coordinates[i], f"{e.name}.{e.coordinates[i].name}"
             size = abs(candidate.parameters[name] - (p.null or 0.0))
@@ -388,7 +389,7 @@ def _joined(names: frozenset[str]) -> str:
     return "+".join(sorted(names)) or NOTHING
 
 
-def _judged(grown: Grown, c: Candidate, probability: float, believed: float) -> Judged:
+def _judged(grown: Grown, c: Candidate, probability: float, worse: bool) -> Judged:
     null = _null(grown)
     left, before = grown.search.excess(c), grown.search.excess(null)
     n = c.residual.size
@@ -398,6 +399,6 @@ def _judged(grown: Grown, c: Candidate, probability: float, believed: float) -> 
         c.log_evidence - null.log_evidence,
         min(left / before, 1.0) if before > 0 else 0.0,
         (left + n - c.x.size) / max(n - c.x.size, 1),
-        believed,
-        _worse(grown, c),
+        grown.believed(c),
+        worse,
     )

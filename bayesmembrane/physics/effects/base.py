@@ -163,7 +163,7 @@ class Effect(ABC):
         return replace(self, reach=reach)
 
     def shown_by(self, measurement: Measurement) -> Self:
-        """The same with what another run of the rig says of it (`Measurement.blank`), and no other."""
+        """The same with what another run of the rig says of it (`Measurement.blank_run`), and no other."""
         return self
 
     @property

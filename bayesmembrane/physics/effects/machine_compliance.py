@@ -79,10 +79,10 @@ class MachineCompliance(Compliance):
     Where a blank run shows the frame, delta_film = delta - compliance F_m g(F / F_m) with the run's curve g up to its
     largest force F_m: there is no exponent then, and the compliance is the run's, but for its error.
 
-    blank : what the run shows; held : True for no parameter at all, the compliance being that of the run
+    curve : what the run shows; held : True for no parameter at all, the compliance being that of the run
     """
 
-    blank: FrameCurve | None = None
+    curve: FrameCurve | None = None
     held: bool = False
 
     name: ClassVar[str] = "machine_compliance"
@@ -100,35 +100,35 @@ class MachineCompliance(Compliance):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.blank is not None:
-            own = {"coordinates": () if self.held else (_measured(self.blank),), "title": "the frame of its blank run"}
+        if self.curve is not None:
+            own = {"coordinates": () if self.held else (_measured(self.curve),), "title": "the frame of its blank run"}
             for name, value in (own | {"exact": True}).items():
                 object.__setattr__(self, name, value)
 
     @property
     def known(self) -> bool:
-        return self.blank is not None
+        return self.curve is not None
 
     def shown_by(self, measurement: Measurement) -> Self:
-        shown = None if measurement.blank is None else _curve_of(measurement.blank.tobytes())
-        return self if shown == self.blank else replace(self, blank=shown, held=self.held and shown is not None)
+        shown = None if measurement.blank_run is None else _curve_of(measurement.blank_run.tobytes())
+        return self if shown == self.curve else replace(self, curve=shown, held=self.held and shown is not None)
 
     def as_held(self) -> Self:
         return replace(self, held=self.known)
 
     def yielding(self, p: Array, force: Array) -> tuple[Array, Array]:
-        if self.blank is None:
+        if self.curve is None:
             size = np.maximum(np.abs(force), SMALLEST)
             secant = p[:, :1] * (size / NEWTON) ** (p[:, 1:2] - 1)
             return secant * force, p[:, 1:2] * secant
-        compliance = np.full((len(force), 1), self.blank.compliance) if self.held else p[:, :1]
-        lost, slope = self.blank.at(force)
+        compliance = np.full((len(force), 1), self.curve.compliance) if self.held else p[:, :1]
+        lost, slope = self.curve.at(force)
         return compliance * lost, compliance * slope
 
 
-def _measured(blank: FrameCurve) -> EffectParameter:
+def _measured(curve: FrameCurve) -> EffectParameter:
     """The compliance of a frame that was measured: no size that may be nothing, but a value with its error."""
-    value, sd = blank.compliance, blank.sd
+    value, sd = curve.compliance, curve.sd
     clear = value > FAR * sd
     return EffectParameter(
         "compliance",

@@ -43,7 +43,7 @@ def run(rng: np.random.Generator, noise: float, softening: float = 0.2) -> np.nd
 def measured_with(blank: np.ndarray | None, force: np.ndarray | None = None) -> Measurement:
     lift = np.linspace(1e-3, 20e-3, 12)
     pull = MOST * (lift / lift[-1]) ** 2 if force is None else force
-    return Measurement(lift, pull, Annulus(0.010, 0.035), Specimen("film", 5e-5), blank=blank)
+    return Measurement(lift, pull, Annulus(0.010, 0.035), Specimen("film", 5e-5), blank_run=blank)
 
 
 def frame(h: Hypothesis) -> MachineCompliance:
@@ -134,13 +134,13 @@ def test_a_known_frame_is_claimed_once_and_has_no_value_at_which_it_is_not_there
     assert claim.with_frame(m) is claim
     assert claim.on(m) is claim
     assert hypothesis("gent", ["machine_compliance"]).on(m) == claim
-    assert claim.known == {"machine_compliance.compliance"}
+    assert claim.known_coordinates == {"machine_compliance.compliance"}
     assert claim.held.parameters == hypothesis("gent").parameters
     assert claim.held.held == claim.held.on(m) == claim.held
     assert [p.null for p in frame(claim).coordinates] == [None]
     assert frame(claim).null == pytest.approx([frame(claim).coordinates[0].prior.mean_sd[0]])
     assert spoken(claim) == "Gent with the frame of its blank run"
-    plain = replace(m, blank=None)
+    plain = replace(m, blank_run=None)
     assert hypothesis("gent").with_frame(plain) == hypothesis("gent")
     for other in (hypothesis("gent", ["machine_compliance"]), claim, claim.held):  # no frame of another rig
         assert len(frame(other.on(plain)).coordinates) == 2
@@ -161,13 +161,13 @@ def test_what_a_blank_run_shows_is_not_asked_of_the_film(tmp_path: Path) -> None
     force = top * np.concatenate([np.linspace(0.02, 1, 30), np.linspace(1, 0.02, 30)])
     lost = give(data.at_work["machine_compliance"], force)
     blank = np.column_stack([lost + 1e-6 * rng.standard_normal(60), force])
-    m = replace(read_measurement(*data.write(tmp_path)), blank=blank)
+    m = replace(read_measurement(*data.write(tmp_path)), blank_run=blank)
     found = diagnose(m, Question(hypothesis("neo_hookean"), declared=True))
     assert found.verdict == "adequate"
     assert found.probabilities.effects["none"] > 0.95
     assert found.null.names == ("machine_compliance",)
     assert document(found)["effects"] == []
-    fitted, plain = fit(m, hypothesis("neo_hookean")), fit(replace(m, blank=None), hypothesis("neo_hookean"))
+    fitted, plain = fit(m, hypothesis("neo_hookean")), fit(replace(m, blank_run=None), hypothesis("neo_hookean"))
     assert fitted.rmse_N < 0.8 * plain.rmse_N
     assert fitted.at_bound == ()
     value, sd = fitted.hypothesis.effects[0].size.prior.mean_sd
