@@ -193,11 +193,11 @@ def test_a_drawing_is_a_cloud_where_it_has_many_marks(points: int, kind: str) ->
     assert len(made.data) <= MOST_SVG
 
 
-@pytest.mark.parametrize("count", [7, 12, 18])
+@pytest.mark.parametrize("count", [4, 7, 8, 12, 18])
 def test_names_of_many_panels_stand_apart_and_on_the_page(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
     made = list[Any]()
     monkeypatch.setattr(draws_of_a_run, "encoded", lambda figure, kind: made.append(figure))
-    names = [("level", "extra noise")[i % 2] for i in range(count)]
+    names = [("compliance", "extra noise")[i % 2] for i in range(count)]
     corner_plot(np.random.default_rng(3).standard_normal((200, count)), names, ["MPa"] * count, "yeoh")
     figure = made[0]
     figure.draw_without_rendering()

@@ -6,6 +6,7 @@ import logging
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,9 @@ from bayesmembrane.report.style import ALARM, FAINT, INK, MUTED, RANGE_COLOURS, 
 
 ENSEMBLES = (*RANGE_COLOURS, "#E69F00")
 MOST_MEANS = 150  # of a line of means
-NARROW = 0.85  # inches: beside each other, names of panels that are narrower would run into one another
+NARROW = 0.85  # inches: under narrower panels no name lies level
+LETTER = 0.08  # inches, of a name
+NO_LETTERS = str.maketrans("", "", "${}_^\\")  # signs that set a name in type
 
 
 def corner_plot(
@@ -41,6 +44,7 @@ def corner_plot(
     m, c = draws.shape[1], colour(look)
     logarithmic = [_wide(draws[:, i]) for i in range(m)]
     ranges = [_span(draws[:, i], log) for i, log in enumerate(logarithmic)]
+    labels = [with_unit(n, u) for n, u in zip(names, units, strict=True)]
     size = WIDTH if m > 2 else 6.0
     with style({"font.size": 10, "axes.labelsize": 10.5, "xtick.labelsize": 8.5, "ytick.labelsize": 8.5}):
         figure = new_figure(size, width=size, layout=None)
@@ -49,7 +53,7 @@ def corner_plot(
         corner.corner(
             draws,
             fig=figure,
-            labels=[with_unit(n, u) for n, u in zip(names, units, strict=True)],
+            labels=labels,
             range=ranges,
             axes_scale=["log" if log else "linear" for log in logarithmic],
             color=c,
@@ -63,7 +67,7 @@ def corner_plot(
             hist_kwargs={"linewidth": 1.3},
         )
         logging.getLogger().setLevel(level)
-        _corner_margins(figure, m, size, logarithmic)
+        _corner_margins(figure, labels, size, logarithmic)
         handles = [Line2D([], [], color=c, label="posterior: 50 % and 90 % regions")]
         for values, shade, mark, label in ((optimum, INK, "x", "our optimum"), (published, ALARM, "+", "paper")):
             if values is not None and _mark(figure, m, values, ranges, shade, mark):
@@ -74,10 +78,16 @@ def corner_plot(
         return encoded(figure, "png")
 
 
-def _corner_margins(figure: Figure, m: int, size: float, logarithmic: Sequence[bool]) -> None:
+def _collide(labels: Sequence[str], panel: float) -> bool:
+    """Whether names (m,) would run into one another under panels of this width in inches."""
+    wide = [LETTER * len(label.translate(NO_LETTERS)) for label in labels]
+    return panel < NARROW or any(0.5 * (a + b) > panel for a, b in pairwise(wide))
+
+
+def _corner_margins(figure: Figure, labels: Sequence[str], size: float, logarithmic: Sequence[bool]) -> None:
     """Room for ticks and labels in inches, however many panels there are."""
-    right, gap = 0.1, 0.07
-    narrow = (size - 0.95 - right) / m < NARROW
+    m, right, gap = len(labels), 0.1, 0.07
+    narrow = _collide(labels, (size - 0.95 - right) / m)
     left, away, ticks = (2.1, 0.6, 2) if narrow else (0.95, 0.72, 3)
     figure.subplots_adjust(
         left=left / size, bottom=left / size, right=1 - right / size, top=1 - right / size, wspace=gap, hspace=gap
