@@ -17,6 +17,7 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.forward import AT_ONCE
+from bayesmembrane.physics.mechanics.request import Spared
 
 BROAD, CLOSE, ROUNDS, EACH = 256, 256, 5, 192
 HALVINGS = 40  # of the interval of tempering powers
@@ -78,21 +79,28 @@ class Tried:
 
 
 def starting_points(
-    posterior: Posterior, rng: np.random.Generator, ensembles: int, walkers: int, counts: Outcomes
+    posterior: Posterior,
+    rng: np.random.Generator,
+    ensembles: int,
+    walkers: int,
+    counts: Outcomes,
+    first: Array | None = None,
 ) -> Array:
     """`Tried.starts` (E, W, k) of what `try_points` found; raises `SettingsError` as that does."""
-    return try_points(posterior, rng, ensembles * walkers, counts).starts(rng, ensembles, walkers)
+    return try_points(posterior, rng, ensembles * walkers, counts, first).starts(rng, ensembles, walkers)
 
 
-def try_points(posterior: Posterior, rng: np.random.Generator, wanted: int, counts: Outcomes) -> Tried:
+def try_points(
+    posterior: Posterior, rng: np.random.Generator, wanted: int, counts: Outcomes, first: Array | None = None
+) -> Tried:
     """Points around the valleys of the posterior, at least ``wanted`` of them possible.
 
-    They are prior draws brought to their best modulus, draws around the valleys that a descent finds from them, and
-    what differential evolution makes of the better ones, in as many rounds as very many walkers need.
+    They are the `candidates`, or the ``first`` (M, k) if those are known, and what differential evolution makes of the
+    better ones, in as many rounds as very many walkers need.
 
     Raises `SettingsError` if next to no admissible parameters reach the data.
     """
-    tried = Tried.of(posterior, _candidates(posterior, rng), counts)
+    tried = Tried.of(posterior, candidates(posterior, rng) if first is None else first, counts)
     for _ in range(max(ROUNDS, int(np.ceil((SPARE * wanted - len(tried.x)) / EACH)))):
         good = tried.possible
         if len(good.x) < 4:
@@ -112,8 +120,10 @@ def try_points(posterior: Posterior, rng: np.random.Generator, wanted: int, coun
     return tried
 
 
-def _candidates(posterior: Posterior, rng: np.random.Generator) -> Array:
-    """Broad and close candidates (M, k), with noise coordinates that suit their residuals."""
+def candidates(posterior: Posterior, rng: np.random.Generator) -> Array:
+    """(M, k): prior draws brought to their best modulus, and draws around the valleys that a descent finds from them,
+    with noise coordinates that suit their residuals. Convexity is not asked for.
+    """
     few = shortened(posterior.measurement, SCREENED_BY)
     objective = Objective(posterior.hypothesis, few, "euclidean", posterior.solve)
     pool, size = objective.pool(rng)
@@ -124,7 +134,7 @@ def _candidates(posterior: Posterior, rng: np.random.Generator) -> Array:
     k = posterior.hypothesis.curve_size
     x[:, :k] = curves
     if x.shape[1] > k:
-        force = objective.forward(curves, reached=False).force
+        force = objective.forward(curves, reached=False, spare=Spared.NOT_ELLIPTIC).force
         rms = np.sqrt(np.mean((force - few.force) ** 2, axis=1))
         fits = np.log(rms / posterior.hypothesis.noise.natural(np.zeros((1, x.shape[1] - k)), 1.0)[0, 0])
         fits -= np.log(np.max(np.abs(posterior.measurement.force)))

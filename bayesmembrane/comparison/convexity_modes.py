@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
@@ -15,16 +15,19 @@ from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.calibration.sampling.proposals.collapsed import Collapsed, collapsed
+from bayesmembrane.calibration.sampling.proposals.filling import joined
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
-from bayesmembrane.calibration.starts import starting_points
-from bayesmembrane.ground.errors import SettingsError
+from bayesmembrane.calibration.starts import Tried, candidates
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.physics.convexity import FREE, MODES, ConvexityMode
 
 WITHIN = "within the range fitted"
-ROUNDS, EACH, LAST = 3, 600, 2000
-KNOWN, STARTS = 1000, 64  # draws of the own mode, and starts without one, that the first proposal is fitted to
+ROUNDS, EACH, MOST = 3, 600, 5
+"""Times that a proposal is fitted anew, draws each time, and of the last proposal so often at most."""
+CLOSE, ENOUGH = 0.5, 500.0
+"""Part of its draws that a proposal is worth when it is as good as it need be, and what all draws are to be worth."""
+KNOWN, STARTS = 1000, 128  # draws of the own mode, and starts without one, that the first proposal is fitted to
 LEAST_ESS, LARGEST_SHARE = 100.0, 0.1  # of the weights that a number may stand on
 WIDEST_MASS = 0.3  # standard error of ln mass
 
@@ -64,7 +67,13 @@ class ByMode:
 
 
 def by_convexity(
-    posterior: Posterior, draws: Array, log_evidence: float, sd: float, masses: Mapping[str, Mass], seed: int = 0
+    posterior: Posterior,
+    draws: Array,
+    log_evidence: float,
+    sd: float,
+    masses: Mapping[str, Mass],
+    seed: int = 0,
+    first: Array | None = None,
 ) -> tuple[ByMode, ...]:
     """ln Z_m = ln Z_own + ln(sum_b w_b 1_m(x_b) / sum_b w_b 1_own(x_b)) - ln mass_m, w = p0 L / g, x_b from g.
 
@@ -75,25 +84,27 @@ def by_convexity(
     masses : of every mode, from `JointPrior.masses`; and of `WITHIN`, if the own mode is also to be judged as if it
         looked no farther than the points that are fitted
 
-    g is a mixture of t-distributions, at first fitted to the draws and to starting points that know of no convexity,
-    then to its own weighted draws (O. Cappé et al., Stat. Comput. 18 (2008) 447), and once more for each mode that is
-    left with few. What g has not found does not count: weights that rest on few draws give a reason and no number.
+    g is a mixture of proposals, each of t-distributions: one for no convexity, at first fitted to the draws and to
+    ``first``, then to its own weighted draws (O. Cappé et al., Stat. Comput. 18 (2008) 447) until they are worth half
+    their number; one for the draws; and one for each mode that is met by few of all these. What g has not found does
+    not count: weights that rest on few draws give a reason and no number.
     """
     rng = np.random.default_rng([seed, 6])
-    free = replace(posterior, hypothesis=replace(posterior.hypothesis, convexity=FREE))
-    first = draws[rng.choice(len(draws), min(KNOWN, len(draws)), replace=False)]
-    try:
-        starts = starting_points(free, rng, 2, STARTS, Outcomes()).reshape(-1, free.size)
-    except SettingsError:
-        starts = first[:0]
-    target = _Target(free, posterior.hypothesis.convexity if WITHIN in masses else None, collapsed(free))
-    near = target.part(np.concatenate([first, starts]))
-    found = _adapted(target, around(near, rng), FREE.name, ROUNDS, rng)
-    own, rows = (posterior.hypothesis.convexity.name, log_evidence, sd), []
+    free, own = replace(posterior, hypothesis=replace(posterior.hypothesis, convexity=FREE)), posterior.hypothesis
+    target = _Target(free, own.convexity if WITHIN in masses else None, collapsed(free))
+    known = target.part(draws[rng.choice(len(draws), min(KNOWN, len(draws)), replace=False)])
+    tried = Tried.of(free, candidates(free, rng) if first is None else first, Outcomes())
+    starts = target.part(tried.starts(rng, 1, STARTS)[0]) if len(tried.possible.x) else known[:0]
+    wide, found = _adapted(target, around(np.concatenate([known, starts]), rng), FREE.name, rng)
+    near = around(known, rng)
+    proposals, seen = [wide, near], [found, _weigh(target, near, EACH, rng)]
     for mode in masses:
-        part = found if found.ess(mode) >= LEAST_ESS else _again(target, found, mode, rng)
-        rows.append(_row(own, mode, found, part, masses[mode]))
-    return tuple(rows)
+        most = max(seen, key=lambda f: f.ess(mode))
+        if target.size + 2 <= most.ess(mode) < LEAST_ESS:
+            proposals.append(_adapted(target, around(most.resampled(mode, EACH, rng), rng), mode, rng)[0])
+    every = _weighed(target, joined([(g, 1) for g in proposals]), masses, rng)
+    of = own.convexity.name, log_evidence, sd
+    return tuple(_row(of, mode, every, masses[mode]) for mode in masses)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,11 +172,6 @@ class _Weighted:
         """ln of the mean weight: the integral of p0 L 1_mode."""
         return float(logsumexp(self.log_weights(mode)) - np.log(len(self.x)))
 
-    def log_sd(self, mode: str) -> float:
-        """Standard error of `log_mean`."""
-        w = self.relative(mode)
-        return float(np.std(w) / np.mean(w) / np.sqrt(len(w)))
-
     def resampled(self, mode: str, count: int, rng: np.random.Generator) -> Array:
         w = self.relative(mode)
         # Cut at the root of their number, so that no single draw draws the proposal to itself.
@@ -179,43 +185,46 @@ def _weigh(target: _Target, g: Mixture, count: int, rng: np.random.Generator) ->
     return _Weighted(x, lp - g.log_density(x), inside)
 
 
-def _adapted(target: _Target, g: Mixture, mode: str, rounds: int, rng: np.random.Generator) -> _Weighted:
-    """The last draws of a proposal that was fitted ``rounds`` times to what it found of ``mode``."""
-    for _ in range(rounds):
+def _adapted(target: _Target, g: Mixture, mode: str, rng: np.random.Generator) -> tuple[Mixture, _Weighted]:
+    """A proposal that was fitted up to `ROUNDS` times to what it found of ``mode``, and the last that was found."""
+    for _ in range(ROUNDS):
         found = _weigh(target, g, EACH, rng)
-        if found.ess(mode) < target.size + 2:
+        if not target.size + 2 <= found.ess(mode) < CLOSE * EACH:
             break
         g = around(found.resampled(mode, EACH, rng), rng)
-    return _weigh(target, g, LAST, rng)
+    return g, found
 
 
-def _again(target: _Target, found: _Weighted, mode: str, rng: np.random.Generator) -> _Weighted:
-    """Draws around those few that meet ``mode``, if there are enough to begin with."""
-    if found.ess(mode) < target.size + 2:
-        return found
-    return _adapted(target, around(found.resampled(mode, EACH, rng), rng), mode, 2, rng)
+def _weighed(target: _Target, g: Mixture, masses: Mapping[str, Mass], rng: np.random.Generator) -> _Weighted:
+    """Draws of ``g`` until those that meet each mode are worth enough, or there are `MOST` times `EACH`."""
+    parts = [_weigh(target, g, EACH, rng)]
+    while len(parts) < MOST and min(_joined(parts).ess(mode) for mode in masses) < ENOUGH:
+        parts.append(_weigh(target, g, EACH, rng))
+    return _joined(parts)
 
 
-def _row(own: tuple[str, float, float], mode: str, found: _Weighted, part: _Weighted, mass: Mass) -> ByMode:
+def _joined(parts: Sequence[_Weighted]) -> _Weighted:
+    """Draws of one proposal together."""
+    inside = {mode: np.concatenate([p.inside[mode] for p in parts]) for mode in parts[0].inside}
+    return _Weighted(np.concatenate([p.x for p in parts]), np.concatenate([p.log_weight for p in parts]), inside)
+
+
+def _row(own: tuple[str, float, float], mode: str, found: _Weighted, mass: Mass) -> ByMode:
     """ln Z of ``mode`` from that of the ``own`` one (its name, ln Z and error); ``found`` has draws of both."""
     own_mode, log_evidence, sd = own
+    ess = found.ess(mode)
     if mode == own_mode:
         total = float(np.hypot(sd, mass.sd / mass.value))
-        return ByMode(mode, log_evidence - float(np.log(mass.value)), total, mass.value, mass.sd, part.ess(mode), None)
-    ess = part.ess(mode)
+        return ByMode(mode, log_evidence - float(np.log(mass.value)), total, mass.value, mass.sd, ess, None)
     if mass.sd > WIDEST_MASS * mass.value:
         return ByMode(mode, None, None, mass.value, mass.sd, ess, Missing.PRIOR)
-    few = ess < LEAST_ESS or np.max(part.relative(mode)) > LARGEST_SHARE * np.sum(part.relative(mode))
+    a, b = found.relative(mode), found.relative(own_mode)
+    few = ess < LEAST_ESS or np.max(a) > LARGEST_SHARE * np.sum(a)
     if few or found.ess(own_mode) < LEAST_ESS:
-        missing = Missing.DRAWS if np.any(part.inside[mode]) else Missing.NONE
+        missing = Missing.DRAWS if np.any(found.inside[mode]) else Missing.NONE
         return ByMode(mode, None, None, mass.value, mass.sd, ess, missing)
-    value = log_evidence + part.log_mean(mode) - found.log_mean(own_mode) - float(np.log(mass.value))
-    if part is found:
-        a, b = found.relative(mode), found.relative(own_mode)
-        pull = a / np.mean(a) - b / np.mean(b)
-        error = float(np.std(pull) / np.sqrt(len(pull)))
-    else:
-        error = float(np.hypot(part.log_sd(mode), found.log_sd(own_mode)))
-    return ByMode(
-        mode, value, float(np.sqrt(error**2 + sd**2 + (mass.sd / mass.value) ** 2)), mass.value, mass.sd, ess, None
-    )
+    value = log_evidence + found.log_mean(mode) - found.log_mean(own_mode) - float(np.log(mass.value))
+    pull = a / np.mean(a) - b / np.mean(b)
+    error = float(np.std(pull) / np.sqrt(len(pull)))
+    total = float(np.sqrt(error**2 + sd**2 + (mass.sd / mass.value) ** 2))
+    return ByMode(mode, value, total, mass.value, mass.sd, ess, None)

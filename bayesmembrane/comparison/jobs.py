@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -17,7 +17,7 @@ from bayesmembrane.calibration.predictions import Wanted, rest_of
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.run import Run, RunSettings, has_predictions, load_run, predictions_of, sample
 from bayesmembrane.calibration.sampling.walk import Progress, Settings
-from bayesmembrane.calibration.starts import starting_points
+from bayesmembrane.calibration.starts import candidates, starting_points
 from bayesmembrane.calibration.store import describe, run_name
 from bayesmembrane.comparison.convexity_modes import WITHIN, ByMode, by_convexity
 from bayesmembrane.comparison.evidence.bridge import bridge
@@ -117,11 +117,16 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
         tell(job.label, text)
         give_back()
 
+    @cache
+    def first(seed: int) -> Array:
+        """Where the valleys are, found without the run: for nested sampling, and for films that are not convex."""
+        return candidates(posterior, np.random.default_rng([seed, 7]))
+
     def climb(name: str, doing: str, seed: int) -> EvidenceEstimate:
         def keep(piece: str, make: Callable[[], ARun]) -> ARun:
             return kept(run.path, f"{name}-{piece}", key, make)
 
-        found = part(name, doing, lambda: _nested(posterior, draws, seed, step, keep))
+        found = part(name, doing, lambda: _nested(posterior, draws, first(seed), seed, step, keep))
         drop_pieces(run.path, name)
         return found
 
@@ -137,7 +142,7 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
         rest = part("range", "the rest", lambda: leave_range_out(posterior, draws, whole), whole.data_hash)
     modes: tuple[ByMode, ...] = ()
     if job.judging.modes:
-        modes = part("modes", "convexity modes", lambda: _modes(posterior, run, bridged, mass, seed))
+        modes = part("modes", "convexity modes", lambda: _modes(posterior, run, bridged, mass, first(seed), seed))
     return Row(
         label=job.label,
         hypothesis=job.hypothesis,
@@ -176,10 +181,12 @@ def _no_mass(hypothesis: Hypothesis) -> str:
     )
 
 
-def _nested(posterior: Posterior, draws: Array, seed: int, tell: Callable[[str], None], keep: Keep) -> EvidenceEstimate:
+def _nested(
+    posterior: Posterior, draws: Array, first: Array, seed: int, tell: Callable[[str], None], keep: Keep
+) -> EvidenceEstimate:
     """Nested sampling that begins around the draws, and around every valley that a descent from prior draws finds."""
-    rng = np.random.default_rng([seed, 7])
-    starts = starting_points(posterior, rng, 2, STARTS, Outcomes()).reshape(-1, posterior.size)
+    rng = np.random.default_rng([seed, 15])
+    starts = starting_points(posterior, rng, 2, STARTS, Outcomes(), first).reshape(-1, posterior.size)
     tolerance = NESTED_SD if posterior.size <= FEW else NESTED_SD_MANY
     target = of_fewest_coordinates(posterior)
     return nested(target, seed, tolerance, tell, (target.part(draws), target.part(starts)), keep)
@@ -230,13 +237,15 @@ def _bridged(posterior: Posterior, run: Run, seed: int) -> EvidenceEstimate:
     )
 
 
-def _modes(posterior: Posterior, run: Run, found: EvidenceEstimate, mass: Mass, seed: int) -> tuple[ByMode, ...]:
+def _modes(
+    posterior: Posterior, run: Run, found: EvidenceEstimate, mass: Mass, first: Array, seed: int
+) -> tuple[ByMode, ...]:
     masses = {mode: Mass(m["value"], m["sd"]) for mode, m in run.status["prior_mass"].items()}
     own, m = posterior.hypothesis.convexity, posterior.measurement
     masses[own.name] = mass
     if own.looks_beyond and m.full_range > np.max(np.abs(m.deflection)) * (1 + 1e-9):
         masses[WITHIN] = posterior.prior.mass(partial(_within, posterior), seed)
-    return by_convexity(posterior, run.draws(), found.log_evidence, found.sd, masses, seed)
+    return by_convexity(posterior, run.draws(), found.log_evidence, found.sd, masses, seed, first)
 
 
 def _within(posterior: Posterior, x: Array) -> NDArray[np.bool_]:

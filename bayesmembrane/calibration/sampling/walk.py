@@ -33,6 +33,8 @@ SAMPLERS = ("auto", "emcee")
 SURE = 0.02
 """Standard error of ln Z up to which a mixture is drawn from, if `MOST_FOR_Z` draws do for that."""
 MOST_FOR_Z = 10_000
+LEAST_WALKERS = 12
+"""Of each ensemble, where a mixture proposes: so many that fifty autocorrelation times are about a thousand draws."""
 SLOW = 8000
 """Steps for `LEAST_TAUS`, from which on a mixture that holds walkers up is mended, or given up: ensembles that walk
 along a narrow valley take longer. (Ogden with a form error, replicate 0 of `tests.studies.sbc` halfway back: 340 s of a
@@ -261,7 +263,7 @@ def started(posterior: Posterior, settings: Settings, seed: int, search: Search 
 def _begun_from_mixture(posterior: Posterior, close: Independent, settings: Settings, seed: int) -> Chains:
     """Ensembles at states of a mixture, to be looked at where they may be worth enough."""
     # Steps that hang on no other walker need no more of them than emcee's ensembles to go on with.
-    walkers = settings.walkers or 16 * -(-2 * posterior.size // 16)
+    walkers = settings.walkers or 4 * -(-max(2 * posterior.size, LEAST_WALKERS) // 4)
     count = settings.ensembles * walkers
     states = np.resize(close.states, (settings.ensembles, walkers, posterior.size))
     chains = begun(posterior, states, seed)
