@@ -340,7 +340,7 @@ def test_a_part_is_told_of_sets_next_to_those_of_the_sum(monkeypatch: pytest.Mon
     assert near.by_laws == pytest.approx(plain.by_laws)
     assert plain.by_laws == pytest.approx(before)
     assert sum(after.values()) == pytest.approx(1.0)
-    assert after[NOTHING] >= before[NOTHING]
+    assert after[NOTHING] >= before[NOTHING] * (1 - 1e-9)
     for name in ("tearing", "mullins", "friction+tearing", "mullins+tearing"):
         assert after[name] > before.get(name, 0.0) + 1e-4
     kept = sum(after[name] for name in ("friction", "friction+mullins"))
