@@ -69,8 +69,7 @@ class ByMode:
 def by_convexity(
     posterior: Posterior,
     draws: Array,
-    log_evidence: float,
-    sd: float,
+    known: tuple[float, float],
     masses: Mapping[str, Mass],
     seed: int = 0,
     first: Array | None = None,
@@ -80,9 +79,10 @@ def by_convexity(
     Parameters
     ----------
     draws : (B, k) of ``posterior``, whose own mode is that of its hypothesis
-    log_evidence, sd : of the same, not yet divided by the mass
+    known : ln Z of the same and its standard error, not yet divided by the mass
     masses : of every mode, from `JointPrior.masses`; and of `WITHIN`, if the own mode is also to be judged as if it
         looked no farther than the points that are fitted
+    first : (M, k) the `candidates` of the posterior; made here if they are not known
 
     g is a mixture of proposals, each of t-distributions: one for no convexity, at first fitted to the draws and to
     ``first``, then to its own weighted draws (O. Cappé et al., Stat. Comput. 18 (2008) 447) until they are worth half
@@ -92,18 +92,18 @@ def by_convexity(
     rng = np.random.default_rng([seed, 6])
     free, own = replace(posterior, hypothesis=replace(posterior.hypothesis, convexity=FREE)), posterior.hypothesis
     target = _Target(free, own.convexity if WITHIN in masses else None, collapsed(free))
-    known = target.part(draws[rng.choice(len(draws), min(KNOWN, len(draws)), replace=False)])
+    drawn = target.part(draws[rng.choice(len(draws), min(KNOWN, len(draws)), replace=False)])
     tried = Tried.of(free, candidates(free, rng) if first is None else first, Outcomes())
-    starts = target.part(tried.starts(rng, 1, STARTS)[0]) if len(tried.possible.x) else known[:0]
-    wide, found = _adapted(target, around(np.concatenate([known, starts]), rng), FREE.name, rng)
-    near = around(known, rng)
+    starts = target.part(tried.starts(rng, 1, STARTS)[0]) if len(tried.possible.x) else drawn[:0]
+    wide, found = _adapted(target, around(np.concatenate([drawn, starts]), rng), FREE.name, rng)
+    near = around(drawn, rng)
     proposals, seen = [wide, near], [found, _weigh(target, near, EACH, rng)]
     for mode in masses:
         most = max(seen, key=lambda f: f.ess(mode))
         if target.size + 2 <= most.ess(mode) < LEAST_ESS:
             proposals.append(_adapted(target, around(most.resampled(mode, EACH, rng), rng), mode, rng)[0])
     every = _weighed(target, joined([(g, 1) for g in proposals]), masses, rng)
-    of = own.convexity.name, log_evidence, sd
+    of = own.convexity.name, *known
     return tuple(_row(of, mode, every, masses[mode]) for mode in masses)
 
 

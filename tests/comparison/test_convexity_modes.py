@@ -19,7 +19,7 @@ def rows() -> dict[str, ByMode]:
     posterior = Posterior(h.on(m), m)
     masses = posterior.prior.masses(m)
     masses[WITHIN] = masses["reached"]
-    found = by_convexity(posterior, np.asarray(bm.sample(m, h, ess=300.0).draws()), KNOWN, 0.0, masses)
+    found = by_convexity(posterior, np.asarray(bm.sample(m, h, ess=300.0).draws()), (KNOWN, 0.0), masses)
     return {r.mode: r for r in found}
 
 
