@@ -15,7 +15,6 @@ from bayesmembrane.ground.errors import SettingsError, unknown_name
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.forward import Forward, Prediction, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
-from bayesmembrane.physics.mechanics.request import Spared
 from bayesmembrane.physics.rigs.base import rig_of
 
 LOSSES = ("euclidean", "weighted")
@@ -91,10 +90,10 @@ class Objective:
     def rescaled(self, films: Array) -> tuple[Array, Array]:
         """Coordinates (M, k) of the films (B, n) that reach the data, at the modulus that fits best, and |r| (M,).
 
-        F(s c) = s F(c), so that s = <F, y> / <F, F> is exact. No search begins where a film loses ellipticity.
+        F(s c) = s F(c), so that s = <F, y> / <F, F> is exact.
         """
         scales = np.asarray(self.hypothesis.material.scales)
-        force = self.whiten(self.forward.film_force(films, Spared.NOT_ELLIPTIC).T)
+        force = self.whiten(self.forward.film_force(films).T)
         y = self.whiten(self.measurement.force)
         with np.errstate(all="ignore"):
             s = y @ force / np.sum(force**2, axis=0)

@@ -17,7 +17,6 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.forward import AT_ONCE
-from bayesmembrane.physics.mechanics.request import Spared
 
 BROAD, CLOSE, ROUNDS, EACH = 256, 256, 5, 192
 HALVINGS = 40  # of the interval of tempering powers
@@ -134,7 +133,7 @@ def candidates(posterior: Posterior, rng: np.random.Generator) -> Array:
     k = posterior.hypothesis.curve_size
     x[:, :k] = curves
     if x.shape[1] > k:
-        force = objective.forward(curves, reached=False, spare=Spared.NOT_ELLIPTIC).force
+        force = objective.forward(curves, reached=False).force
         rms = np.sqrt(np.mean((force - few.force) ** 2, axis=1))
         fits = np.log(rms / posterior.hypothesis.noise.natural(np.zeros((1, x.shape[1] - k)), 1.0)[0, 0])
         fits -= np.log(np.max(np.abs(posterior.measurement.force)))

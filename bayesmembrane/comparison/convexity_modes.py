@@ -95,14 +95,15 @@ def by_convexity(
     drawn = target.part(draws[rng.choice(len(draws), min(KNOWN, len(draws)), replace=False)])
     tried = Tried.of(free, candidates(free, rng) if first is None else first, Outcomes())
     starts = target.part(tried.starts(rng, 1, STARTS)[0]) if len(tried.possible.x) else drawn[:0]
-    wide, found = _adapted(target, around(np.concatenate([drawn, starts]), rng), FREE.name, rng)
     near = around(drawn, rng)
-    proposals, seen = [wide, near], [found, _weigh(target, near, EACH, rng)]
+    made = [_adapted(target, around(np.concatenate([drawn, starts]), rng), FREE.name, rng)]
+    made.append((near, _weigh(target, near, EACH, rng)))
     for mode in masses:
-        most = max(seen, key=lambda f: f.ess(mode))
+        most = max((found for _, found in made), key=lambda found: found.ess(mode))
         if target.size + 2 <= most.ess(mode) < LEAST_ESS:
-            proposals.append(_adapted(target, around(most.resampled(mode, EACH, rng), rng), mode, rng)[0])
-    every = _weighed(target, joined([(g, 1) for g in proposals]), masses, rng)
+            made.append(_adapted(target, around(most.resampled(mode, EACH, rng), rng), mode, rng))
+    useful = [g for g, found in made if found.ess(FREE.name) > 0.0]
+    every = _weighed(target, joined([(g, 1) for g in useful or [near]]), masses, rng)
     of = own.convexity.name, *known
     return tuple(_row(of, mode, every, masses[mode]) for mode in masses)
 
@@ -162,11 +163,14 @@ class _Weighted:
         return np.where(self.inside[mode], self.log_weight, -np.inf)
 
     def ess(self, mode: str) -> float:
-        return effective_draws(self.relative(mode))
+        """What the draws that meet a mode are worth; 0 where none has a weight."""
+        w = self.relative(mode)
+        return effective_draws(w) if np.any(w) else 0.0
 
     def relative(self, mode: str) -> Array:
-        """Weights (B,), the largest of no convexity being one."""
-        return np.asarray(np.exp(self.log_weights(mode) - np.max(self.log_weight)))
+        """Weights (B,), the largest of no convexity being one; none where all are zero."""
+        top = np.max(self.log_weight)
+        return np.asarray(np.exp(self.log_weights(mode) - (top if np.isfinite(top) else 0.0)))
 
     def log_mean(self, mode: str) -> float:
         """ln of the mean weight: the integral of p0 L 1_mode."""
@@ -186,21 +190,31 @@ def _weigh(target: _Target, g: Mixture, count: int, rng: np.random.Generator) ->
 
 
 def _adapted(target: _Target, g: Mixture, mode: str, rng: np.random.Generator) -> tuple[Mixture, _Weighted]:
-    """A proposal that was fitted up to `ROUNDS` times to what it found of ``mode``, and the last that was found."""
-    for _ in range(ROUNDS):
-        found = _weigh(target, g, EACH, rng)
+    """Of a proposal and up to `ROUNDS` - 1 that are fitted to what the one before found of ``mode`` the one whose draws
+    are worth most there, and these.
+    """
+    best = g, _weigh(target, g, EACH, rng)
+    found = best[1]
+    for _ in range(ROUNDS - 1):
         if not target.size + 2 <= found.ess(mode) < CLOSE * EACH:
             break
         g = around(found.resampled(mode, EACH, rng), rng)
-    return g, found
+        found = _weigh(target, g, EACH, rng)
+        best = max(best, (g, found), key=lambda tried: tried[1].ess(mode))
+    return best
 
 
 def _weighed(target: _Target, g: Mixture, masses: Mapping[str, Mass], rng: np.random.Generator) -> _Weighted:
-    """Draws of ``g`` until those that meet each mode are worth enough, or there are `MOST` times `EACH`."""
-    parts = [_weigh(target, g, EACH, rng)]
-    while len(parts) < MOST and min(_joined(parts).ess(mode) for mode in masses) < ENOUGH:
-        parts.append(_weigh(target, g, EACH, rng))
-    return _joined(parts)
+    """Draws of ``g`` until those that meet each mode are worth enough, or there are `MOST` times `EACH`; modes whose
+    mass is not known, and those that no draw of the first met, are not waited for.
+    """
+    found = _weigh(target, g, EACH, rng)
+    awaited = [m for m, mass in masses.items() if mass.sd <= WIDEST_MASS * mass.value and found.ess(m) > 0.0]
+    for _ in range(MOST - 1):
+        if min((found.ess(mode) for mode in awaited), default=ENOUGH) >= ENOUGH:
+            break
+        found = _joined([found, _weigh(target, g, EACH, rng)])
+    return found
 
 
 def _joined(parts: Sequence[_Weighted]) -> _Weighted:

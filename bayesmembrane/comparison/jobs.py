@@ -117,10 +117,7 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
         tell(job.label, text)
         give_back()
 
-    @cache
-    def first(seed: int) -> Array:
-        """Where the valleys are, found without the run: for nested sampling, and for films that are not convex."""
-        return candidates(posterior, np.random.default_rng([seed, 7]))
+    first = cache(partial(valleys, posterior))
 
     def climb(name: str, doing: str, seed: int) -> EvidenceEstimate:
         def keep(piece: str, make: Callable[[], ARun]) -> ARun:
@@ -181,12 +178,22 @@ def _no_mass(hypothesis: Hypothesis) -> str:
     )
 
 
+def valleys(posterior: Posterior, seed: int) -> Array:
+    """`candidates` (M, k), found without the run: for nested sampling, and for films that are not convex."""
+    return candidates(posterior, np.random.default_rng([seed, 7]))
+
+
+def nested_starts(posterior: Posterior, first: Array, seed: int) -> Array:
+    """(M, k) where nested sampling begins besides the draws: around every valley of the ``first`` candidates."""
+    rng = np.random.default_rng([seed, 15])
+    return starting_points(posterior, rng, 2, STARTS, Outcomes(), first).reshape(-1, posterior.size)
+
+
 def _nested(
     posterior: Posterior, draws: Array, first: Array, seed: int, tell: Callable[[str], None], keep: Keep
 ) -> EvidenceEstimate:
     """Nested sampling that begins around the draws, and around every valley that a descent from prior draws finds."""
-    rng = np.random.default_rng([seed, 15])
-    starts = starting_points(posterior, rng, 2, STARTS, Outcomes(), first).reshape(-1, posterior.size)
+    starts = nested_starts(posterior, first, seed)
     tolerance = NESTED_SD if posterior.size <= FEW else NESTED_SD_MANY
     target = of_fewest_coordinates(posterior)
     return nested(target, seed, tolerance, tell, (target.part(draws), target.part(starts)), keep)

@@ -144,14 +144,7 @@ class Free(ConvexityMode):
         return np.full(len(states.films), np.inf)
 
 
-@dataclass(frozen=True)
-class Unasked(Free):
-    """Nothing is asked, and a film that loses ellipticity is not followed: no rig shows what it does then."""
-
-    spare = Spared.NOT_ELLIPTIC
-
-
-REACHED, BOX, ELLIPTIC, FREE, UNASKED = Reached(), Box(), Elliptic(), Free(), Unasked()
+REACHED, BOX, ELLIPTIC, FREE = Reached(), Box(), Elliptic(), Free()
 MODES: dict[str, ConvexityMode] = {m.name: m for m in (REACHED, BOX, ELLIPTIC, FREE)}
 RESTRICTING = tuple(m for m in MODES.values() if m.restricts)
 """The modes that exclude films, the strongest claim about the measurement first."""

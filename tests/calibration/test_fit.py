@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bayesmembrane.app.demo import shipped_measurement
 from bayesmembrane.calibration import fit as searches
 from bayesmembrane.calibration.fit import fit
 from bayesmembrane.calibration.objective import Objective
@@ -52,6 +53,17 @@ def test_a_film_without_noise_comes_back(film, name: str) -> None:  # type: igno
         assert estimate.value == pytest.approx(truth, rel=2e-5)
         assert estimate.sd is not None
         assert estimate.sd < 1e-3 * abs(truth)
+
+
+def test_a_film_that_loses_ellipticity_comes_back() -> None:
+    """It has a force all the same, and no search may leave it out: only the convexity prior excludes it."""
+    m, h = shipped_measurement("OP2"), hypothesis("mooney_rivlin", convexity="none")
+    films = h.films(np.array([[3.86, -0.10]]))
+    rig = {"inner_radius": m.rig.inner_radius, "outer_radius": m.rig.outer_radius}
+    curves = solve(request(material("mooney_rivlin"), films, m.deflection, solver="shooting", **rig))
+    assert np.min(curves.ellipticity) < -0.01
+    found = fit(replace(m, force=curves.force[0], covariance=None, force_sd=None), h)
+    assert found.coordinates[1] == pytest.approx(-0.10, abs=1e-3)
 
 
 def test_an_ogden_curve_comes_back_if_not_its_six_parameters(film) -> None:  # type: ignore[no-untyped-def]
