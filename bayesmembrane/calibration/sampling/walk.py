@@ -55,8 +55,8 @@ class Settings:
     """How to sample.
 
     ess : wanted effective sample size of the worst coordinate
-    ensembles, walkers : independent ensembles, and walkers in each (None: four a coordinate, in sixteens; where a mixture
-        proposes two a coordinate, in fours, and `LEAST_WALKERS` at least)
+    ensembles, walkers : independent ensembles, and walkers in each (None: four a coordinate, in sixteens; where a
+        mixture proposes two a coordinate, in fours, and `LEAST_WALKERS` at least)
     chunk : steps before the first look at tau
     most_steps : each ensemble stops there, and the run says so
     sampler : "auto" proposes from a mixture where one is close enough, and has emcee's ensembles walk elsewhere;
