@@ -24,7 +24,7 @@ from bayesmembrane.physics.convexity import FREE, MODES, ConvexityMode
 
 WITHIN = "within the range fitted"
 ROUNDS, EACH, MOST = 3, 600, 5
-"""Times that a proposal is fitted anew, draws each time, and of the last proposal so often at most."""
+"""Proposals that are tried for a mode, draws of each, and how many times as many of all together there are at most."""
 CLOSE, ENOUGH = 0.5, 500.0
 """Part of its draws that a proposal is worth when it is as good as it need be, and what all draws are to be worth."""
 KNOWN, STARTS = 1000, 128  # draws of the own mode, and starts without one, that the first proposal is fitted to

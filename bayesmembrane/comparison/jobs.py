@@ -117,7 +117,7 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
         tell(job.label, text)
         give_back()
 
-    first = cache(partial(valleys, posterior))
+    first = cache(partial(first_candidates, posterior))
 
     def climb(name: str, doing: str, seed: int) -> EvidenceEstimate:
         def keep(piece: str, make: Callable[[], ARun]) -> ARun:
@@ -178,7 +178,7 @@ def _no_mass(hypothesis: Hypothesis) -> str:
     )
 
 
-def valleys(posterior: Posterior, seed: int) -> Array:
+def first_candidates(posterior: Posterior, seed: int) -> Array:
     """`candidates` (M, k), found without the run: for nested sampling, and for films that are not convex."""
     return candidates(posterior, np.random.default_rng([seed, 7]))
 

@@ -9,7 +9,7 @@ import pytest
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.run import load_run
 from bayesmembrane.comparison.evidence.estimate import BRIDGE, NESTED
-from bayesmembrane.comparison.jobs import STARTS, nested_starts, valleys
+from bayesmembrane.comparison.jobs import STARTS, first_candidates, nested_starts
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.data.shipped import shipped
 from bayesmembrane.physics.hypothesis import hypothesis
@@ -44,7 +44,7 @@ def test_so_has_one_of_several_energies_that_are_sampled_well(run: Run) -> None:
 def test_a_yeoh_film_has_starts_for_nested_sampling_by_the_default_seed() -> None:
     """What it begins with, alone: each is a film that exists."""
     posterior = Posterior(hypothesis("yeoh"), read_measurement(OP1[0], OP1[2]))
-    starts = nested_starts(posterior, valleys(posterior, 0), 0)
+    starts = nested_starts(posterior, first_candidates(posterior, 0), 0)
     assert starts.shape == (2 * STARTS, posterior.size)
     assert np.all(np.isfinite(posterior.evaluate(starts).log_posterior))
 
