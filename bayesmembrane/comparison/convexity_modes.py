@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
@@ -17,7 +17,7 @@ from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.calibration.sampling.proposals.collapsed import Collapsed, collapsed
 from bayesmembrane.calibration.sampling.proposals.filling import joined
 from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
-from bayesmembrane.calibration.starts import Tried, candidates
+from bayesmembrane.calibration.starts import Tried
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.plain import plain
 from bayesmembrane.physics.convexity import FREE, MODES, ConvexityMode
@@ -27,7 +27,7 @@ ROUNDS, EACH, MOST = 3, 600, 5
 """Proposals that are tried for a mode, draws of each, and how many times as many of all together there are at most."""
 CLOSE, ENOUGH = 0.5, 500.0
 """Part of its draws that a proposal is worth when it is as good as it need be, and what all draws are to be worth."""
-KNOWN, STARTS = 1000, 128  # draws of the own mode, and starts without one, that the first proposal is fitted to
+DRAWN, STARTS = 1000, 128  # draws of the own mode, and candidates, that the first proposal is fitted to
 LEAST_ESS, LARGEST_SHARE = 100.0, 0.1  # of the weights that a number may stand on
 WIDEST_MASS = 0.3  # standard error of ln mass
 
@@ -69,31 +69,31 @@ class ByMode:
 def by_convexity(
     posterior: Posterior,
     draws: Array,
-    known: tuple[float, float],
+    own_evidence: tuple[float, float],
     masses: Mapping[str, Mass],
+    tried_first: Array,
     seed: int = 0,
-    first: Array | None = None,
 ) -> tuple[ByMode, ...]:
     """ln Z_m = ln Z_own + ln(sum_b w_b 1_m(x_b) / sum_b w_b 1_own(x_b)) - ln mass_m, w = p0 L / g, x_b from g.
 
     Parameters
     ----------
     draws : (B, k) of ``posterior``, whose own mode is that of its hypothesis
-    known : ln Z of the same and its standard error, not yet divided by the mass
+    own_evidence : ln Z of the same and its standard error, not yet divided by the mass
     masses : of every mode, from `JointPrior.masses`; and of `WITHIN`, if the own mode is also to be judged as if it
         looked no farther than the points that are fitted
-    first : (M, k) the `candidates` of the posterior; made here if they are not known
+    tried_first : (M, k) `candidates` of the posterior
 
     g is a mixture of proposals, each of t-distributions: one for no convexity, at first fitted to the draws and to
-    ``first``, then to its own weighted draws (O. Cappé et al., Stat. Comput. 18 (2008) 447) until they are worth half
-    their number; one for the draws; and one for each mode that is met by few of all these. What g has not found does
-    not count: weights that rest on few draws give a reason and no number.
+    ``tried_first``, then to its own weighted draws (O. Cappé et al., Stat. Comput. 18 (2008) 447) until they are worth
+    half their number; one for the draws; and one for each mode that is met by few of all these. What g has not found
+    does not count: weights that rest on few draws give a reason and no number.
     """
     rng = np.random.default_rng([seed, 6])
-    free, own = replace(posterior, hypothesis=replace(posterior.hypothesis, convexity=FREE)), posterior.hypothesis
-    target = _Target(free, own.convexity if WITHIN in masses else None, collapsed(free))
-    drawn = target.part(draws[rng.choice(len(draws), min(KNOWN, len(draws)), replace=False)])
-    tried = Tried.of(free, candidates(free, rng) if first is None else first, Outcomes())
+    own = posterior.hypothesis.convexity
+    target = _Target.of(posterior, own if WITHIN in masses else None)
+    drawn = target.part(draws[rng.choice(len(draws), min(DRAWN, len(draws)), replace=False)])
+    tried = Tried.of(target.free, tried_first, Outcomes())
     starts = target.part(tried.starts(rng, 1, STARTS)[0]) if len(tried.possible.x) else drawn[:0]
     near = around(drawn, rng)
     made = [_adapted(target, around(np.concatenate([drawn, starts]), rng), FREE.name, rng)]
@@ -104,8 +104,7 @@ def by_convexity(
             made.append(_adapted(target, around(most.resampled(mode, EACH, rng), rng), mode, rng))
     useful = [g for g, found in made if found.ess(FREE.name) > 0.0]
     every = _weighed(target, joined([(g, 1) for g in useful or [near]]), masses, rng)
-    of = own.convexity.name, *known
-    return tuple(_row(of, mode, every, masses[mode]) for mode in masses)
+    return tuple(_row((own.name, *own_evidence), mode, every, mass) for mode, mass in masses.items())
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +117,12 @@ class _Target:
     free: Posterior
     within: ConvexityMode | None
     shape: Collapsed | None
+
+    @classmethod
+    def of(cls, posterior: Posterior, within: ConvexityMode | None) -> _Target:
+        """That of a ``posterior``, whatever its own mode."""
+        free = replace(posterior, hypothesis=replace(posterior.hypothesis, convexity=FREE))
+        return cls(free, within, collapsed(free))
 
     @property
     def size(self) -> int:
@@ -176,6 +181,11 @@ class _Weighted:
         """ln of the mean weight: the integral of p0 L 1_mode."""
         return float(logsumexp(self.log_weights(mode)) - np.log(len(self.x)))
 
+    def and_more(self, more: _Weighted) -> _Weighted:
+        """With further draws of the same mixture."""
+        inside = {mode: np.concatenate([met, more.inside[mode]]) for mode, met in self.inside.items()}
+        return _Weighted(np.concatenate([self.x, more.x]), np.concatenate([self.log_weight, more.log_weight]), inside)
+
     def resampled(self, mode: str, count: int, rng: np.random.Generator) -> Array:
         w = self.relative(mode)
         # Cut at the root of their number, so that no single draw draws the proposal to itself.
@@ -213,14 +223,8 @@ def _weighed(target: _Target, g: Mixture, masses: Mapping[str, Mass], rng: np.ra
     for _ in range(MOST - 1):
         if min((found.ess(mode) for mode in awaited), default=ENOUGH) >= ENOUGH:
             break
-        found = _joined([found, _weigh(target, g, EACH, rng)])
+        found = found.and_more(_weigh(target, g, EACH, rng))
     return found
-
-
-def _joined(parts: Sequence[_Weighted]) -> _Weighted:
-    """Draws of one proposal together."""
-    inside = {mode: np.concatenate([p.inside[mode] for p in parts]) for mode in parts[0].inside}
-    return _Weighted(np.concatenate([p.x for p in parts]), np.concatenate([p.log_weight for p in parts]), inside)
 
 
 def _row(own: tuple[str, float, float], mode: str, found: _Weighted, mass: Mass) -> ByMode:

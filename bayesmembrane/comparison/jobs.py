@@ -252,7 +252,7 @@ def _modes(
     masses[own.name] = mass
     if own.looks_beyond and m.full_range > np.max(np.abs(m.deflection)) * (1 + 1e-9):
         masses[WITHIN] = posterior.prior.mass(partial(_within, posterior), seed)
-    return by_convexity(posterior, run.draws(), (found.log_evidence, found.sd), masses, seed, first)
+    return by_convexity(posterior, run.draws(), (found.log_evidence, found.sd), masses, first, seed)
 
 
 def _within(posterior: Posterior, x: Array) -> NDArray[np.bool_]:

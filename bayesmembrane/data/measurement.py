@@ -246,8 +246,11 @@ def without_round_off(deflection: ArrayLike) -> Array:
     return d
 
 
-def check_blank_run(blank: Array, where: str | None = None) -> None:
-    """Raise `DataError` unless the (M, 2) m and N of a blank run say how a frame yields to a force that grows."""
+def check_blank_run(blank: Array, where: str | None = None) -> float:
+    """The slope, m/N, of the straight line through the (M, 2) m and N of a blank run.
+
+    Raises `DataError` unless they say how a frame yields to a force that grows.
+    """
     travel, force = blank.T
     if np.unique(force[force > 0]).size < BLANK_READINGS:
         fault = f"a blank run needs readings at {BLANK_READINGS} different forces above zero at least"
@@ -257,6 +260,7 @@ def check_blank_run(blank: Array, where: str | None = None) -> None:
     if slope * reached < -max(FALLS * float(np.sqrt(variance)) * reached, LEAST_TRAVEL):
         fault = "the crosshead goes the less the larger the force is, and a frame yields the other way"
         raise DataError(fault, where, "change the sign of a column")
+    return float(slope)
 
 
 def check_covariance(covariance: Array, where: str | None = None) -> None:

@@ -262,8 +262,7 @@ def _blank_run(options: TomlSection, rig: Fixture, went: float, asked: float) ->
     table = parse_table(read_text(path), str(path))
     columns, _ = curve_columns(table)
     blank = np.column_stack([columns["deflection"], columns["force"]])
-    check_blank_run(blank, str(path))
-    slope, reached = float(np.polyfit(blank[:, 1], blank[:, 0], 1)[0]), float(np.max(blank[:, 1]))
+    slope, reached = check_blank_run(blank, str(path)), float(np.max(blank[:, 1]))
     if slope * asked > MOST_OF_TRAVEL * went:
         fault = f"the frame alone would go {1e3 * slope * asked:.3g} mm under the {asked:.3g} N of the test"
         raise DataError(f"{fault}, which goes {1e3 * went:.3g} mm with a film", str(path), "check the units of both")

@@ -1,16 +1,14 @@
 """Evidence under every convexity mode, from draws of one of them, beside quadrature over the shape that is drawn."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import bayesmembrane as bm
 from bayesmembrane.app.demo import shipped_measurement
 from bayesmembrane.calibration.posterior import Posterior
-from bayesmembrane.calibration.sampling.proposals.collapsed import collapsed
 from bayesmembrane.comparison.convexity_modes import WITHIN, ByMode, _Target, _Weighted, by_convexity
-from bayesmembrane.physics.convexity import FREE, MODES
+from bayesmembrane.comparison.jobs import first_candidates
+from bayesmembrane.physics.convexity import MODES
 
 KNOWN, FAR, POINTS = 3.0, 40.0, 4001
 
@@ -27,14 +25,14 @@ def rows(posterior: Posterior) -> dict[str, ByMode]:
     masses = posterior.prior.masses(posterior.measurement)
     masses[WITHIN] = masses["reached"]
     run = bm.sample(posterior.measurement, posterior.hypothesis, ess=300.0)
-    return {r.mode: r for r in by_convexity(posterior, np.asarray(run.draws()), (KNOWN, 0.0), masses)}
+    first = first_candidates(posterior, 0)
+    return {r.mode: r for r in by_convexity(posterior, np.asarray(run.draws()), (KNOWN, 0.0), masses, first)}
 
 
 @pytest.fixture(scope="module")
 def exact(posterior: Posterior) -> dict[str, float]:
     """ln of the integral under each mode over that of the own one, modulus and noise integrated out."""
-    free = replace(posterior, hypothesis=replace(posterior.hypothesis, convexity=FREE))
-    target = _Target(free, posterior.hypothesis.convexity, collapsed(free))
+    target = _Target.of(posterior, posterior.hypothesis.convexity)
     assert target.size == 1
     rough = np.linspace(-9.0, 9.0, 1001)
     log_p, _ = target.solved(rough[:, None])

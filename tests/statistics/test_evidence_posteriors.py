@@ -14,6 +14,7 @@ from bayesmembrane.comparison.convexity_modes import by_convexity
 from bayesmembrane.comparison.evidence.bridge import bridge
 from bayesmembrane.comparison.evidence.nested import nested
 from bayesmembrane.comparison.evidence.target import PosteriorTarget, of_fewest_coordinates
+from bayesmembrane.comparison.jobs import first_candidates
 from bayesmembrane.comparison.prior_widths import prior_widths, scaled
 from bayesmembrane.physics.hypothesis import hypothesis
 from tests.statistics.cubature import log_evidence
@@ -88,7 +89,8 @@ def test_evidence_under_another_mode_comes_from_the_draws_of_one(solved):
     x, _, _ = sampled("mooney_rivlin", range_name="OP2")
     masses = p.prior.masses(p.measurement, 213)
     known = exact("mooney_rivlin", range_name="OP2")
-    rows = {r.mode: r for r in by_convexity(p, x.reshape(-1, x.shape[-1]), (known, 0.0), masses, 1)}
+    first = first_candidates(p, 1)
+    rows = {r.mode: r for r in by_convexity(p, x.reshape(-1, x.shape[-1]), (known, 0.0), masses, first, 1)}
     assert rows["reached"].log_evidence == pytest.approx(known - np.log(masses["reached"].value))
     answered = [m for m, r in rows.items() if r.missing is None]
     assert "reached" in answered

@@ -34,7 +34,7 @@ SURE = 0.02
 """Standard error of ln Z up to which a mixture is drawn from, if `MOST_FOR_Z` draws do for that."""
 MOST_FOR_Z = 10_000
 LEAST_WALKERS = 12
-"""Of each ensemble, where a mixture proposes: so many that fifty autocorrelation times are about a thousand draws."""
+"""Of each ensemble, where a mixture proposes: fifty autocorrelation times of two are then 1200 draws that count."""
 SLOW = 8000
 """Steps for `LEAST_TAUS`, from which on a mixture that holds walkers up is mended, or given up: ensembles that walk
 along a narrow valley take longer. (Ogden with a form error, replicate 0 of `tests.studies.sbc` halfway back: 340 s of a
