@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +21,17 @@ MORE, PATIENT = 2.0, 12
 Rows = NDArray[np.intp]
 Film = Callable[[Rows, Array], tuple[Array, Array]]
 """Of some rows, at deflections (b, N) m: force (b, N) N, nan where there is none, and about its slope (b, N) N/m."""
-Frame = Callable[[Rows, Array], tuple[Array, Array]]
-"""Of as many rows as there are forces (b, N) N: how far it yields (b, N) m, and the derivative (b, N) m/N."""
+Frame = Callable[[Rows, Array, Array], tuple[Array, Array]]
+"""Of as many rows as there are forces (b, N) N, and the largest ones before (b, N) N: how far it yields (b, N) m, and
+the derivative (b, N) m/N."""
 
 
 def in_series(
     film: Film, frame: Frame, measured: Array, start: Array | None = None
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """(delta (B, N) m, F (B, N) N, found (B,)): F = film(delta) with delta + frame(F) = ``measured`` (B, N) m.
+
+    The N points are in the order of the test: a frame may remember the largest force so far.
 
     Newton's method for the force, from ``start`` (B, N) N or from a frame that is rigid. A frame that yields like a
     power of the force less than one is without bounds soft at no force, where a tangent leads astray: long steps are
@@ -41,7 +45,8 @@ def in_series(
     low, high = np.full(measured.shape, -np.inf), np.full(measured.shape, np.inf)
     before = np.full((2, *measured.shape), np.nan)
     for turn in range(MOST_ITERATIONS):
-        yielded, soft = frame(rows, held)
+        most = _before(held)
+        yielded, soft = frame(rows, held, most)
         at = measured[rows] - yielded
         pull, slope = film(rows, at)
         lost, slope = np.isnan(pull), _seen(at - before[0], pull - before[1], slope, SHORT * reach)
@@ -54,7 +59,7 @@ def in_series(
             break
         new = held + step
         far = np.nonzero(~here[:, None] & (np.abs(step) > LONG * np.abs(held)))
-        new[far] = _along(frame, rows[far[0]], (pull + slope * yielded)[far], slope[far], held[far])
+        new[far] = _along(partial(frame, rows[far[0]]), (pull + slope * yielded)[far], slope[far], held[far], most[far])
         low, high = np.where(lost, held, low), np.where(~lost & (pull < held), held, high)
         with np.errstate(invalid="ignore"):
             between = np.where(np.isinf(high), MORE * np.abs(held), 0.5 * (low + high))
@@ -80,14 +85,24 @@ def _rigid(force: Array) -> Array:
     return np.where(np.isnan(force), np.nan_to_num(most), force)
 
 
-def _along(frame: Frame, rows: Rows, pull: Array, slope: Array, start: Array) -> Array:
+def _before(force: Array) -> Array:
+    """(b, N) N: the largest of the forces (b, N) before each, and 0."""
+    so_far = np.maximum.accumulate(np.fmax(force, 0.0), axis=1)
+    return np.concatenate([np.zeros((len(force), 1)), so_far[:, :-1]], axis=1)
+
+
+def _along(
+    yielding: Callable[[Array, Array], tuple[Array, Array]], pull: Array, slope: Array, start: Array, most: Array
+) -> Array:
     """F (M,) with F + k u(F) = ``pull`` (M,) N, of films with the slope k (M,): by Newton's method for ln |F|, of which
-    the logarithm of the left side is nearly a straight line.
+    the logarithm of the left side is nearly a straight line. ``most`` (M,) N is the largest force before.
     """
+    rest = yielding(np.zeros((len(pull), 1)), most[:, None])[0][:, 0]  # what has seated has no part in the logarithm
+    pull = pull - slope * rest
     force = np.where(start * pull > 0, start, pull)
     with np.errstate(all="ignore"):
         for _ in range(TURNS):
-            yielded, soft = (v[:, 0] for v in frame(rows, force[:, None]))
-            whole = force + slope * yielded
+            yielded, soft = (v[:, 0] for v in yielding(force[:, None], most[:, None]))
+            whole = force + slope * (yielded - rest)
             force = force * np.exp(np.log(pull / whole) * whole / (force * (1 + slope * soft)))
     return np.where((pull == 0) | ~np.isfinite(force), 0.0, force)

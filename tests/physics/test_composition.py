@@ -78,7 +78,7 @@ def test_a_taut_film_pulls_back_below_its_plane_and_what_it_has_lost_does_not() 
         assert np.min(f) < -1e-3 * np.max(f)
         assert np.max(np.abs(f - exact)) < 1e-5 * np.max(exact)
     names = ("machine_compliance", "prestretch", "zero_offset")
-    f = force(m, *names, x=np.array([c, 1.0, 1.05, 2e-3]))
+    f = force(m, *names, x=np.array([c, 1.0, 0.0, 1.05, 2e-3]))
     d = m.deflection - 2e-3 - c * f
     assert np.max(np.abs(f - np.sign(d) * direct("yeoh", np.abs(d), prestretch=1.05))) < 1e-5 * np.max(f)
     lost = [1e-3 if p.name == "set" else p.typical for p in PermanentSet.coordinates]
@@ -103,7 +103,7 @@ def test_a_set_is_the_same_on_both_sides_of_a_taut_film_and_pushes_no_less_on_a_
 def test_the_frame_takes_its_part(exponent: float) -> None:
     """delta_film + C F^n = delta, with a film force that is itself solved at delta_film; with memory too."""
     m, c = measured(), 8e-4
-    f = force(m, "machine_compliance", x=np.array([c, exponent]))
+    f = force(m, "machine_compliance", x=np.array([c, exponent, 0.0]))
     assert f == pytest.approx(direct("yeoh", m.deflection - c * f**exponent), rel=1e-6, abs=1e-9)
     names = ("machine_compliance", "mullins", "viscoelastic", "clamp_slip")
     h = hypothesis("yeoh", names)
@@ -111,7 +111,8 @@ def test_the_frame_takes_its_part(exponent: float) -> None:
     theta = x[None, 3:]
     law, _ = forward.law(h.films(x), theta)
     delta, total, _ = forward.composition.closed(law, theta)
-    yielded, _ = MachineCompliance().yielding(MachineCompliance().typical[None], total)
+    before = np.maximum.accumulate(np.append(0.0, total))[None, :-1]
+    yielded, _ = MachineCompliance().yielding(MachineCompliance().typical[None], total, before)
     assert np.max(np.abs(delta + yielded - m.deflection)) < 1e-9 * m.full_range
     again, _ = forward.composition.film(law, theta, delta)
     assert again == pytest.approx(total, rel=1e-12)
@@ -321,7 +322,7 @@ def test_a_frame_that_yields_keeps_a_film_from_locking() -> None:
     every = solve(request(materials()["gent"], np.stack([np.full(101, 5.3), limits], 1), [0.04], **RADII))
     limit = limits[np.argmax(every.ok[:, 0]) - 1]
     film = materials()["gent"].to_coordinates([5.3, limit])
-    stiff, soft = (Forward(h, m, m.deflection)([*film, c, 1.0]) for c in (0.0, 2e-4))
+    stiff, soft = (Forward(h, m, m.deflection)([*film, c, 1.0, 0.0]) for c in (0.0, 2e-4))
     assert not stiff.ok[0]
     assert soft.ok[0]
     delta = m.deflection - 2e-4 * soft.force[0]

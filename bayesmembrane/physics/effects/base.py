@@ -106,7 +106,8 @@ class Effect(ABC):
     absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
     exact : True if it has no law that could be off: an offset is an offset
     may_change : True of one that is exact, and whose size may all the same become another one while a test is made
-    remembers : False if it changes the curve by a function of the deflection alone, alike on every leg
+    remembers : False if it changes the curve by a function of the deflection alone, alike on every leg, in its plainest
+        shape
     scales_with_modulus : True if forces stay proportional to the modulus, which is relied on; False costs time only
     of_the_material : True if all tests of one material have it, or none of them
     constant : True if its parameters are then the same in all of them; those of others belong to what a test reached
@@ -324,8 +325,11 @@ class Compliance(Effect, ABC):
     stage = "compliance"
 
     @abstractmethod
-    def yielding(self, p: Array, force: Array) -> tuple[Array, Array]:
-        """((B, N) m, (B, N) m/N): displacement of the frame under the film's force, and its derivative."""
+    def yielding(self, p: Array, force: Array, most: Array) -> tuple[Array, Array]:
+        """((B, N) m, (B, N) m/N): displacement of the frame under the film's force, and its derivative.
+
+        ``most`` : (B, N) N, the largest force before, or 0.
+        """
 
 
 class Sensor(Effect, ABC):

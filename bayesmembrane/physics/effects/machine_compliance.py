@@ -68,16 +68,19 @@ class FrameCurve:
 
 @dataclass(frozen=True)
 class MachineCompliance(Compliance):
-    """delta_film = delta - compliance F |F / 1 N|^(exponent - 1).
+    """delta_film = delta - (1 - seated) u(F) - seated u(F_m), u(F) = compliance F |F / 1 N|^(exponent - 1).
 
-    Beams and load cells yield in proportion to the force (1), contacts of round bodies as F^(2/3) (H. Hertz, J. Reine
-    Angew. Math. 92 (1882) 156), rough seats, whose stiffness grows with the force, more nearly as its logarithm, joints
-    that open the other way round: the compliance of real frames changes with the load, by tens of percents. And frames
-    differ by orders of magnitude: a prior that falls like a normal one would rather let the film be softer than the
-    frame.
+    F_m is the largest force so far. Beams and load cells yield in proportion to the force (1), contacts of round bodies
+    as F^(2/3) (H. Hertz, J. Reine Angew. Math. 92 (1882) 156), rough seats, whose stiffness grows with the force, more
+    nearly as its logarithm, joints that open the other way round: the compliance of real frames changes with the load,
+    by tens of percents. A load string that was not preloaded gives way for good at its first loading, in grips, lock
+    nuts and couplings (``seated``; that is what its makers have it preloaded for: Instron 34SC, operator's guide,
+    "Preload the load string"), and a film behind it looks longer after its first pull. And frames differ by orders of
+    magnitude: a prior that falls like a normal one would rather let the film be softer than the frame.
 
     Where a blank run shows the frame, delta_film = delta - compliance F_m g(F / F_m) with the run's curve g up to its
-    largest force F_m: there is no exponent then, and the compliance is the run's, but for its error.
+    largest force F_m: there is no exponent then, nothing is seated any more, and the compliance is the run's, but for
+    its error.
 
     curve : what the run shows; held : True for no parameter at all, the compliance being that of the run
     """
@@ -89,13 +92,21 @@ class MachineCompliance(Compliance):
     title: ClassVar[str] = "compliance of the machine"
     reference: ClassVar[str] = "S. R. Kalidindi, A. Abusafieh, E. El-Danaf, Exp. Mech. 37 (1997) 210"
     signature: ClassVar[str] = (
-        "Too soft where the force is high: the residual follows force times slope, alike on all legs, and a blank run "
-        "shows it."
+        "Too soft where the force is high: the residual follows force times slope, and a blank run shows it. It is "
+        "alike on all legs, but for what a load string that was not preloaded loses at its first loading."
     )
     remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("compliance", "m/N", "travel lost by the first newton", Lomax(5e-4), (0.0, 1e-2), 0.0),
         EffectParameter("exponent", "-", "of the force that the travel lost grows with", Normal(0.8, 0.16), (0.3, 1.4)),
+        EffectParameter(
+            "seated",
+            "-",
+            "part of it that stays after the largest force so far",
+            HalfNormal(0.25),
+            (0.0, 0.9),
+            begin=0.1,
+        ),
     )
 
     def __post_init__(self) -> None:
@@ -116,14 +127,22 @@ class MachineCompliance(Compliance):
     def as_held(self) -> Self:
         return replace(self, held=self.known)
 
-    def yielding(self, p: Array, force: Array) -> tuple[Array, Array]:
+    def yielding(self, p: Array, force: Array, most: Array) -> tuple[Array, Array]:
         if self.curve is None:
-            size = np.maximum(np.abs(force), SMALLEST)
-            secant = p[:, :1] * (size / NEWTON) ** (p[:, 1:2] - 1)
-            return secant * force, p[:, 1:2] * secant
+            now, soft = _power(p, force)
+            so_far = np.maximum(force, most)
+            seated = p[:, 2:3]
+            lost = (1 - seated) * now + seated * _power(p, so_far)[0]
+            return lost, np.where(force >= so_far, soft, (1 - seated) * soft)
         compliance = np.full((len(force), 1), self.curve.compliance) if self.held else p[:, :1]
         lost, slope = self.curve.at(force)
         return compliance * lost, compliance * slope
+
+
+def _power(p: Array, force: Array) -> tuple[Array, Array]:
+    """u(F) and its derivative, of compliances and exponents p (B, 2 or more)."""
+    secant = p[:, :1] * (np.maximum(np.abs(force), SMALLEST) / NEWTON) ** (p[:, 1:2] - 1)
+    return secant * force, p[:, 1:2] * secant
 
 
 def _measured(curve: FrameCurve) -> EffectParameter:

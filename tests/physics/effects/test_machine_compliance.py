@@ -67,11 +67,11 @@ def test_the_frame_of_a_blank_run_yields_as_the_run_does(law: str) -> None:
     found = frame(hypothesis("gent").with_frame(measured_with(blank)))
     asked = np.array([[0.1, 0.5, 1.0, 2.0]])
     x = np.array([[found.coordinates[0].prior.mean_sd[0]]])
-    lost, slope = found.yielding(x, asked)
+    lost, slope = found.yielding(x, asked, 0 * asked)
     assert lost == pytest.approx(LAWS[law](asked), rel=0.02)
-    assert found.yielding(x, -asked)[0] == pytest.approx(-lost)
+    assert found.yielding(x, -asked, 0 * asked)[0] == pytest.approx(-lost)
     step = 1e-7
-    assert slope == pytest.approx((found.yielding(x, asked - step)[0] - lost) / -step, rel=1e-3)
+    assert slope == pytest.approx((found.yielding(x, asked - step, 0 * asked)[0] - lost) / -step, rel=1e-3)
 
 
 def test_the_error_of_a_blank_run_holds() -> None:
@@ -115,7 +115,7 @@ def test_a_rigid_frame_is_one_that_hardly_yields(travel: np.ndarray) -> None:
 def test_a_few_readings_in_any_order_are_a_curve() -> None:
     force = np.array([1.9, 1.5, 2.0, 1.7])
     found = frame(hypothesis("gent").with_frame(measured_with(np.column_stack([1e-4 * force + 3e-5, force]))))
-    lost, _ = found.yielding(np.array([[1e-4]]), np.array([[0.5, 2.0]]))
+    lost, _ = found.yielding(np.array([[1e-4]]), np.array([[0.5, 2.0]]), np.zeros((1, 2)))
     assert lost == pytest.approx(np.array([[0.5e-4, 2e-4]]), rel=0.05)
 
 
@@ -143,7 +143,7 @@ def test_a_known_frame_is_claimed_once_and_has_no_value_at_which_it_is_not_there
     plain = replace(m, blank_run=None)
     assert hypothesis("gent").with_frame(plain) == hypothesis("gent")
     for other in (hypothesis("gent", ["machine_compliance"]), claim, claim.held):  # no frame of another rig
-        assert len(frame(other.on(plain)).coordinates) == 2
+        assert len(frame(other.on(plain)).coordinates) == 3
 
 
 def test_a_stored_run_knows_the_frame() -> None:
