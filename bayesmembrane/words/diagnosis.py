@@ -12,7 +12,7 @@ from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.standard import expected_size
 from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, UNNAMED, WAVE, Foreign
-from bayesmembrane.diagnosis.explanation.total import ANOTHER_LAW, NOTHING, Judged, Probabilities, set_name
+from bayesmembrane.diagnosis.explanation.total import ANOTHER_LAW, NOTHING, UNLISTED, Judged, Probabilities, set_name
 from bayesmembrane.diagnosis.left.heldout import HeldOut
 from bayesmembrane.diagnosis.left.shape import resolution_of
 from bayesmembrane.diagnosis.left.turning import at_a_turn
@@ -164,10 +164,13 @@ def probabilities_told(p: Probabilities) -> list[str]:
 
 
 def foreign_told(p: Probabilities) -> list[tuple[str, float]]:
-    """What is foreign, in words, and how probable, where it counts: what was found, and what no law describes."""
-    other_law = p.foreign.get(ANOTHER_LAW, 0.0)
-    told = [("something foreign", p.something_found), ("a law that is not in the library", other_law)]
+    """What is foreign, in words, and how probable, where it counts: what was found, and what is only concluded."""
+    told = [("something foreign", p.something_found)]
+    told += [(what, p.foreign.get(kind, 0.0)) for kind, what in _CONCLUDED.items()]
     return [(what, q) for what, q in told if q >= WORDS.probable]
+
+
+_CONCLUDED = {ANOTHER_LAW: "a law that is not in the library", UNLISTED: "a fault of the rig that is not in it"}
 
 
 def _beyond(first: set[str], name: str) -> str:

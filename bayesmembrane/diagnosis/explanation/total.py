@@ -29,6 +29,10 @@ OF_A_FALL = 3
 """Parameters: how far the force falls, when, and how soon."""
 ANOTHER_LAW = "another_law"
 """A kind of what is foreign: what no law, or no energy, of the library follows."""
+UNLISTED = "unlisted"
+"""A kind of what is foreign: a fault of no known kind, or one that was not seen, which effects follow instead."""
+CONCLUDED = (ANOTHER_LAW, UNLISTED)
+"""Kinds that nothing in the curve shows by itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +97,8 @@ class Probabilities:
 
     @property
     def something_found(self) -> float:
-        """Of something foreign that was looked for and found, and is not only concluded from laws that do not hold."""
-        return self.anything_foreign - self.foreign.get(ANOTHER_LAW, 0.0)
+        """Of something foreign that was looked for and found, and is not only concluded."""
+        return self.anything_foreign - sum(self.foreign.get(kind, 0.0) for kind in CONCLUDED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +186,7 @@ def summed(grown: Grown) -> Total:
             joint[name, ANOTHER_LAW] += moved
             p[i] -= moved
     flat = _flattened(joint)
-    both = _with_neighbours(flat, [e.name for e in case.visible if e.name not in given])
+    both = _with_unlisted(_with_neighbours(flat, [e.name for e in case.visible if e.name not in given]))
     judged = []
     for (c, kind, _), q in zip(terms, p[: len(terms)].tolist(), strict=True):
         if kind == NOTHING:
@@ -245,6 +249,18 @@ def _with_neighbours(joint: Mapping[tuple[str, str], float], visible: Sequence[s
         near = spread(sets, visible, BELIEFS.most, share, BELIEFS.farther)
         out |= {(_joined(names), kind): q for names, q in near.items()}
     return _falling(out)
+
+
+def _with_unlisted(joint: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], float]:
+    """With a part of what effects have, and nothing foreign, told of `UNLISTED` beside them, as far as no set stands
+    out.
+    """
+    known = {name: q for (name, kind), q in joint.items() if kind == NOTHING}
+    part = BELIEFS.unlisted * (1 - BELIEFS.standing_out(known.values()))
+    moved = {(name, UNLISTED): part * q for name, q in known.items() if name != NOTHING and part * q > 0}
+    return _falling(
+        {(n, k): q - moved.get((n, UNLISTED), 0.0) if k == NOTHING else q for (n, k), q in joint.items()} | moved
+    )
 
 
 def _like_a_tear(

@@ -15,6 +15,7 @@ from bayesmembrane.diagnosis.explanation.growth import grown, with_falls, with_s
 from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.total import (
     ANOTHER_LAW,
+    CONCLUDED,
     NOTHING,
     Judged,
     Probabilities,
@@ -179,7 +180,7 @@ def _strange(total: Total, given: Sequence[str]) -> Foreign | None:
     p = total.probabilities
     if p.something_found <= VERDICT.foreign_told:
         return None
-    first, kind = next(key for key in total.joint if key[1] not in (NOTHING, ANOTHER_LAW))
+    first, kind = next(key for key in total.joint if key[1] not in (NOTHING, *CONCLUDED))
     same = [f for f in total.foreign if f.kind == kind]
     return next((f for f in same if set_name(f.base, given) == first), same[0])
 

@@ -16,7 +16,7 @@ from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS, Beliefs
 from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, UNNAMED, Foreign
 from bayesmembrane.diagnosis.explanation.growth import Grown
-from bayesmembrane.diagnosis.explanation.total import ANOTHER_LAW, NOTHING
+from bayesmembrane.diagnosis.explanation.total import ANOTHER_LAW, NOTHING, UNLISTED
 from bayesmembrane.diagnosis.thresholds import TWINS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect
@@ -51,15 +51,16 @@ def summed_up(
     sees_nothing: bool = True,
     adequate: bool = False,
     elsewhere: float = 0.0,
+    unlisted: float = 0.0,
 ) -> total.Total:
     """The sum where friction explains the curve, and Mullins beside it has a ``gain`` in ln Z.
 
     That changes by ``seen`` where what could not be seen counts as absent. Of four effects that can be seen some may be
     ``untried``, where traces of those that were not fitted have a ``promised`` ln of the Bayes factor. Beside the first
     set there is a ``step``, if there is one. ``flatter`` : the power of `Beliefs.flattened`;
-    ``elsewhere`` : told of sets that are next to those of the sum.
+    ``elsewhere`` : told of sets that are next to those of the sum; ``unlisted`` : of a fault of no known kind.
     """
-    monkeypatch.setattr(total, "BELIEFS", told(flatter, elsewhere))
+    monkeypatch.setattr(total, "BELIEFS", told(flatter, elsewhere, unlisted))
     takes = {
         frozenset({"friction"}): {"friction": LEFT - 20.0},
         frozenset({"friction", "mullins"}): {"mullins": 3.0},
@@ -109,9 +110,12 @@ def summed_up(
     return total.summed(grown)
 
 
-def told(flatter: float = 1.0, elsewhere: float = 0.0) -> Beliefs:
-    """With another power of `Beliefs.flattened`, and so much told of sets next to those of the sum."""
-    return replace(BELIEFS, flatter=flatter, elsewhere=elsewhere, elsewhere_by_another_law=2 * elsewhere)
+def told(flatter: float = 1.0, elsewhere: float = 0.0, unlisted: float = 0.0) -> Beliefs:
+    """With another power of `Beliefs.flattened`, and so much told of sets next to those of the sum, and of what is not
+    listed.
+    """
+    by_law = 2 * elsewhere
+    return replace(BELIEFS, flatter=flatter, elsewhere=elsewhere, elsewhere_by_another_law=by_law, unlisted=unlisted)
 
 
 def by_likelihood_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -345,6 +349,19 @@ def test_a_part_is_told_of_sets_next_to_those_of_the_sum(monkeypatch: pytest.Mon
         assert after[name] > before.get(name, 0.0) + 1e-4
     kept = sum(after[name] for name in ("friction", "friction+mullins"))
     assert 0.8 < kept / sum(before[name] for name in ("friction", "friction+mullins")) < 0.9
+
+
+def test_a_part_of_what_effects_have_is_told_of_a_fault_of_no_known_kind(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where none stands out, beside the same sets, and not of no effect; it is not something that was found."""
+    plain, some = (summed_up(monkeypatch, 0.0, 1.0, unlisted=u).probabilities for u in (0.0, 0.1))
+    assert max(plain.effects.values()) < 0.9
+    assert some.effects == pytest.approx(plain.effects)
+    assert some.foreign[UNLISTED] == pytest.approx(0.1 * (1 - plain.effects[NOTHING]))
+    assert sum(some.foreign.values()) == pytest.approx(1.0)
+    assert some.something_found == pytest.approx(0.0, abs=1e-12)
+    clear = summed_up(monkeypatch, 0.0, -9.0, unlisted=0.1).probabilities
+    assert max(clear.effects.values()) > 0.95
+    assert clear.foreign.get(UNLISTED, 0.0) == 0.0
 
 
 def test_nothing_is_told_of_others_where_one_stands_out(monkeypatch: pytest.MonkeyPatch) -> None:
