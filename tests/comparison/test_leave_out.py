@@ -9,6 +9,7 @@ from scipy.special import logsumexp
 
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.run import RunSettings, sample
+from bayesmembrane.comparison.leave_out import refit
 from bayesmembrane.comparison.leave_out import score as pc
 from bayesmembrane.comparison.leave_out.pool import ENOUGH, LED_BY, Pool
 from bayesmembrane.data.measurement import Measurement, Specimen
@@ -147,6 +148,29 @@ def test_exact_refits_agree_with_the_grid(monkeypatch):
     # The outlier, fifteen orders of e away, is known within a tenth of its logarithm, all others within 0.1.
     assert np.all(np.abs(found.pointwise - exact) < 0.1 + 0.1 * np.maximum(-exact, 0.0))
     assert abs(found.elpd - np.sum(exact)) < 1.5
+
+
+@pytest.mark.parametrize("noise", ["correlated", "none"])
+def test_the_others_integrated_by_themselves_agree_with_the_grid(noise, monkeypatch):
+    """The outlier is fifteen orders of e away, where no draw of the whole posterior is."""
+    x, weight, force = grid(noise)
+    exact = -logsumexp(weight[:, None] - posterior(noise).pointwise(x, force), axis=0)
+    monkeypatch.setattr(pc, "PARETO_K", -np.inf)
+    monkeypatch.setattr(Pool, "without", lambda pool, i: (0.0, np.inf, 0.0))
+    found = pc.leave_one_out(posterior(noise), run(noise).data, seed=3)
+    assert found.monte_carlo_sd < 0.2
+    # A reading that says nothing is one with a noise of thirty times the largest force: 0.001 in its logarithm.
+    assert np.all(np.abs(found.pointwise - exact) < 5 * found.monte_carlo_sd + 0.01)
+
+
+def test_where_no_proposal_is_good_the_error_is_told(monkeypatch):
+    monkeypatch.setattr(refit, "independent", lambda *_: None)
+    assert refit.log_integral_without(posterior(), 4, run().draws(), np.random.default_rng(0))[1] == np.inf
+    monkeypatch.setattr(Pool, "without", lambda pool, i: (-3.0, 2.0, 1.0))
+    monkeypatch.setattr(pc, "PARETO_K", -np.inf)
+    found = pc.leave_one_out(posterior(), run().data, seed=3)
+    assert found.pointwise == pytest.approx(-3.0)
+    assert found.monte_carlo_sd == pytest.approx(2.0 * np.sqrt(12))
 
 
 @pytest.mark.parametrize("noise", ["correlated", "none"])

@@ -13,7 +13,9 @@ from bayesmembrane.ground.parameters import Array
 
 LEARN_FROM, BRIDGED = 2000, 30
 SPREAD, HEAVY = 1.3, 5.0  # how much wider than the draws a density is, and its most degrees of freedom
-ENOUGH, FOLLOWED = 100.0, 10  # effective draws of the other points' posterior, and densities made to find them
+ENOUGH, FOLLOWED = 100.0, 2  # effective draws of the other points' posterior, and densities made to find them
+LED_FROM = 20.0
+"""Effective draws from which on they say where to draw more."""
 EACH, PER_DIMENSION = 400, 300  # draws of such a density
 UNSEEN = 10.0  # over the effective draws is the least error
 TOGETHER = 4096  # draws that are weighed at once
@@ -51,7 +53,7 @@ class Pool:
         Comput. 18 (2008) 447).
         """
         for _ in range(FOLLOWED):
-            if self._of(i)[2] >= ENOUGH:
+            if not LED_FROM <= self._of(i)[2] < ENOUGH:
                 break
             try:
                 towards = around(self._drawn_towards(i), self.rng)
@@ -59,6 +61,16 @@ class Pool:
                 break
             self._add(towards, EACH + PER_DIMENSION * self.posterior.size)
         return self._of(i)
+
+    def effective(self, i: int) -> float:
+        """Number of draws that count for the posterior of the others than point ``i``."""
+        return self._of(i)[2]
+
+    @property
+    def log_integral_sd(self) -> float:
+        """Monte Carlo error of `log_z`."""
+        w = np.exp(self.log_p - self.log_q - np.max(self.log_p - self.log_q))
+        return float(np.std(w) / (np.sqrt(len(w)) * np.mean(w)))
 
     def _of(self, i: int) -> tuple[float, float, float]:
         a, b = self.log_p - self.log_q, self.log_p - self.terms[:, i] - self.log_q

@@ -13,7 +13,8 @@ from scipy.special import logsumexp
 
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.convergence import effective_draws
-from bayesmembrane.comparison.leave_out.pool import Pool
+from bayesmembrane.comparison.leave_out.pool import ENOUGH, Pool
+from bayesmembrane.comparison.leave_out.refit import log_integral_without
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
@@ -59,7 +60,7 @@ def leave_one_out(posterior: Posterior, data: Any, seed: int = 0, tell: Tell | N
     ``data`` is the InferenceData of a run of ``posterior``: its pointwise terms are ln p(y_i | y_-i, x) under the whole
     covariance, so that p(x | y) / p(y_i | y_-i, x) is what the other points say of x, whatever the correlation. Pareto
     smoothed importance sampling uses that; where its k exceeds 0.7, draws of densities that are led to the posterior of
-    the other points are added (`Pool`).
+    the other points are added (`Pool`), and where these do not do, that posterior is integrated by itself (`refit`).
 
     A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413; P.-C. Bürkner, J. Gabry, A. Vehtari, Comput. Stat. 36
     (2021) 1243.
@@ -73,22 +74,35 @@ def leave_one_out(posterior: Posterior, data: Any, seed: int = 0, tell: Tell | N
     log_likelihood = data.log_likelihood["force"].values.reshape(len(draws), -1).astype(float)
     error = np.array([_smoothed_error(log_likelihood[:, i]) for i in range(len(terms))])
     rng = np.random.default_rng([seed, 2])
-    bad = np.flatnonzero(~(k <= PARETO_K))
-    log_posterior = data.sample_stats["lp"].values.ravel().astype(float)
-    pool = Pool(posterior, draws, log_posterior, log_likelihood, rng) if bad.size else None
-    for i in bad:
-        if tell is not None:
-            tell(f"leaving out point {i + 1} of {len(terms)}")
-        assert pool is not None
-        terms[i], error[i], _ = pool.without(int(i))
+    bad = ~(k <= PARETO_K)
+    if np.any(bad):
+        log_posterior = data.sample_stats["lp"].values.ravel().astype(float)
+        pool = Pool(posterior, draws, log_posterior, log_likelihood, rng)
+        for i in range(len(terms)):
+            # A few draws that hold a place by chance look as good as many: with the pool there are others.
+            if bad[i] or pool.effective(i) < ENOUGH:
+                bad[i] = True
+                if tell is not None:
+                    tell(f"leaving out point {i + 1} of {len(terms)}")
+                terms[i], error[i] = _by_itself(pool, i)
     return LeaveOneOut(
         elpd=float(np.sum(terms)),
         se=float(np.sqrt(len(terms) * np.var(terms))),
         monte_carlo_sd=float(np.sqrt(np.sum(error**2))),
         pointwise=terms,
         pareto_k=k,
-        refitted=tuple(int(i) for i in bad),
+        refitted=tuple(np.flatnonzero(bad).tolist()),
     )
+
+
+def _by_itself(pool: Pool, i: int) -> tuple[float, float]:
+    """One term with its error, by the draws of the pool if they are enough, or else by the integral of the others."""
+    term, error, effective = pool.without(i)
+    if effective >= ENOUGH:
+        return term, error
+    rest, sd = log_integral_without(pool.posterior, i, pool.x[: pool.counts[0]], pool.rng)
+    sd = float(np.hypot(sd, pool.log_integral_sd))
+    return (pool.log_z - rest, sd) if sd < error else (term, error)
 
 
 def _smoothed_error(log_likelihood: Array) -> float:
