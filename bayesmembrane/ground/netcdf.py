@@ -10,13 +10,14 @@ from typing import Any
 _COMPRESSIBLE = "biufc"
 LARGE = 1_000_000
 """Numbers of single precision beyond which they stay as they are: noise, hardly smaller and slowest to compress."""
+SMALL = 50_000
+"""Bytes up to which an array stays as it is: what HDF5 keeps of its pieces is more than what it saves."""
 
 
 def packed(groups: Mapping[str, Any]) -> bytes:
     """The content of a netCDF file with these xarray datasets as its groups, compressed; "/" is the file itself."""
     encoding = {
-        f"/{name.strip('/')}": {n: {"zlib": True} for n, v in held.variables.items() if _compressed(v)}
-        for name, held in groups.items()
+        f"/{name.strip('/')}": {n: _stored(v) for n, v in held.variables.items()} for name, held in groups.items()
     }
     import xarray  # on demand: half a second
 
@@ -25,8 +26,11 @@ def packed(groups: Mapping[str, Any]) -> bytes:
         return bytes(tree.to_netcdf(None, engine="h5netcdf", encoding=encoding))
 
 
-def _compressed(values: Any) -> bool:
-    return values.dtype.kind in _COMPRESSIBLE and not (values.dtype.itemsize == 4 and values.size > LARGE)
+def _stored(values: Any) -> dict[str, Any]:
+    """How an array is stored; no value stands for a missing one."""
+    noise = values.dtype.itemsize == 4 and values.size > LARGE
+    worth = values.dtype.kind in _COMPRESSIBLE and values.nbytes > SMALL and not noise
+    return {"_FillValue": None} | ({"zlib": True} if worth else {})
 
 
 def _without_cluster() -> AbstractContextManager[Any]:
