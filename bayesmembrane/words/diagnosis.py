@@ -170,7 +170,7 @@ def foreign_told(p: Probabilities) -> list[tuple[str, float]]:
     return [(what, q) for what, q in told if q >= WORDS.probable]
 
 
-_CONCLUDED = {ANOTHER_LAW: "a law that is not in the library", UNLISTED: "a fault of the rig that is not in it"}
+_CONCLUDED = {ANOTHER_LAW: "a law that is not in the library", UNLISTED: "a fault that is not in the library"}
 
 
 def _beyond(first: set[str], name: str) -> str:
