@@ -40,6 +40,7 @@ from bayesmembrane.calibration.sampling.walk import (
     run_ensembles,
     walkers_of,
 )
+from bayesmembrane.calibration.sampling.weights import GOOD_K
 from bayesmembrane.calibration.store import (
     ASKED,
     STATUS,
@@ -103,6 +104,14 @@ class Run(Showable):
     def finished(self) -> bool:
         """True if it came to its own end: enough draws, or the limit of steps."""
         return not self.interrupted
+
+    @property
+    def integral(self) -> tuple[float, float] | None:
+        """(ln int p0(x) p(y | x) dx, its standard error) by the weights of its proposals; None if they say little."""
+        found = self.status.get("importance")
+        if found is None or found["k_hat"] > GOOD_K:
+            return None
+        return float(found["log_integral"]), float(found["log_integral_sd"])
 
     def draws(self) -> Array:
         """Coordinates of all draws, all ensembles together, shape (B, k)."""

@@ -131,7 +131,7 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
     climbed = climb("nested", "nested sampling", seed)
     if by_chance(climbed, bridged):
         climbed = averaged(climbed, climb("again", "nested sampling, again", seed + AGAIN))
-    loo = part("loo", "leave one out", lambda: leave_one_out(posterior, run.data, seed, step))
+    loo = part("loo", "leave one out", lambda: leave_one_out(posterior, run.data, seed, step, run.integral))
     widths = part("widths", "prior widths", lambda: prior_widths(posterior, draws, worth, seed))
     rest = None
     if job.whole is not None:

@@ -234,7 +234,7 @@ def moved(before: Run, after: Run) -> dict[str, dict[str, float]]:
 
 def _stage(run: Run, solve: Solve, seed: int) -> Stage:
     posterior = Posterior(run.hypothesis, run.measurement, solve)
-    loo = leave_one_out(posterior, run.data, seed)
+    loo = leave_one_out(posterior, run.data, seed, integral=run.integral)
     return Stage(run, *(_by_weights(run) or _bridged(run, posterior, seed)), loo.elpd, loo.se, coverage(run))
 
 

@@ -15,6 +15,8 @@ CLOSED = 1e-11  # of the largest deflection: so far what both give way may be fr
 SHORT, STEEP = 1e-7, 5.0  # a secant over a shorter step is round-off, a steeper one no slope
 LONG, TURNS = 0.1, 4
 """A step longer than this part of the force is made along the curve of the frame, which takes so many turns to find."""
+PASSES = 12
+"""At most, of a frame that remembers: a film without memory of time needs two."""
 MORE, PATIENT = 2.0, 12
 """So many times the force of the frame is tried where the film has none, and so often before a row is left so."""
 
@@ -31,22 +33,46 @@ def in_series(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """(delta (B, N) m, F (B, N) N, found (B,)): F = film(delta) with delta + frame(F) = ``measured`` (B, N) m.
 
-    The N points are in the order of the test: a frame may remember the largest force so far.
+    The N points are in the order of the test: a frame may remember the largest force so far. Where the force is larger
+    than ever it is that of a frame that remembers nothing, so that this one comes first, or the forces of ``start``
+    (B, N) N do; then what is remembered stands still in each pass, until it does so from one to the next. Where the
+    film has no force there is nothing to be remembered.
+    """
+    delta, force, found = _closed(film, frame, measured, start, _before(start, measured))
+    most, rows, reach = _before(start, measured), np.arange(len(measured)), _reach(measured)
+    for _ in range(PASSES):
+        now = _before(force, measured)
+        with np.errstate(invalid="ignore"):
+            moved = np.abs(frame(rows, force[rows], now[rows])[0] - frame(rows, force[rows], most[rows])[0])
+        rows, most = rows[np.any(moved > CLOSED * reach, axis=1) & found[rows]], now
+        if not rows.size:
+            return delta, force, found
+        part = _closed(
+            partial(_of, film, rows), partial(_of, frame, rows), measured[rows], _rigid(force[rows]), most[rows]
+        )
+        delta[rows], force[rows], found[rows] = part
+    found[rows] = False
+    return delta, force, found
+
+
+def _closed(
+    film: Film, frame: Frame, measured: Array, start: Array | None, most: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """`in_series` with a frame that remembers ``most`` (B, N) N as the largest forces before.
 
     Newton's method for the force, from ``start`` (B, N) N or from a frame that is rigid. A frame that yields like a
     power of the force less than one is without bounds soft at no force, where a tangent leads astray: long steps are
     made along the film's tangent and the frame's own curve. Slopes are at first those of a film without memory, then
     secants. Rows that are found rest; those with ``found`` False are not, and have no force.
     """
-    rows, reach = np.arange(len(measured)), max(float(np.max(np.abs(measured))), 1e-12)
+    rows, reach = np.arange(len(measured)), _reach(measured)
     delta, force, found = np.array(measured), np.full(measured.shape, np.nan), np.zeros(len(measured), np.bool_)
     held = _rigid(film(rows, measured)[0]) if start is None else start
     # Forces of the frame that were too little, since the film has none where they leave it, and that were too much.
     low, high = np.full(measured.shape, -np.inf), np.full(measured.shape, np.inf)
     before = np.full((2, *measured.shape), np.nan)
     for turn in range(MOST_ITERATIONS):
-        most = _before(held)
-        yielded, soft = frame(rows, held, most)
+        yielded, soft = frame(rows, held, most[rows])
         at = measured[rows] - yielded
         pull, slope = film(rows, at)
         lost, slope = np.isnan(pull), _seen(at - before[0], pull - before[1], slope, SHORT * reach)
@@ -59,7 +85,8 @@ def in_series(
             break
         new = held + step
         far = np.nonzero(~here[:, None] & (np.abs(step) > LONG * np.abs(held)))
-        new[far] = _along(partial(frame, rows[far[0]]), (pull + slope * yielded)[far], slope[far], held[far], most[far])
+        here_most = most[rows[far[0]], far[1]]
+        new[far] = _along(partial(frame, rows[far[0]]), (pull + slope * yielded)[far], slope[far], held[far], here_most)
         low, high = np.where(lost, held, low), np.where(~lost & (pull < held), held, high)
         with np.errstate(invalid="ignore"):
             between = np.where(np.isinf(high), MORE * np.abs(held), 0.5 * (low + high))
@@ -67,6 +94,15 @@ def in_series(
         some, before = ~here, np.stack([at, pull])[:, ~here]
         rows, held, low, high = rows[some], new[some], low[some], high[some]
     return delta, force, found
+
+
+def _of(function: Callable[..., tuple[Array, Array]], rows: Rows, some: Rows, *values: Array) -> tuple[Array, Array]:
+    """A film or a frame of ``some`` of these rows."""
+    return function(rows[some], *values)
+
+
+def _reach(measured: Array) -> float:
+    return max(float(np.max(np.abs(measured))), 1e-12)
 
 
 def _seen(way: Array, gain: Array, slope: Array, shortest: float) -> Array:
@@ -85,8 +121,10 @@ def _rigid(force: Array) -> Array:
     return np.where(np.isnan(force), np.nan_to_num(most), force)
 
 
-def _before(force: Array) -> Array:
-    """(b, N) N: the largest of the forces (b, N) before each, and 0."""
+def _before(force: Array | None, measured: Array) -> Array:
+    """(B, N) N: the largest of the forces (B, N) before each, and 0; 0 where no forces are known."""
+    if force is None:
+        return np.zeros(measured.shape)
     so_far = np.maximum.accumulate(np.fmax(force, 0.0), axis=1)
     return np.concatenate([np.zeros((len(force), 1)), so_far[:, :-1]], axis=1)
 

@@ -21,6 +21,7 @@ from bayesmembrane.physics.reach import Reach
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.physics.effects.protocols import FILMS, RIG, force, measured, path, staircase, timeless, two_speeds, vector
 
+UNSEATED = -20.0  # log odds of the part of a frame's yielding that stays
 RADII = {"inner_radius": RIG.inner_radius, "outer_radius": RIG.outer_radius}
 
 
@@ -78,7 +79,7 @@ def test_a_taut_film_pulls_back_below_its_plane_and_what_it_has_lost_does_not() 
         assert np.min(f) < -1e-3 * np.max(f)
         assert np.max(np.abs(f - exact)) < 1e-5 * np.max(exact)
     names = ("machine_compliance", "prestretch", "zero_offset")
-    f = force(m, *names, x=np.array([c, 1.0, 0.0, 1.05, 2e-3]))
+    f = force(m, *names, x=np.array([c, 1.0, UNSEATED, 1.05, 2e-3]))
     d = m.deflection - 2e-3 - c * f
     assert np.max(np.abs(f - np.sign(d) * direct("yeoh", np.abs(d), prestretch=1.05))) < 1e-5 * np.max(f)
     lost = [1e-3 if p.name == "set" else p.typical for p in PermanentSet.coordinates]
@@ -103,7 +104,7 @@ def test_a_set_is_the_same_on_both_sides_of_a_taut_film_and_pushes_no_less_on_a_
 def test_the_frame_takes_its_part(exponent: float) -> None:
     """delta_film + C F^n = delta, with a film force that is itself solved at delta_film; with memory too."""
     m, c = measured(), 8e-4
-    f = force(m, "machine_compliance", x=np.array([c, exponent, 0.0]))
+    f = force(m, "machine_compliance", x=np.array([c, exponent, UNSEATED]))
     assert f == pytest.approx(direct("yeoh", m.deflection - c * f**exponent), rel=1e-6, abs=1e-9)
     names = ("machine_compliance", "mullins", "viscoelastic", "clamp_slip")
     h = hypothesis("yeoh", names)
@@ -322,7 +323,7 @@ def test_a_frame_that_yields_keeps_a_film_from_locking() -> None:
     every = solve(request(materials()["gent"], np.stack([np.full(101, 5.3), limits], 1), [0.04], **RADII))
     limit = limits[np.argmax(every.ok[:, 0]) - 1]
     film = materials()["gent"].to_coordinates([5.3, limit])
-    stiff, soft = (Forward(h, m, m.deflection)([*film, c, 1.0, 0.0]) for c in (0.0, 2e-4))
+    stiff, soft = (Forward(h, m, m.deflection)([*film, c, 1.0, UNSEATED]) for c in (0.0, 2e-4))
     assert not stiff.ok[0]
     assert soft.ok[0]
     delta = m.deflection - 2e-4 * soft.force[0]

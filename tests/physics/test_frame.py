@@ -46,7 +46,7 @@ def test_it_is_the_root_that_bisection_finds() -> None:
 def test_a_frame_that_seats_is_the_root_of_one_reading_after_the_other(power: float) -> None:
     """Two cycles, the second one higher: by bisection at each reading, with the largest force of those before."""
     measured = np.interp(np.linspace(0, 4, 81), range(5), [0.0, 0.6, 0.1, 0.85, 0.3])
-    x = np.array([[0.05, power, 0.4]])
+    x = np.array([[0.05, power, np.log(0.4 / 0.6)]])
 
     def seats(_: np.ndarray, force: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return MachineCompliance().yielding(x, force, most)
@@ -67,6 +67,39 @@ def test_a_frame_that_seats_is_the_root_of_one_reading_after_the_other(power: fl
         most = max(most, f)
     assert np.max(force) > 3.0
     assert np.any(force[0, 50:] < force[0, 10] - 0.1)
+
+
+def test_a_lost_station_leaves_the_curve_after_it() -> None:
+    """What the film cannot follow has no force, and nothing is remembered of it."""
+    x = np.array([[0.02, 0.8, -0.8]])
+    way = np.append(np.linspace(0, 0.8, 9), np.linspace(0.7, 0.3, 5))
+
+    def seats(_: np.ndarray, force: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return MachineCompliance().yielding(x, force, most)
+
+    plain = in_series(film, seats, way[None])
+    beyond = in_series(film, seats, np.insert(way, 9, 3.0)[None])
+    assert plain[2].all()
+    assert beyond[2].all()
+    assert np.isnan(beyond[1][0, 9])
+    assert np.delete(beyond[1], 9, axis=1) == pytest.approx(plain[1], rel=1e-9)
+
+
+def test_no_film_near_locking_is_lost_for_a_frame_that_seats() -> None:
+    """Two cycles, the second one higher: what is found on a frame where nothing stays is found where something does."""
+    way = 0.06 * np.interp(np.linspace(0, 4, 60), range(5), [0.02, 0.6, 0.1, 1.0, 0.02])
+    m = Measurement(way, np.ones(way.size), Uniaxial(), Specimen("tape", 1e-3), time=np.arange(1.0, 61.0))
+    h = hypothesis("gent", ["machine_compliance"]).on(m)
+    f = Forward(h, m, m.deflection)
+    limits, rng = np.geomspace(0.3, 3.0, 300), np.random.default_rng(0)
+    film = np.stack([h.material.to_coordinates(np.array([20.0, limit])) for limit in limits])
+    frames = np.stack([10 ** rng.uniform(-4, -2, 300), rng.uniform(0.5, 1.2, 300), rng.normal(-1, 2, 300)], axis=1)
+    seats = np.concatenate([film, frames], axis=1)
+    plain = seats.copy()
+    plain[:, -1] = -20.0
+    kept, lost = (np.array(f(x).ok) for x in (plain, seats))
+    assert 30 < np.count_nonzero(kept) < 300
+    assert np.array_equal(kept, lost)
 
 
 def test_rows_do_not_mix_and_a_start_does_not_matter() -> None:
@@ -105,7 +138,7 @@ def test_a_relaxed_film_on_a_frame_that_is_soft_at_no_force_closes() -> None:
     m = Measurement(way, np.ones(way.size), strip, Specimen("tape", 1e-3), time=time)
     h = hypothesis("gent", ["viscoelastic", "machine_compliance"])
     f = Forward(h.on(m), m, m.deflection)
-    theta = {"viscoelastic": [0.5, 20.0, 0.0, 0.5, -1.5, 0.0], "machine_compliance": [2e-3, 0.3, 0.3]}
+    theta = {"viscoelastic": [0.5, 20.0, 0.0, 0.5, -1.5, 0.0], "machine_compliance": [2e-3, 0.3, -0.8]}
     x = np.concatenate([theta[e.name] for e in f.composition.effects])[None]
     law, _ = f.law(np.array([[20.0, 60.0]]), x)
     delta, force, status = f.composition.closed(law, x)
@@ -131,4 +164,4 @@ def test_what_the_load_cell_adds_has_the_slopes_of_differences() -> None:
         step = np.zeros(x.shape)
         step[0, i] = 1e-4 * max(abs(x[0, i]), 1e-9)
         expected = (f(x + step).force - f(x - step).force)[0] / (2 * step[0, i])
-        assert slopes[0, :, i] == pytest.approx(expected, rel=5e-3, abs=1e-4 * np.max(np.abs(expected)))
+        assert slopes[0, :, i] == pytest.approx(expected, rel=1e-2, abs=1e-4 * np.max(np.abs(expected)))

@@ -11,11 +11,9 @@ from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, around
 from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array
 
-LEARN_FROM, BRIDGED = 2000, 30
+LEARN_FROM, BRIDGED, SETTLED = 2000, 1000, 1e-6
 SPREAD, HEAVY = 1.3, 5.0  # how much wider than the draws a density is, and its most degrees of freedom
-ENOUGH, FOLLOWED = 100.0, 2  # effective draws of the other points' posterior, and densities made to find them
-LED_FROM = 20.0
-"""Effective draws from which on they say where to draw more."""
+ENOUGH, FOLLOWED = 100.0, 10  # effective draws of the other points' posterior, and densities made to find them
 EACH, PER_DIMENSION = 400, 300  # draws of such a density
 UNSEEN = 10.0  # over the effective draws is the least error
 TOGETHER = 4096  # draws that are weighed at once
@@ -45,15 +43,15 @@ class Pool:
         some = rng.permutation(len(draws))
         self._add(fit_mixture(draws[some[:LEARN_FROM]], rng), len(draws))
 
-    def without(self, i: int) -> tuple[float, float, float]:
+    def without(self, i: int, most: int = FOLLOWED, led_from: float = 0.0) -> tuple[float, float, float]:
         """(ln p(y_i | y_-i), its Monte Carlo error, effective number of draws) with p(x | y_-i) ~ p(x | y) / term_i.
 
-        Where the draws hold next to none of p(x | y_-i), more are drawn from densities that are led there: each is
-        fitted to what the draws so far say of it, at a power at which enough of them count (O. Cappé et al., Stat.
-        Comput. 18 (2008) 447).
+        Where the draws hold next to none of p(x | y_-i), more are drawn from ``most`` densities that are led there:
+        each is fitted to what the draws so far say of it, at a power at which enough of them count (O. Cappé et al.,
+        Stat. Comput. 18 (2008) 447). Fewer than ``led_from`` effective draws lead nowhere.
         """
-        for _ in range(FOLLOWED):
-            if not LED_FROM <= self._of(i)[2] < ENOUGH:
+        for _ in range(most):
+            if not led_from <= self._of(i)[2] < ENOUGH:
                 break
             try:
                 towards = around(self._drawn_towards(i), self.rng)
@@ -65,12 +63,6 @@ class Pool:
     def effective(self, i: int) -> float:
         """Number of draws that count for the posterior of the others than point ``i``."""
         return self._of(i)[2]
-
-    @property
-    def log_integral_sd(self) -> float:
-        """Monte Carlo error of `log_z`."""
-        w = np.exp(self.log_p - self.log_q - np.max(self.log_p - self.log_q))
-        return float(np.std(w) / (np.sqrt(len(w)) * np.mean(w)))
 
     def _of(self, i: int) -> tuple[float, float, float]:
         a, b = self.log_p - self.log_q, self.log_p - self.terms[:, i] - self.log_q
@@ -113,7 +105,11 @@ class Pool:
         share = np.log(np.array(self.counts) / len(self.x))
         parts = [slice(i, i + TOGETHER) for i in range(0, len(self.x), TOGETHER)]
         log_g = np.concatenate([logsumexp(share[1:, None] + self.log_others[:, part], axis=0) for part in parts])
+        if len(self.others) == 1:  # each round goes a part of the way alone, and ln Z may be far
+            self.log_z = float(np.median((self.log_p - log_g)[: self.counts[0]]))
         for _ in range(BRIDGED):
             # Meng & Wong's iteration: the mean of p / q is the normalisation of p.
             self.log_q = np.logaddexp(share[0] + self.log_p - self.log_z, log_g)
-            self.log_z = float(logsumexp(self.log_p - self.log_q) - np.log(len(self.log_p)))
+            before, self.log_z = self.log_z, float(logsumexp(self.log_p - self.log_q) - np.log(len(self.log_p)))
+            if abs(self.log_z - before) < SETTLED:
+                break

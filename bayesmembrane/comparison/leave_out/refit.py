@@ -18,46 +18,58 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.noise.base import force_scale
 
-BLIND, EXACT = 30.0, 1e-7
+BLIND, EXACT = 30.0, 1e-11
 """Of the largest force: the noise of a reading that says nothing, and that of one whose own noise is not known."""
-LEARN_FROM, OF_THEM, EACH = 1500, 500, 600
+LEARN_FROM, OF_THEM, EACH = 1500, 300, 300
 """Draws of the whole posterior that a mixture is fitted to, of which some are tried again, and draws of each width."""
 WIDTHS, HEAVY = (1.3, 2.5, 4.0), 5.0
 """Of that mixture, for the posterior of fewer points is wider; and its degrees of freedom at most."""
-ROUNDS, PARENTS = 4, 300
+ROUNDS, PARENTS = 3, 300
 """Of differential evolution, and points that it begins at."""
-CHECKED = 2000
-"""Draws that give the integral."""
+GOOD_ENOUGH, CHECKED = 0.1, 2000
+"""Efficiency of a proposal, and draws of it that give the integral: to 0.07."""
+
+
+def log_integral(posterior: Posterior, draws: Array, rng: np.random.Generator) -> tuple[float, float]:
+    """(ln int p0(x) p(y | x) dx, its standard error), by the weights of independent proposals.
+
+    ``draws`` (M, k) of the posterior, or one that is close, say where to look. The error is infinite where no proposal
+    is found.
+    """
+    counts = Outcomes()
+    try:
+        close = independent(posterior, _tried(posterior, draws, rng, counts), rng, counts, GOOD_ENOUGH)
+    except (SettingsError, np.linalg.LinAlgError):
+        close = None
+    if close is None:
+        return -np.inf, np.inf
+    proposal = proposing(posterior, close.mixture)
+    found = worth(proposal.solved(proposal.drawn(rng, CHECKED)).log_weights)
+    return found.log_mean, max(found.log_mean_sd, UNSEEN / max(found.efficiency * CHECKED, 1.0))
 
 
 def log_integral_without(posterior: Posterior, i: int, draws: Array, rng: np.random.Generator) -> tuple[float, float]:
     """(ln int p0(x) p(y_-i | x) dx, its standard error), with the prior p0 as the posterior has it.
 
     The reading keeps its place, with a noise of its own of `BLIND` times the largest force: what it then makes of any
-    curve is one over that and the root of two pi, to a thousandth, and every scale of the prior stays what it was.
-    ``draws`` (M, k) of the whole posterior say where to look. The error is infinite where no proposal is found.
+    curve is one over that and the root of two pi, to a thousandth, and every scale of the prior stays what it was. A
+    covariance whose smallest eigenvalue is less than 1e-10 of the largest force squared loses digits beside it.
     """
-    blind, sd = _blinded(posterior.measurement, i)
-    target, counts = replace(posterior, measurement=blind), Outcomes()
-    try:
-        close = independent(target, _tried(target, draws, rng, counts), rng, counts)
-    except (SettingsError, np.linalg.LinAlgError):
-        close = None
-    if close is None:
-        return -np.inf, np.inf
-    proposal = proposing(target, close.mixture)
-    found = worth(proposal.solved(proposal.drawn(rng, CHECKED)).log_weights)
-    unseen = UNSEEN / max(found.efficiency * CHECKED, 1.0)
-    return found.log_mean + float(np.log(sd * np.sqrt(2 * np.pi))), max(found.log_mean_sd, unseen)
+    m, sd = posterior.measurement, BLIND * force_scale(posterior.measurement)
+    value, error = log_integral(replace(posterior, measurement=_blinded(m, i, sd)), draws, rng)
+    return value + float(np.log(sd * np.sqrt(2 * np.pi))), error
 
 
-def _blinded(m: Measurement, i: int) -> tuple[Measurement, float]:
-    """The measurement with a reading that says nothing, and the standard deviation of that."""
-    own, scale = m.noise_covariance, force_scale(m)
-    covariance = np.diag(np.full(len(m), (EXACT * scale) ** 2)) if own is None else np.array(own)
+def _blinded(m: Measurement, i: int, sd: float) -> Measurement:
+    """The measurement with a noise ``sd`` (N) of one reading; no covariance where it has none, which costs the most."""
+    if m.covariance is None:
+        own = np.full(len(m), EXACT * force_scale(m)) if m.force_sd is None else np.array(m.force_sd)
+        own[i] = sd
+        return replace(m, force_sd=own)
+    covariance = np.array(m.covariance)
     covariance[i], covariance[:, i] = 0.0, 0.0
-    covariance[i, i] = (BLIND * scale) ** 2
-    return replace(m, covariance=covariance, force_sd=None), BLIND * scale
+    covariance[i, i] = sd**2
+    return replace(m, covariance=covariance, force_sd=None)
 
 
 def _tried(target: Posterior, draws: Array, rng: np.random.Generator, counts: Outcomes) -> Tried:

@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.comparison.leave_out.pool import ENOUGH, Pool
-from bayesmembrane.comparison.leave_out.refit import log_integral_without
+from bayesmembrane.comparison.leave_out.refit import log_integral, log_integral_without
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
@@ -26,6 +26,10 @@ from bayesmembrane.physics.mechanics import api
 from bayesmembrane.physics.noise.base import force_scale
 
 PARETO_K = 0.7
+LED, LED_FROM = 2, 20.0
+"""Densities that are led to the posterior of the others before it is integrated, from so many effective draws on."""
+MOST_INTEGRALS = 8
+"""Of one call: each takes thousands of curves."""
 
 Tell = Callable[[str], None]
 
@@ -43,7 +47,7 @@ class LeaveOneOut:
     monte_carlo_sd : what the draws add to that
     pointwise : (N,) the terms
     pareto_k : (N,) shape of the tail of the importance weights; above 0.7 the term comes from further draws
-    refitted : indices of those points
+    refitted : indices of those points, and of others of which the draws say too little
     """
 
     elpd: float
@@ -54,13 +58,20 @@ class LeaveOneOut:
     refitted: tuple[int, ...]
 
 
-def leave_one_out(posterior: Posterior, data: Any, seed: int = 0, tell: Tell | None = None) -> LeaveOneOut:
+def leave_one_out(
+    posterior: Posterior,
+    data: Any,
+    seed: int = 0,
+    tell: Tell | None = None,
+    integral: tuple[float, float] | None = None,
+) -> LeaveOneOut:
     """ln p(y_i | y_-i) = ln of the mean of p(y_i | y_-i, x) over p(x | y_-i), for every point i.
 
     ``data`` is the InferenceData of a run of ``posterior``: its pointwise terms are ln p(y_i | y_-i, x) under the whole
     covariance, so that p(x | y) / p(y_i | y_-i, x) is what the other points say of x, whatever the correlation. Pareto
     smoothed importance sampling uses that; where its k exceeds 0.7, draws of densities that are led to the posterior of
     the other points are added (`Pool`), and where these do not do, that posterior is integrated by itself (`refit`).
+    ``integral`` is ln of that of the whole posterior with its standard error, if the run has it.
 
     A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413; P.-C. Bürkner, J. Gabry, A. Vehtari, Comput. Stat. 36
     (2021) 1243.
@@ -73,36 +84,51 @@ def leave_one_out(posterior: Posterior, data: Any, seed: int = 0, tell: Tell | N
     draws = np.stack([data.posterior[n].values.ravel() for n in posterior.hypothesis.names], axis=1)
     log_likelihood = data.log_likelihood["force"].values.reshape(len(draws), -1).astype(float)
     error = np.array([_smoothed_error(log_likelihood[:, i]) for i in range(len(terms))])
-    rng = np.random.default_rng([seed, 2])
-    bad = ~(k <= PARETO_K)
+    bad, shared = ~(k <= PARETO_K), 0.0
     if np.any(bad):
         log_posterior = data.sample_stats["lp"].values.ravel().astype(float)
-        pool = Pool(posterior, draws, log_posterior, log_likelihood, rng)
-        for i in range(len(terms)):
-            # A few draws that hold a place by chance look as good as many: with the pool there are others.
-            if bad[i] or pool.effective(i) < ENOUGH:
-                bad[i] = True
-                if tell is not None:
-                    tell(f"leaving out point {i + 1} of {len(terms)}")
-                terms[i], error[i] = _by_itself(pool, i)
+        pool = Pool(posterior, draws, log_posterior, log_likelihood, np.random.default_rng([seed, 2]))
+        # Whose k is small, for few draws are where the others are wide, is seen by the draws of the pool.
+        bad |= np.array([pool.effective(i) < ENOUGH for i in range(len(terms))])
+        others = _Others(pool, draws, integral)
+        for i in np.flatnonzero(bad).tolist():
+            if tell is not None:
+                tell(f"leaving out point {i + 1} of {len(terms)}")
+            terms[i], error[i] = others.term(i)
+        shared = others.shared
     return LeaveOneOut(
         elpd=float(np.sum(terms)),
         se=float(np.sqrt(len(terms) * np.var(terms))),
-        monte_carlo_sd=float(np.sqrt(np.sum(error**2))),
+        monte_carlo_sd=float(np.sqrt(np.sum(error**2) + shared**2)),
         pointwise=terms,
         pareto_k=k,
         refitted=tuple(np.flatnonzero(bad).tolist()),
     )
 
 
-def _by_itself(pool: Pool, i: int) -> tuple[float, float]:
-    """One term with its error, by the draws of the pool if they are enough, or else by the integral of the others."""
-    term, error, effective = pool.without(i)
-    if effective >= ENOUGH:
-        return term, error
-    rest, sd = log_integral_without(pool.posterior, i, pool.x[: pool.counts[0]], pool.rng)
-    sd = float(np.hypot(sd, pool.log_integral_sd))
-    return (pool.log_z - rest, sd) if sd < error else (term, error)
+class _Others:
+    """Terms of points that the draws of the posterior say too little of."""
+
+    def __init__(self, pool: Pool, draws: Array, integral: tuple[float, float] | None) -> None:
+        self.pool, self.draws, self.whole, self.integrals = pool, draws, integral, 0
+
+    @property
+    def shared(self) -> float:
+        """What the error of the whole posterior's integral, which is in each of those integrated, adds to their sum."""
+        return self.integrals * self.whole[1] if self.integrals and self.whole is not None else 0.0
+
+    def term(self, i: int) -> tuple[float, float]:
+        """One with its error: by the draws of the pool, or few more, or by an integral, or by as many as it takes."""
+        term, error, effective = self.pool.without(i, LED, LED_FROM)
+        if effective >= ENOUGH:
+            return term, error
+        if self.integrals < MOST_INTEGRALS:
+            self.whole = self.whole or log_integral(self.pool.posterior, self.draws, self.pool.rng)
+            rest, sd = log_integral_without(self.pool.posterior, i, self.draws, self.pool.rng)
+            if np.hypot(sd, self.whole[1]) < error:
+                self.integrals += 1
+                return self.whole[0] - rest, sd
+        return self.pool.without(i)[:2]
 
 
 def _smoothed_error(log_likelihood: Array) -> float:

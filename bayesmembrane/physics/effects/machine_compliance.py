@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import isotonic_regression
+from scipy.special import expit
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array, HalfNormal, Lomax, Normal
@@ -68,14 +69,16 @@ class FrameCurve:
 
 @dataclass(frozen=True)
 class MachineCompliance(Compliance):
-    """delta_film = delta - (1 - seated) u(F) - seated u(F_m), u(F) = compliance F |F / 1 N|^(exponent - 1).
+    """delta_film = delta - (1 - s) u(F) - s u(F_m), with u(F) = compliance F |F / 1 N|^(exponent - 1) and
+    s = 1 / (1 + exp(-seated)).
 
     F_m is the largest force so far. Beams and load cells yield in proportion to the force (1), contacts of round bodies
     as F^(2/3) (H. Hertz, J. Reine Angew. Math. 92 (1882) 156), rough seats, whose stiffness grows with the force, more
     nearly as its logarithm, joints that open the other way round: the compliance of real frames changes with the load,
     by tens of percents. A load string that was not preloaded gives way for good at its first loading, in grips, lock
-    nuts and couplings (``seated``; that is what its makers have it preloaded for: Instron 34SC, operator's guide,
-    "Preload the load string"), and a film behind it looks longer after its first pull. And frames differ by orders of
+    nuts and couplings (s; that is what its makers have it preloaded for: Instron 34SC, operator's guide, "Preload the
+    load string"), and a film behind it looks longer after its first pull. Of one that was, next to nothing stays: s may
+    have any order of magnitude. And frames differ by orders of
     magnitude: a prior that falls like a normal one would rather let the film be softer than the frame.
 
     Where a blank run shows the frame, delta_film = delta - compliance F_m g(F / F_m) with the run's curve g up to its
@@ -102,10 +105,10 @@ class MachineCompliance(Compliance):
         EffectParameter(
             "seated",
             "-",
-            "part of it that stays after the largest force so far",
-            HalfNormal(0.25),
-            (0.0, 0.9),
-            begin=0.1,
+            "log odds of the part of it that stays after the largest force so far",
+            Normal(-4.0, 3.0),
+            (-20.0, 6.0),
+            begin=-2.0,
         ),
     )
 
@@ -131,7 +134,7 @@ class MachineCompliance(Compliance):
         if self.curve is None:
             now, soft = _power(p, force)
             so_far = np.maximum(force, most)
-            seated = p[:, 2:3]
+            seated = expit(p[:, 2:3])
             lost = (1 - seated) * now + seated * _power(p, so_far)[0]
             return lost, np.where(force >= so_far, soft, (1 - seated) * soft)
         compliance = np.full((len(force), 1), self.curve.compliance) if self.held else p[:, :1]

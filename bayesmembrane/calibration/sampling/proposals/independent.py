@@ -61,8 +61,11 @@ class Independent:
     worth: Worth
 
 
-def independent(posterior: Posterior, tried: Tried, rng: np.random.Generator, counts: Outcomes) -> Independent | None:
-    """A mixture close to the posterior, from what has been ``tried``; None if none is found that is close enough.
+def independent(
+    posterior: Posterior, tried: Tried, rng: np.random.Generator, counts: Outcomes, enough: float | None = None
+) -> Independent | None:
+    """A mixture close to the posterior, from what has been ``tried``; None if none is found that is close enough. One
+    of the efficiency ``enough`` is good enough (None: as much as a walk wants).
 
     In each round an emulator is learned from the better points, walked on, and a mixture fitted to where that led; some
     draws of it are solved, tell how good it is, and join what the next round learns from. O. Cappé et al.,
@@ -72,9 +75,10 @@ def independent(posterior: Posterior, tried: Tried, rng: np.random.Generator, co
     shape = collapsed(posterior)
     if shape is None:
         scores = scores_of(posterior)
-        found = _of_all_coordinates(_Learning(Scored(posterior, scores), rng, counts), _scored(tried, scores))
+        search = _Learning(Scored(posterior, scores), rng, counts)
+        found = _of_all_coordinates(search, _scored(tried, scores), enough or ENOUGH)
         return None if found is None else replace(found, states=scores.back(found.states))
-    close = _of_shapes(_Learning(shape, rng, counts), _shapes(tried, shape))
+    close = _of_shapes(_Learning(shape, rng, counts), _shapes(tried, shape), enough or ENOUGH_SHAPE)
     if close is None:
         return None
     states = close.states[:STATES]
@@ -99,7 +103,7 @@ def _shapes(tried: Tried, shape: Collapsed) -> Tried:
     return Tried(x, lp, curves)
 
 
-def _of_all_coordinates(search: _Learning, tried: Tried) -> Independent | None:
+def _of_all_coordinates(search: _Learning, tried: Tried, enough: float = ENOUGH) -> Independent | None:
     """What `independent` finds of all coordinates: what is best of `ROUNDS` is filled, if it has to be."""
     found: list[Independent] = []
     with suppress(np.linalg.LinAlgError):  # what was tried fills no volume
@@ -107,7 +111,7 @@ def _of_all_coordinates(search: _Learning, tried: Tried) -> Independent | None:
             now, tried = search.round(tried, SNAPSHOTS, turn > 0)
             if now is not None:
                 found.append(now)
-                if _rank(now) >= (True, ENOUGH):
+                if _rank(now) >= (True, enough):
                     return now
     best = max(found, key=_rank, default=None)
     if best is None or best.worth.efficiency < HOPELESS:
@@ -124,9 +128,9 @@ def _of_all_coordinates(search: _Learning, tried: Tried) -> Independent | None:
     return best if _rank(best) >= (True, LEAST) else None
 
 
-def _of_shapes(search: _Learning, tried: Tried) -> Independent | None:
+def _of_shapes(search: _Learning, tried: Tried, enough: float = ENOUGH_SHAPE) -> Independent | None:
     """What `independent` finds of shapes: a few hundred draws do not show the tail of their weights, and a mixture is
-    filled as soon as there is one that is not `ENOUGH_SHAPE`.
+    filled as soon as there is one that is not good ``enough``.
     """
     found: list[Independent] = []
     with suppress(np.linalg.LinAlgError):
@@ -134,7 +138,7 @@ def _of_shapes(search: _Learning, tried: Tried) -> Independent | None:
             now, tried = search.round(tried, SNAPSHOTS * (MORE if turn else 1), turn > 0)
             if now is None:
                 continue
-            if _rank(now) >= (True, ENOUGH_SHAPE):
+            if _rank(now) >= (True, enough):
                 return now
             more, tried = search.completed(now, tried)
             if more is not None:
