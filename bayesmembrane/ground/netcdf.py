@@ -15,7 +15,7 @@ SMALL = 50_000
 
 
 def packed(groups: Mapping[str, Any]) -> bytes:
-    """The content of a netCDF file with these xarray datasets as its groups, compressed; "/" is the file itself."""
+    """The content of a netCDF file with these xarray datasets as its groups, large ones compressed; "/" is the file."""
     encoding = {
         f"/{name.strip('/')}": {n: _stored(v) for n, v in held.variables.items()} for name, held in groups.items()
     }

@@ -163,14 +163,14 @@ def probabilities_told(p: Probabilities) -> list[str]:
     return [*told, *(f"{what} {percent(q)}" for what, q in foreign_told(p))]
 
 
+_CONCLUDED = {ANOTHER_LAW: "a law that is not in the library", UNLISTED: "a fault that is not in the library"}
+
+
 def foreign_told(p: Probabilities) -> list[tuple[str, float]]:
     """What is foreign, in words, and how probable, where it counts: what was found, and what is only concluded."""
     told = [("something foreign", p.something_found)]
     told += [(what, p.foreign.get(kind, 0.0)) for kind, what in _CONCLUDED.items()]
     return [(what, q) for what, q in told if q >= WORDS.probable]
-
-
-_CONCLUDED = {ANOTHER_LAW: "a law that is not in the library", UNLISTED: "a fault that is not in the library"}
 
 
 def _beyond(first: set[str], name: str) -> str:

@@ -118,6 +118,16 @@ def test_a_rate_of_a_test_that_nobody_timed_says_what_is_assumed(timed: bool) ->
     assert ("assumed 1 mm/s" in flagged_size(effect, drifts, m)) is not timed
 
 
+def test_what_is_only_concluded_is_told_beside_what_was_found() -> None:
+    kinds = {"none": 0.6, "ripple": 0.3, "unlisted": 0.06, "another_law": 0.04}
+    told = probabilities_told(Probabilities({"friction": 1.0}, {"yeoh": 1.0}, kinds))[1:]
+    assert told == [
+        "something foreign 30 %",
+        "a law that is not in the library 4 %",
+        "a fault that is not in the library 6 %",
+    ]
+
+
 def test_what_is_in_nearly_all_sets_is_told_first() -> None:
     sets = {"viscoelastic": 0.5, "friction+viscoelastic": 0.3, "tearing+viscoelastic": 0.18, "tearing": 0.02}
     told = probabilities_told(Probabilities(sets, {"yeoh": 1.0}, {"none": 0.9, "ripple": 0.1}))

@@ -28,6 +28,8 @@ ROUNDS, PARENTS = 3, 300
 """Of differential evolution, and points that it begins at."""
 GOOD_ENOUGH, CHECKED = 0.1, 2000
 """Efficiency of a proposal, and draws of it that give the integral: to 0.07."""
+LOOSE = 0.2
+"""An error of this size is worth another proposal."""
 
 
 def log_integral(posterior: Posterior, draws: Array, rng: np.random.Generator) -> tuple[float, float]:
@@ -36,9 +38,20 @@ def log_integral(posterior: Posterior, draws: Array, rng: np.random.Generator) -
     ``draws`` (M, k) of the posterior, or one that is close, say where to look. The error is infinite where no proposal
     is found.
     """
+    value, error = -np.inf, np.inf
+    for enough in (GOOD_ENOUGH, None):  # the second time one as good as a walk wants
+        value, error = _integrated(posterior, draws, rng, enough)
+        if error < LOOSE:
+            break
+    return value, error
+
+
+def _integrated(
+    posterior: Posterior, draws: Array, rng: np.random.Generator, enough: float | None
+) -> tuple[float, float]:
     counts = Outcomes()
     try:
-        close = independent(posterior, _tried(posterior, draws, rng, counts), rng, counts, GOOD_ENOUGH)
+        close = independent(posterior, _tried(posterior, draws, rng, counts), rng, counts, enough)
     except (SettingsError, np.linalg.LinAlgError):
         close = None
     if close is None:

@@ -78,8 +78,8 @@ class MachineCompliance(Compliance):
     by tens of percents. A load string that was not preloaded gives way for good at its first loading, in grips, lock
     nuts and couplings (s; that is what its makers have it preloaded for: Instron 34SC, operator's guide, "Preload the
     load string"), and a film behind it looks longer after its first pull. Of one that was, next to nothing stays: s may
-    have any order of magnitude. And frames differ by orders of
-    magnitude: a prior that falls like a normal one would rather let the film be softer than the frame.
+    have any order of magnitude. Only a way back shows it. And frames differ by orders of magnitude: a prior that falls
+    like a normal one would rather let the film be softer than the frame.
 
     Where a blank run shows the frame, delta_film = delta - compliance F_m g(F / F_m) with the run's curve g up to its
     largest force F_m: there is no exponent then, nothing is seated any more, and the compliance is the run's, but for
