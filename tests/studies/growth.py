@@ -43,11 +43,10 @@ EFFECTS = (
     "force_offset",
     "zero_offset",
     "prestretch",
-    "machine_compliance",
     "thickness",
     "clamp_bending",
+    "machine_compliance",
     "off_centre_disc",
-    "force_gain",
     "friction",
 )
 Case = tuple[str, int, int]
