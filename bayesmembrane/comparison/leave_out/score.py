@@ -88,7 +88,7 @@ def leave_one_out(
     if np.any(bad):
         log_posterior = data.sample_stats["lp"].values.ravel().astype(float)
         pool = Pool(posterior, draws, log_posterior, log_likelihood, np.random.default_rng([seed, 2]))
-        # Whose k is small, for few draws are where the others are wide, is seen by the draws of the pool.
+        # A k is small, too, where few draws reach what the others allow: those of the pool show it.
         bad |= np.array([pool.effective(i) < ENOUGH for i in range(len(terms))])
         others = _Others(pool, draws, integral)
         for i in np.flatnonzero(bad).tolist():
