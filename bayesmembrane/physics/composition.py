@@ -115,8 +115,8 @@ class Composition:
         def film(rows: NDArray[np.intp], delta: Array) -> tuple[Array, Array]:
             return self.film(law if rows.size == len(x) else law.of(rows), x[rows], delta)
 
-        def yielding(rows: NDArray[np.intp], force: Array, most: Array) -> tuple[Array, Array]:
-            parts = [e.yielding(p[rows], force, most) for e, p in frame]
+        def yielding(rows: NDArray[np.intp], force: Array, peaks: Array) -> tuple[Array, Array]:
+            parts = [e.yielding(p[rows], force, peaks) for e, p in frame]
             return sum(u for u, _ in parts), sum(du for _, du in parts)
 
         delta, force, found = in_series(film, yielding, measured, start)

@@ -38,17 +38,17 @@ def in_series(
     (B, N) N do; then what is remembered stands still in each pass, until it does so from one to the next. Where the
     film has no force there is nothing to be remembered.
     """
-    delta, force, found = _closed(film, frame, measured, start, _before(start, measured))
-    most, rows, reach = _before(start, measured), np.arange(len(measured)), _reach(measured)
+    delta, force, found = _closed(film, frame, measured, start, _peaks_before(start, measured))
+    peaks, rows, reach = _peaks_before(start, measured), np.arange(len(measured)), _reach(measured)
     for _ in range(PASSES):
-        now = _before(force, measured)
+        now = _peaks_before(force, measured)
         with np.errstate(invalid="ignore"):
-            moved = np.abs(frame(rows, force[rows], now[rows])[0] - frame(rows, force[rows], most[rows])[0])
-        rows, most = rows[np.any(moved > CLOSED * reach, axis=1) & found[rows]], now
+            moved = np.abs(frame(rows, force[rows], now[rows])[0] - frame(rows, force[rows], peaks[rows])[0])
+        rows, peaks = rows[np.any(moved > CLOSED * reach, axis=1) & found[rows]], now
         if not rows.size:
             return delta, force, found
         part = _closed(
-            partial(_of, film, rows), partial(_of, frame, rows), measured[rows], _rigid(force[rows]), most[rows]
+            partial(_of, film, rows), partial(_of, frame, rows), measured[rows], _rigid(force[rows]), peaks[rows]
         )
         delta[rows], force[rows], found[rows] = part
     found[rows] = False
@@ -56,9 +56,9 @@ def in_series(
 
 
 def _closed(
-    film: Film, frame: Frame, measured: Array, start: Array | None, most: Array
+    film: Film, frame: Frame, measured: Array, start: Array | None, peaks: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """`in_series` with a frame that remembers ``most`` (B, N) N as the largest forces before.
+    """`in_series` with a frame that remembers ``peaks`` (B, N) N as the largest forces before.
 
     Newton's method for the force, from ``start`` (B, N) N or from a frame that is rigid. A frame that yields like a
     power of the force less than one is without bounds soft at no force, where a tangent leads astray: long steps are
@@ -72,7 +72,7 @@ def _closed(
     low, high = np.full(measured.shape, -np.inf), np.full(measured.shape, np.inf)
     before = np.full((2, *measured.shape), np.nan)
     for turn in range(MOST_ITERATIONS):
-        yielded, soft = frame(rows, held, most[rows])
+        yielded, soft = frame(rows, held, peaks[rows])
         at = measured[rows] - yielded
         pull, slope = film(rows, at)
         lost, slope = np.isnan(pull), _seen(at - before[0], pull - before[1], slope, SHORT * reach)
@@ -85,8 +85,8 @@ def _closed(
             break
         new = held + step
         far = np.nonzero(~here[:, None] & (np.abs(step) > LONG * np.abs(held)))
-        here_most = most[rows[far[0]], far[1]]
-        new[far] = _along(partial(frame, rows[far[0]]), (pull + slope * yielded)[far], slope[far], held[far], here_most)
+        peak = peaks[rows[far[0]], far[1]]
+        new[far] = _along(partial(frame, rows[far[0]]), (pull + slope * yielded)[far], slope[far], held[far], peak)
         low, high = np.where(lost, held, low), np.where(~lost & (pull < held), held, high)
         with np.errstate(invalid="ignore"):
             between = np.where(np.isinf(high), MORE * np.abs(held), 0.5 * (low + high))
@@ -121,7 +121,7 @@ def _rigid(force: Array) -> Array:
     return np.where(np.isnan(force), np.nan_to_num(most), force)
 
 
-def _before(force: Array | None, measured: Array) -> Array:
+def _peaks_before(force: Array | None, measured: Array) -> Array:
     """(B, N) N: the largest of the forces (B, N) before each, and 0; 0 where no forces are known."""
     if force is None:
         return np.zeros(measured.shape)
@@ -130,17 +130,17 @@ def _before(force: Array | None, measured: Array) -> Array:
 
 
 def _along(
-    yielding: Callable[[Array, Array], tuple[Array, Array]], pull: Array, slope: Array, start: Array, most: Array
+    yielding: Callable[[Array, Array], tuple[Array, Array]], pull: Array, slope: Array, start: Array, peaks: Array
 ) -> Array:
     """F (M,) with F + k u(F) = ``pull`` (M,) N, of films with the slope k (M,): by Newton's method for ln |F|, of which
-    the logarithm of the left side is nearly a straight line. ``most`` (M,) N is the largest force before.
+    the logarithm of the left side is nearly a straight line. ``peaks`` (M,) N are the largest forces before.
     """
-    rest = yielding(np.zeros((len(pull), 1)), most[:, None])[0][:, 0]  # what has seated has no part in the logarithm
+    rest = yielding(np.zeros((len(pull), 1)), peaks[:, None])[0][:, 0]  # what has seated has no part in the logarithm
     pull = pull - slope * rest
     force = np.where(start * pull > 0, start, pull)
     with np.errstate(all="ignore"):
         for _ in range(TURNS):
-            yielded, soft = (v[:, 0] for v in yielding(force[:, None], most[:, None]))
+            yielded, soft = (v[:, 0] for v in yielding(force[:, None], peaks[:, None]))
             whole = force + slope * (yielded - rest)
             force = force * np.exp(np.log(pull / whole) * whole / (force * (1 + slope * soft)))
     return np.where((pull == 0) | ~np.isfinite(force), 0.0, force)

@@ -37,7 +37,7 @@ class Closer(Problem):
         given = np.array([BESIDES**i for i in range(len(points))])
         share = np.concatenate([given / np.sum(given), modes.weights])
         g = joined(fitted, share)
-        self.q = Mixture(g.log_weights, g.means, WIDER * g.roots, DEGREES)
+        self.q = g.broader(WIDER, DEGREES)
         x = self.q.draw(rng, LOOKED_AT)
         if worth(problem.log_posterior(x) - self.q.log_density(x)).efficiency < GOOD:
             with suppress(np.linalg.LinAlgError):  # it is large where nothing has a volume

@@ -83,7 +83,7 @@ class Pool:
 
     def _add(self, g: Mixture, count: int) -> None:
         """Draw from g, made broader and with heavy tails, and weigh everything anew."""
-        g = Mixture(g.log_weights, g.means, SPREAD * g.roots, min(g.degrees, HEAVY))
+        g = g.broader(SPREAD, min(g.degrees, HEAVY))
         x = g.draw(self.rng, count)
         e = self.posterior.evaluate(x)
         good = e.log_posterior > HOPELESS  # heavy tails reach films of any force

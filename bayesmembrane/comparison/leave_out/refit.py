@@ -8,10 +8,10 @@ import numpy as np
 
 from bayesmembrane.calibration.posterior import Outcomes, Posterior
 from bayesmembrane.calibration.sampling.proposals.independent import independent
-from bayesmembrane.calibration.sampling.proposals.mixture import Mixture, fit_mixture
+from bayesmembrane.calibration.sampling.proposals.mixture import fit_mixture
 from bayesmembrane.calibration.sampling.proposals.proposing import proposing
 from bayesmembrane.calibration.sampling.weights import worth
-from bayesmembrane.calibration.starts import Tried, evolved, tempered
+from bayesmembrane.calibration.starts import Tried, try_points
 from bayesmembrane.comparison.leave_out.pool import UNSEEN
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
@@ -24,8 +24,8 @@ LEARN_FROM, OF_THEM, EACH = 1500, 300, 300
 """Draws of the whole posterior that a mixture is fitted to, of which some are tried again, and draws of each width."""
 WIDTHS, HEAVY = (1.3, 2.5, 4.0), 5.0
 """Of that mixture, for the posterior of fewer points is wider; and its degrees of freedom at most."""
-ROUNDS, PARENTS = 3, 300
-"""Of differential evolution, and points that it begins at."""
+POSSIBLE = 300
+"""Points that have to be possible films."""
 GOOD_ENOUGH, CHECKED = 0.1, 2000
 """Efficiency of a proposal, and draws of it that give the integral: to 0.07."""
 LOOSE = 0.2
@@ -89,11 +89,5 @@ def _tried(target: Posterior, draws: Array, rng: np.random.Generator, counts: Ou
     """Points around the posterior of the other readings: draws of all of them, wider ones, and what evolves of both."""
     some = draws[rng.permutation(len(draws))[:LEARN_FROM]]
     g = fit_mixture(some, rng)
-    degrees = min(g.degrees, HEAVY)
-    wider = [Mixture(g.log_weights, g.means, w * g.roots, degrees).draw(rng, EACH) for w in WIDTHS]
-    tried = Tried.of(target, np.concatenate([some[:OF_THEM], *wider]), counts)
-    for _ in range(ROUNDS):
-        good = tried.possible
-        parents = good.x[tempered(good.log_posterior, PARENTS / 2, PARENTS, rng)]
-        tried = tried.joined(Tried.of(target, evolved(parents, rng), counts))
-    return tried
+    wider = [g.broader(times, min(g.degrees, HEAVY)).draw(rng, EACH) for times in WIDTHS]
+    return try_points(target, rng, POSSIBLE, counts, np.concatenate([some[:OF_THEM], *wider]))

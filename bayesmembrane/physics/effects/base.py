@@ -325,10 +325,10 @@ class Compliance(Effect, ABC):
     stage = "compliance"
 
     @abstractmethod
-    def yielding(self, p: Array, force: Array, most: Array) -> tuple[Array, Array]:
+    def yielding(self, p: Array, force: Array, peaks: Array) -> tuple[Array, Array]:
         """((B, N) m, (B, N) m/N): displacement of the frame under the film's force, and its derivative.
 
-        ``most`` : (B, N) N, the largest force before, or 0.
+        ``peaks`` : (B, N) N, the largest force before each, or 0.
         """
 
 

@@ -50,6 +50,10 @@ class Mixture:
         z = np.linalg.inv(self.roots) @ (x.T - self.means[:, :, None])
         return np.asarray(np.einsum("jib,jib->jb", z, z))
 
+    def broader(self, times: float, degrees: float) -> Mixture:
+        """The same about the same places, so many times as wide, with other degrees of freedom, and without a bend."""
+        return Mixture(self.log_weights, self.means, times * self.roots, degrees)
+
     def draw(self, rng: np.random.Generator, count: int) -> Array:
         """Independent draws (count, k)."""
         w = np.exp(self.log_weights)
