@@ -70,7 +70,7 @@ class FrameCurve:
 @dataclass(frozen=True)
 class MachineCompliance(Compliance):
     """delta_film = delta - (1 - s) u(F) - s u(F_m), with u(F) = compliance F |F / 1 N|^(exponent - 1) and
-    s = 1 / (1 + exp(-ln_odds_seated)).
+    s = 1 / (1 + exp(-log_odds_seated)).
 
     F_m is the largest force so far. Beams and load cells yield in proportion to the force (1), contacts of round bodies
     as F^(2/3) (H. Hertz, J. Reine Angew. Math. 92 (1882) 156), rough seats, whose stiffness grows with the force, more
@@ -103,7 +103,7 @@ class MachineCompliance(Compliance):
         EffectParameter("compliance", "m/N", "travel lost by the first newton", Lomax(5e-4), (0.0, 1e-2), 0.0),
         EffectParameter("exponent", "-", "of the force that the travel lost grows with", Normal(0.8, 0.16), (0.3, 1.4)),
         EffectParameter(
-            "ln_odds_seated",
+            "log_odds_seated",
             "-",
             "log odds of the part of it that stays after the largest force so far",
             Normal(-4.0, 3.0),

@@ -133,7 +133,7 @@ def test_effects_that_do_not_remember_are_alike_on_every_leg(name: str) -> None:
     slow_fast = np.cumsum(np.where(np.arange(4 * 31 - 3) < 60, 1.0, 0.1))
     m = curve(np.concatenate([LEG, LEG[1:]]), slow_fast)
     sizes = np.array([0.5 * p.typical if p.null is None else p.null + 0.5 * p.scale for p in effect.coordinates])
-    sizes[[p.name == "ln_odds_seated" for p in effect.coordinates]] = -np.inf
+    sizes[[p.name == "log_odds_seated" for p in effect.coordinates]] = -np.inf
     x = np.concatenate([np.log([10.0]), np.clip(sizes, *zip(*((p.bounds) for p in effect.coordinates), strict=True))])
     force = Forward(claim, m, m.deflection)(x[None, :]).force[0]
     legs = force[:31], force[30:61][::-1], force[60:91], force[90:][::-1]
