@@ -18,7 +18,7 @@ from bayesmembrane.calibration.sampling.proposals.proposing import Proposing, pr
 from bayesmembrane.calibration.sampling.weights import Worth, worth
 from bayesmembrane.ground.parameters import Array
 
-BLOCK = 32
+BLOCK = 16
 """Steps that are solved at once. Blocks end at its multiples, so that a walk that goes on has the same ones."""
 MANY, LOOKED_AT, MENDING = 2**18, 2000, 0.2
 """States of a long walk among which distinct ones are sought, those that are looked at for where a mixture holds

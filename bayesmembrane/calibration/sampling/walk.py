@@ -153,7 +153,7 @@ def run_ensembles(
     chains = started(posterior, settings, seed) if chains is None else chains
     walk = _Walk(posterior, beside, chains)
     judged: tuple[object, Convergence] | None = None
-    target, status = chains.look or max(settings.chunk, chains.steps), "interrupted"
+    target, status = min(chains.look, settings.most_steps) or max(settings.chunk, chains.steps), "interrupted"
     with deferred(beside.stop) as asked, suppress(KeyboardInterrupt):
         if fresh:  # from here on whoever sees that something is kept may stop the walk
             beside.keep(chains)

@@ -143,7 +143,7 @@ def _of_shapes(search: _Learning, tried: Tried, enough: float = ENOUGH_SHAPE) ->
             more, tried = search.completed(now, tried)
             if more is not None:
                 found.append(more)
-                if _rank(more) >= (True, ENOUGH_FILLED):
+                if _rank(more) >= (True, min(enough, ENOUGH_FILLED)):
                     return more
     return max(found, key=_rank, default=None)
 
