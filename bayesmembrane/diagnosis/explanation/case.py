@@ -18,7 +18,8 @@ from bayesmembrane.diagnosis.candidates.signatures import signatures
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.detection.detect import Detection, detect
 from bayesmembrane.diagnosis.detection.scores import Signature
-from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside
+from bayesmembrane.diagnosis.explanation.foreign import Foreign
+from bayesmembrane.diagnosis.explanation.foreign_search import beside
 from bayesmembrane.diagnosis.explanation.limit import log_evidence_alone
 from bayesmembrane.diagnosis.explanation.twins import Pairs, twins, twins_in_time, twins_one_way
 from bayesmembrane.diagnosis.reference.inferred import own_noise

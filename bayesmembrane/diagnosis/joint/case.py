@@ -17,7 +17,8 @@ from bayesmembrane.diagnosis.detection.detect import Detection
 from bayesmembrane.diagnosis.detection.lack_of_fit import lack_of_fit
 from bayesmembrane.diagnosis.detection.scores import Signature, score_test
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase, OpenCase, Question, Tell, renewed, seen_elsewhere
-from bayesmembrane.diagnosis.explanation.foreign import Foreign, beside
+from bayesmembrane.diagnosis.explanation.foreign import Foreign
+from bayesmembrane.diagnosis.explanation.foreign_search import beside
 from bayesmembrane.diagnosis.explanation.twins import Near, Pairs, one_speed, twins, twins_in_time, twins_one_way
 from bayesmembrane.diagnosis.joint.effects import AT, EffectInTests, effects_in_tests
 from bayesmembrane.diagnosis.joint.search import JointSearch, joint_noise

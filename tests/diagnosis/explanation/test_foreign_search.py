@@ -8,8 +8,9 @@ import pytest
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
-from bayesmembrane.diagnosis.explanation import foreign as foreign_module
-from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, SUDDEN, UNNAMED, WAVE, Foreign, beside, foreign
+from bayesmembrane.diagnosis.explanation import foreign_search as foreign_module
+from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, SUDDEN, UNNAMED, WAVE, Foreign
+from bayesmembrane.diagnosis.explanation.foreign_search import beside, foreign
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.ground.parameters import Array
