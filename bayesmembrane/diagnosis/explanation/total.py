@@ -161,8 +161,10 @@ def summed(grown: Grown) -> Total:
     tears = [_tears(f, every, grown.search) for f in told]
     least = [_like_a_tear(f, some, weight, grown.search) for f, some in zip(told, tears, strict=True)]
     for w, some in zip(strange, tears, strict=True):
-        for c in some:
-            raised[frozenset(c.names)] += max(w - float(np.log(BELIEFS.apart)) - weight(c) - nothing, 0.0)
+        for names in {frozenset(c.names) for c in some}:
+            # Of the set, whatever its energy: of one that tears worse in this energy another one may be ahead.
+            best = max(weight(c) for c in every if frozenset(c.names) == names)
+            raised[names] += max(w - float(np.log(BELIEFS.apart)) - best - nothing, 0.0)
     every.sort(key=weight, reverse=True)
     terms = [(c, NOTHING, weight(c) + nothing) for c in every]
     terms += [(f.base, f.kind, max(w, low)) for f, w, low in zip(told, strange, least, strict=True)]

@@ -207,14 +207,17 @@ def test_a_fall_that_stays_is_at_most_twelve_times_less_probable_than_a_tear_tha
         assert least(left, size, one) == -np.inf
 
 
+@pytest.mark.parametrize("ahead", [-20.0, 0.0, 15.0])
 @pytest.mark.parametrize(("size", "behind", "held"), [(-0.1, 0.9, True), (0.1, 0.9, False), (-0.1, 1.1, False)])
 def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_little_better(
-    monkeypatch: pytest.MonkeyPatch, size: float, behind: float, held: bool
+    monkeypatch: pytest.MonkeyPatch, size: float, behind: float, held: bool, ahead: float
 ) -> None:
+    """Nor more, for being ``ahead`` with another energy than that beside which it was compared."""
     by_likelihood_alone(monkeypatch)
     monkeypatch.setattr(total, "BELIEFS", told())
     base = candidate("friction", log_evidence=-60.0)
     torn = candidate("friction", "tearing", log_evidence=-60.0)
+    other = candidate("friction", "tearing", log_evidence=-60.0 + ahead, energy="yeoh")
     case = SimpleNamespace(
         null=candidate(log_evidence=-90.0),
         plain={"gent": base},
@@ -226,12 +229,13 @@ def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_li
         tell=lambda _: None,
     )
     grown = grown_of(case)
-    for c in (case.null, base, torn):
+    for c in (case.null, base, torn, other):
         grown.add(c)
     cast(Any, grown.search).squares = leaving(base, LEFT, LEFT + 2 * behind * TWINS.behind)
     joint = total.summed(grown).joint
     ratio = joint["friction", SUDDEN] / joint["friction+tearing", NOTHING]
-    assert (ratio == pytest.approx(BELIEFS.apart)) is held
+    both = 1.0 + float(np.exp(-abs(ahead)))  # what is behind, of the set as a whole
+    assert (ratio == pytest.approx(BELIEFS.apart / both, rel=1e-4)) is held
     assert held or ratio > 2 * BELIEFS.apart
 
 
