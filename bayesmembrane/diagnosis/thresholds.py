@@ -363,6 +363,16 @@ class ForeignThresholds:
     """Of the whole test: how long a step takes, from at once to a few seconds."""
     rests: tuple[float, ...] = (0.01, 0.03, 0.1)
     """Of the whole test: in which what has begun comes to rest, as a temperature does."""
+    passes: tuple[float, ...] = (0.03, 0.1)
+    """Of the whole test: after which what comes and goes is largest."""
+    lost: float = 0.02
+    """Of the largest deflection: the expected loss of a drive, at once."""
+    within: tuple[float, float] = (0.08, 0.92)
+    """Of the largest force: where a range of an amplifier may begin."""
+    met_at: tuple[float, float] = (0.6, 0.95)
+    """Of the largest deflection: where a disc may meet something; before that it would hardly be lifted on."""
+    levels: int = 48
+    """Of either that are tried."""
     waves: int = 800
     """Waves that are tried over time, and as many over deflection, at most."""
     wave_step: float = 0.35

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesmembrane.calibration.run import Run
-from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
-from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, WAVE, Foreign
+from bayesmembrane.diagnosis.explanation.foreign import Foreign
 from bayesmembrane.diagnosis.explanation.total import NOTHING, set_name
 from bayesmembrane.diagnosis.left.shape import ResidualShape, residual_shape
 from bayesmembrane.diagnosis.loop import Loop, Stage
@@ -30,6 +29,7 @@ from bayesmembrane.words.diagnosis import (
     why_none,
     why_not,
 )
+from bayesmembrane.words.foreign import ADVICE, foreign_clause
 from bayesmembrane.words.hypothesis import effect_title, spoken
 from bayesmembrane.words.language import listed
 from bayesmembrane.words.moved import MATTERS, modulus_of, settled
@@ -38,7 +38,6 @@ from bayesmembrane.words.seen import MEASURED, seen
 from bayesmembrane.words.shape import PARTS
 from bayesmembrane.words.sizes import bound_of_material as _bound
 from bayesmembrane.words.sizes import flagged_size, hardly_met
-from bayesmembrane.words.units import size_in_words
 
 ROOM = 82
 """Words for all sentences: with its table and its picture a first screen stays below 120."""
@@ -298,7 +297,8 @@ def _unknown(course: Course) -> str:
     start = f"{sure} nearly certain, yet " if sure else ""
     if (strange := _strange(d)) is not None:
         beside = listed(effect_title(n) for n in strange.base.names)
-        return f"{start}{_foreign(strange, d.measurement)}{f', beside {beside}' if beside and not sure else ''}"
+        beside = f", beside {beside}" if beside and not sure else ""
+        return f"{start}{foreign_clause(strange, d.rig.shown(d.thickness))}{beside}"
     if d.members:
         return f"{start if d.firm else ''}nothing{further} is named, for {why_not(d)}"
     if d.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
@@ -311,7 +311,7 @@ def _unknown(course: Course) -> str:
 def _beside(d: Diagnosis) -> str:
     """What is foreign beside the effects, if that is more probable than not."""
     strange = _strange(d)
-    return "" if strange is None else f", beside {_foreign(strange, d.measurement)}"
+    return "" if strange is None else f", beside {foreign_clause(strange, d.rig.shown(d.thickness))}"
 
 
 def _strange(d: Diagnosis) -> Foreign | None:
@@ -346,24 +346,6 @@ def _explained(d: Diagnosis) -> str:
 def _energy(candidate: Candidate) -> str:
     """The energy, with what lies at its bound."""
     return candidate.hypothesis.material.title + (f" ({bound})" if (bound := _bound(candidate)) else "")
-
-
-def _foreign(f: Foreign, m: Measurement) -> str:
-    """What is foreign, as a clause."""
-    shown = m.rig.shown(m.specimen.thickness)
-    size = size_in_words(f.size, "N", shown)
-    if f.kind == SUDDEN:
-        when = f"reading {f.place + 1}" if f.moment is None else f"{f.moment:.4g} s"
-        step = f"{100 * abs(f.size):.2g} %" if f.relative else size.removeprefix("-")
-        return f"a sudden {'rise' if f.size > 0 else 'drop'} of the force by {step} at {when}"
-    if f.kind == WAVE:
-        return f"a wave of {size} every {size_in_words(f.period, 'm' if f.against == 'deflection' else 's', shown)}"
-    if f.kind == PLAY:
-        return f"a play of {size_in_words(f.size, 'm', shown)} in the drive"
-    if f.kind == CLIPPED:
-        limit = "soft limit" if f.soft >= WORDS.soft_limit else "limit"
-        return f"the load cell at its {limit} of {size} from reading {f.place + 1} on"
-    return f"something smooth, about {100 * f.size:.2g} % of the force, that no effect here leaves"
 
 
 # ---- what is left ----------------------------------------------------------------------------------------------------
@@ -451,13 +433,7 @@ def _when_unknown(d: Diagnosis) -> str:
         return _tell_apart(d)
     if strange is None:
         return "Repeat the test, and do not extrapolate with this model."
-    advice = {
-        SUDDEN: "Look for a knock, a tear or a change of temperature then.",
-        WAVE: "Look at the drive, its gear, and what vibrates.",
-        PLAY: "Take the play out of the drive, and test again.",
-        CLIPPED: "Leave these readings out, or take a larger load cell.",
-    }
-    return advice.get(strange.kind, "Repeat the test: what comes again is no accident.")
+    return ADVICE.get(strange.kind, "Repeat the test: what comes again is no accident.")
 
 
 def _tell_apart(d: Diagnosis) -> str:

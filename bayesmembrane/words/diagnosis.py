@@ -11,7 +11,6 @@ import numpy as np
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.standard import expected_size
-from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, PLAY, SUDDEN, UNNAMED, WAVE, Foreign
 from bayesmembrane.diagnosis.explanation.total import ANOTHER_LAW, NOTHING, UNLISTED, Judged, Probabilities, set_name
 from bayesmembrane.diagnosis.left.heldout import HeldOut
 from bayesmembrane.diagnosis.left.shape import resolution_of
@@ -21,6 +20,7 @@ from bayesmembrane.diagnosis.result import Diagnosis, Thinned
 from bayesmembrane.diagnosis.separation import Experiment
 from bayesmembrane.diagnosis.thresholds import NEXT_TEST, VERDICT, WORDS
 from bayesmembrane.ground.registry import components
+from bayesmembrane.words.foreign import foreign_sentence
 from bayesmembrane.words.hypothesis import effect_title, material_title, spoken
 from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.next_test import spoken_test
@@ -271,42 +271,6 @@ def experiment_sentence(experiment: Experiment, rig: Fixture) -> str:
     if np.isinf(experiment.separation):
         return f"{spoken_test(experiment.test, rig)}: shows one of them directly"
     return f"{spoken_test(experiment.test, rig)}: {experiment.separation:.1f} standard deviations apart"
-
-
-def foreign_sentence(f: Foreign, shown: Units) -> str:
-    """What is foreign: when or where, how large, and what makes such a thing."""
-    factor, unit = shown["N"]
-    taken = f"takes {100 * f.share:.0f} % of the squares away"
-    if f.kind == SUDDEN:
-        when = f"reading {f.place + 1}" if f.moment is None else f"{f.moment:.4g} s"
-        size = f"{100 * abs(f.size):.2g} %" if f.relative else f"{factor * abs(f.size):.3g} {unit}"
-        return (
-            f"A sudden {'rise' if f.size > 0 else 'drop'} of the force by {size} at {when} {taken}: look for a change "
-            "of temperature, a knock or a tear then."
-        )
-    if f.kind == WAVE:
-        length, name = shown["m"] if f.against == "deflection" else (1.0, "s")
-        return (
-            f"A wave of {factor * f.size:.3g} {unit} that repeats every {length * f.period:.3g} {name} {taken}, as a "
-            "drive, a gear or a vibration would make it."
-        )
-    if f.kind == PLAY:
-        length, name = shown["m"]
-        return (
-            f"A play of {length * f.size:.3g} {name} in the drive {taken}: after each reversal the film is behind the "
-            "counter."
-        )
-    if f.kind == CLIPPED:
-        softly = f" and yields within about {100 * f.soft:.1g} % of it" if f.soft >= WORDS.soft_limit else ""
-        limit = f"{f.size:.4g} N" if unit.endswith("N") else f"{factor * f.size:.4g} {unit}"
-        return (
-            f"The load cell is at its limit of {limit} from reading {f.place + 1} on{softly}: leave these readings out."
-        )
-    assert f.kind == UNNAMED
-    return (
-        f"Something smooth along the test, of about {100 * f.size:.2g} % of the force, {taken}; no effect in the "
-        "library has this course."
-    )
 
 
 # ---- one answer for each verdict -------------------------------------------------------------------------------------

@@ -11,7 +11,6 @@ from bayesmembrane.diagnosis.thresholds import VERDICT, WORDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.words.diagnosis import (
     elsewhere,
-    foreign_sentence,
     percent,
     probabilities_told,
     set_aside_sentence,
@@ -19,6 +18,7 @@ from bayesmembrane.words.diagnosis import (
     shared,
     thinning_sentence,
 )
+from bayesmembrane.words.foreign import foreign_sentence
 from bayesmembrane.words.hypothesis import effect_title, material_title
 from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.seen import seen

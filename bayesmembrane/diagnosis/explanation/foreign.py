@@ -1,4 +1,4 @@
-"""What no effect of the library describes: steps, waves, play of the drive, a load cell at its limit, or nothing known."""
+"""What no effect of the library describes: changes, waves, faults of drive and load cell, or nothing known."""
 
 from __future__ import annotations
 
@@ -9,8 +9,13 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.limit import Limit
 from bayesmembrane.ground.parameters import Array
 
-SUDDEN, WAVE, PLAY, CLIPPED, UNNAMED = "sudden_change", "ripple", "play", "clipped", "unnamed"
-KINDS = (SUDDEN, WAVE, PLAY, CLIPPED, UNNAMED)
+SUDDEN, PASSING, LOST = "sudden_change", "passing_change", "lost_steps"
+"""The force changes at a moment, or for a while; the zero of the deflection does."""
+WAVE, PLAY, STOP = "ripple", "play", "end_stop"
+RANGE, CLIPPED = "gain_range", "clipped"
+"""Of an amplifier, from some force on; of a load cell at its limit."""
+UNNAMED = "unnamed"
+KINDS = (SUDDEN, PASSING, LOST, WAVE, PLAY, STOP, RANGE, CLIPPED, UNNAMED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,9 +26,11 @@ class Foreign:
     base : the model
     gain : ln of the Bayes factor over the model without it, its chance included
     chance : ln of the chance that the data find it where it was found, of all the places or waves where it could be
-    size : of the most probable member, N, or part of the force if ``relative``; of a play m
+    size : of the most probable member, N, or part of the force if ``relative``; of a play and of lost steps m
     relative : see ``size``
     place : number of the reading at which a step comes, else 0
+    level : force, N, from which on an amplifier has another range, or deflection, m, from which on something is met
+    lasts : s, how soon a passing change is largest
     moment : its time in s, or None
     on_clock : the same on the clock of the test (`Motion.clock`), s
     period : of a wave, s or m
@@ -45,6 +52,8 @@ class Foreign:
     on_clock: float = 0.0
     period: float = 0.0
     against: str = ""
+    level: float = 0.0
+    lasts: float = 0.0
     share: float = 0.0
     trace: Array | None = None
     soft: float = 0.0
@@ -53,7 +62,7 @@ class Foreign:
     @property
     def falls(self) -> bool:
         """True if the force falls at some moment, and stays lower."""
-        return self.kind == SUDDEN and self.size < 0
+        return (self.kind == SUDDEN and self.size < 0) or (self.kind == LOST and self.size > 0)
 
     def counted(self, counts: float) -> float:
         """ln of the Bayes factor of which a part ``counts``: laws may be off, yet not where a thing could have been."""

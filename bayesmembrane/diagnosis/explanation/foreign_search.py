@@ -14,13 +14,16 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, extended, weighed
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, UNNAMED, Foreign
-from bayesmembrane.diagnosis.explanation.foreign_traces import Family, families, steps
+from bayesmembrane.diagnosis.explanation.foreign_traces import Family, bending, families
 from bayesmembrane.diagnosis.explanation.limit import limit_of
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.diagnosis.thresholds import FOREIGN
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.form_error import LARGEST, LAW
+
+IMPOSSIBLE = -20.0
+"""ln of the Bayes factor of what has the wrong sign."""
 
 
 def beside(search: Search, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
@@ -34,11 +37,9 @@ def beside(search: Search, bases: Sequence[Candidate], others: Sequence[Candidat
     if len(search.measurement) >= FOREIGN.least_points:
         smooth = smooth_reference(search.measurement)
         for base in others:
-            both: tuple[Finder, ...] = (
-                partial(_of_family, base, steps(search.measurement, base)),
-                partial(_clipped, base),
-            )
-            found += [f for f in (_with_its_own_noise(search, smooth, find) for find in both) if f is not None]
+            finders: list[Finder] = [partial(_of_family, base, f) for f in bending(search.measurement, base)]
+            finders.append(partial(_clipped, base))
+            found += [f for f in (_with_its_own_noise(search, smooth, find) for find in finders) if f is not None]
     return sorted(found, key=lambda f: -(f.gain + f.base.log_evidence))
 
 
@@ -89,22 +90,29 @@ def _of_family(base: Candidate, family: Family, search: Search, _before: Foreign
     # Beside noise and form error as they are expected: what is foreign has driven the fitted ones up.
     plain = np.minimum(base.theta, model.priors[:, 0])
     pieces = family.pieces(len(search.measurement))
-    gains = np.concatenate([_gains(search, model, plain, part, family.width) for part in pieces])
+    gains, signed = np.concatenate([_gains(search, model, plain, part, family.width) for part in pieces], axis=1)
+    sure = float(np.log(2)) if family.upward else 0.0  # half of the prior is twice as high
+    if family.upward:
+        gains = np.where(signed > 0, gains, IMPOSSIBLE)
     best = int(np.argmax(gains))
     members = family.traces(np.array([best]))
     spread = float(np.logaddexp.reduce(gains) - np.log(gains.size) - gains[best])
     wider = extended(model, [Block(search.noise.white(members))])
     z = weighed(wider, base.theta)
-    mean = wider.mean(z.theta)
-    own = mean[-family.width :]
+    own = wider.mean(z.theta)[-family.width :]
     trace = members @ own
-    gain = z.log_evidence - weighed(model, base.theta).log_evidence + spread
+    gain = z.log_evidence - weighed(model, base.theta).log_evidence + spread + sure
+    if family.upward and own[0] <= 0:
+        gain = IMPOSSIBLE
     found = Foreign(family.kind, base, gain, spread, trace=trace, share=_share(search, base, trace))
     return family.told(found, best, float(own[0]))
 
 
-def _gains(search: Search, model: Linear, theta: Array, traces: Array, width: int) -> Array:
-    """(m,) ln K of each group of ``width`` columns s: r^T P s (1 + s^T P s)^-1 s^T P r / 2 - ln |1 + s^T P s| / 2."""
+def _gains(search: Search, model: Linear, theta: Array, traces: Array, width: int) -> tuple[Array, Array]:
+    """(2, m): of each group of ``width`` columns s the gain, and the first of its coefficients,
+
+    ln K = r^T P s c / 2 - ln |1 + s^T P s| / 2,    c = (1 + s^T P s)^-1 s^T P r.
+    """
     n, count = traces.shape
     white = search.noise.white(traces)
     freed = model.freed(theta, white)
@@ -112,7 +120,7 @@ def _gains(search: Search, model: Linear, theta: Array, traces: Array, width: in
     f, w = (v.reshape(n, count // width, width) for v in (freed, white))
     gram = np.einsum("nmi,nmj->mij", w, f) + np.eye(width)
     solved = np.linalg.solve(gram, a[:, :, None])[:, :, 0]
-    return np.asarray(0.5 * np.sum(a * solved, axis=1) - 0.5 * np.linalg.slogdet(gram)[1])
+    return np.asarray(0.5 * np.sum(a * solved, axis=1) - 0.5 * np.linalg.slogdet(gram)[1]), solved[:, 0]
 
 
 def _share(search: Search, base: Candidate, trace: Array) -> float:

@@ -13,7 +13,7 @@ from scipy.special import expit
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.detection.periodicity import most_waves
-from bayesmembrane.diagnosis.explanation.foreign import PLAY, SUDDEN, WAVE, Foreign
+from bayesmembrane.diagnosis.explanation.foreign import LOST, PASSING, PLAY, RANGE, STOP, SUDDEN, WAVE, Foreign
 from bayesmembrane.diagnosis.thresholds import DETECTION, FOREIGN
 from bayesmembrane.ground.parameters import Array
 
@@ -28,6 +28,7 @@ class Family:
     count : how many groups there are
     traces : (N, width m) those of the groups with the numbers (m,)
     told : what is found, with what its most probable member, of that number and coefficient, says of itself
+    upward : whether a negative coefficient is none of these
     """
 
     kind: str
@@ -35,6 +36,7 @@ class Family:
     traces: Callable[[NDArray[np.intp]], Array]
     told: Callable[[Foreign, int, float], Foreign]
     width: int = 1
+    upward: bool = False
 
     def pieces(self, readings: int) -> Iterator[Array]:
         """All traces, some groups at a time: those of a long test fill the memory."""
@@ -44,10 +46,16 @@ class Family:
 
 
 def families(m: Measurement, base: Candidate) -> list[Family]:
-    out = [steps(m, base), _waves(m)]
+    """Every family that can be looked for beside ``base``."""
+    out = [*bending(m, base), _passing(m, base), _waves(m)]
     if np.any(m.leg < 0):
         out.append(_plays(m, base))
     return out
+
+
+def bending(m: Measurement, base: Candidate) -> list[Family]:
+    """Those for which a film that is fitted through them takes another energy."""
+    return [steps(m, base), _lost(m, base), _ranges(m, base), _stops(m, base)]
 
 
 def _places(m: Measurement) -> Array:
@@ -60,27 +68,65 @@ def steps(m: Measurement, base: Candidate) -> Family:
     """Steps of the force that take several times, and what comes to rest in several: by a constant first, then by a
     factor.
     """
-    clock, places = m.path.clock[m.on_path], _places(m)
     kinds = [partial(_stepping, width) for width in FOREIGN.widths] + [partial(_resting, t) for t in FOREIGN.rests]
-    fitted = m.force - base.residual
-    largest = float(np.max(np.abs(m.force)))
-    each = len(kinds) * places.size
+    largest, fitted = float(np.max(np.abs(m.force))), m.force - base.residual
+
+    def told(found: Foreign, scale: int, _: int, coefficient: float) -> Foreign:
+        return replace(found, size=coefficient * FOREIGN.size * (1.0 if scale else largest), relative=bool(scale))
+
+    return _at_moments(m, SUDDEN, kinds, [FOREIGN.size * largest, FOREIGN.size * fitted], told)
+
+
+def _passing(m: Measurement, base: Candidate) -> Family:
+    """What comes and goes, as a draught or a lamp makes it: by a constant first, then by a factor."""
+    kinds = [partial(_coming_and_going, t) for t in FOREIGN.passes]
+    largest, fitted = float(np.max(np.abs(m.force))), m.force - base.residual
+
+    def told(found: Foreign, scale: int, kind: int, coefficient: float) -> Foreign:
+        lasts = FOREIGN.passes[kind] * float(np.ptp(m.path.clock[m.on_path]))
+        size = coefficient * FOREIGN.size * (1.0 if scale else largest)
+        return replace(found, size=size, relative=bool(scale), lasts=lasts)
+
+    return _at_moments(m, PASSING, kinds, [FOREIGN.size * largest, FOREIGN.size * fitted], told)
+
+
+def _lost(m: Measurement, base: Candidate) -> Family:
+    """-dF/d(deflection) from some moment on: the drive lost steps, or the counter its zero."""
+    unit = FOREIGN.lost * m.path.full_range
+    slope = unit * _slope(m.deflection, m.force - base.residual)
+
+    def told(found: Foreign, _: int, __: int, coefficient: float) -> Foreign:
+        return replace(found, size=coefficient * unit)
+
+    return _at_moments(m, LOST, [partial(_stepping, FOREIGN.widths[0])], [-slope], told)
+
+
+def _at_moments(
+    m: Measurement,
+    kind: str,
+    courses: Sequence[Callable[[Array], Array]],
+    scales: Sequence[Array | float],
+    told: Callable[[Foreign, int, int, float], Foreign],
+) -> Family:
+    """Every course after every moment, by every scale (N,) N in turn; ``told`` is given numbers of scale and course."""
+    clock, places = m.path.clock[m.on_path], _places(m)
+    each = len(courses) * places.size
+    by = np.stack([np.broadcast_to(np.asarray(s, dtype=float), clock.shape) for s in scales], axis=1)
 
     def traces(numbers: NDArray[np.intp]) -> Array:
         since = (clock[:, None] - clock[places[numbers % places.size]]) / np.ptp(clock)
-        for k, kind in enumerate(kinds):
+        for k, course in enumerate(courses):
             own = numbers % each // places.size == k
-            since[:, own] = kind(since[:, own])
-        return np.asarray(FOREIGN.size * (since * np.where(numbers < each, largest, fitted[:, None])))
+            since[:, own] = course(since[:, own])
+        return np.asarray(since * by[:, numbers // each])
 
-    def told(found: Foreign, best: int, coefficient: float) -> Foreign:
+    def placed(found: Foreign, best: int, coefficient: float) -> Foreign:
         place = int(places[best % places.size])
-        relative = best >= each
-        size = coefficient * FOREIGN.size * (1.0 if relative else largest)
         moment = None if m.time is None else float(m.time[place])
-        return replace(found, size=size, relative=relative, place=place, moment=moment, on_clock=float(clock[place]))
+        found = replace(found, place=place, moment=moment, on_clock=float(clock[place]))
+        return told(found, best // each, best % each // places.size, coefficient)
 
-    return Family(SUDDEN, 2 * each, traces, told)
+    return Family(kind, len(scales) * each, traces, placed)
 
 
 def _stepping(width: float, since: Array) -> Array:
@@ -89,6 +135,42 @@ def _stepping(width: float, since: Array) -> Array:
 
 def _resting(time: float, since: Array) -> Array:
     return -np.expm1(-np.maximum(since, 0.0) / time)
+
+
+def _coming_and_going(time: float, since: Array) -> Array:
+    """x exp(1 - x) of the time x since, in units of the one at which it is largest."""
+    x = np.maximum(since, 0.0) / time
+    return np.asarray(x * np.exp(1 - x))
+
+
+def _ranges(m: Measurement, base: Candidate) -> Family:
+    """The force times a factor, where it is larger than some force: an amplifier that changes its range."""
+    fitted = m.force - base.residual
+    largest = float(np.max(np.abs(m.force)))
+    levels = largest * np.linspace(*FOREIGN.within, FOREIGN.levels)
+
+    def traces(numbers: NDArray[np.intp]) -> Array:
+        return np.asarray(FOREIGN.size * fitted[:, None] * (np.abs(fitted)[:, None] > levels[numbers]))
+
+    def told(found: Foreign, best: int, coefficient: float) -> Foreign:
+        return replace(found, size=coefficient * FOREIGN.size, relative=True, level=float(levels[best]))
+
+    return Family(RANGE, levels.size, traces, told)
+
+
+def _stops(m: Measurement, _: Candidate) -> Family:
+    """What is met at some deflection, and pushes against the disc from there on."""
+    most, largest = float(np.max(m.deflection)), float(np.max(np.abs(m.force)))
+    levels = most * np.linspace(*FOREIGN.met_at, FOREIGN.levels)
+
+    def traces(numbers: NDArray[np.intp]) -> Array:
+        at = levels[numbers]
+        return np.asarray(FOREIGN.size * largest * np.maximum(m.deflection[:, None] - at, 0.0) / (most - at))
+
+    def told(found: Foreign, best: int, coefficient: float) -> Foreign:
+        return replace(found, size=coefficient * FOREIGN.size * largest, level=float(levels[best]))
+
+    return Family(STOP, levels.size, traces, told, upward=True)
 
 
 def _frequencies(most: float) -> Array:

@@ -9,7 +9,17 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation import foreign_search as foreign_module
-from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, SUDDEN, UNNAMED, WAVE, Foreign
+from bayesmembrane.diagnosis.explanation.foreign import (
+    CLIPPED,
+    LOST,
+    PASSING,
+    RANGE,
+    STOP,
+    SUDDEN,
+    UNNAMED,
+    WAVE,
+    Foreign,
+)
 from bayesmembrane.diagnosis.explanation.foreign_search import beside, foreign
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
@@ -113,6 +123,59 @@ def test_a_step_is_told_with_its_moment_and_its_part_of_the_force() -> None:
     assert found.relative
     assert found.moment == pytest.approx(140.0, abs=4.0)
     assert found.size == pytest.approx(0.02, abs=0.006)
+
+
+def most_probable(m: Measurement, change: Array, seed: int) -> Foreign:
+    """Of all kinds, beside the plain fit of a film whose force is changed."""
+    return max(foreign(*searched(m, change, seed)), key=lambda f: f.gain)
+
+
+@pytest.mark.parametrize("lost", [0.4e-3, -0.4e-3])
+def test_lost_steps_are_told_with_their_moment_and_their_length(lost: float) -> None:
+    m = film_on(*cycles())
+    after = m.time > 240.0
+    shifted = film_on(np.maximum(m.deflection - np.where(after, lost, 0.0), 0.0), m.time).force
+    found = most_probable(m, shifted - m.force, 4411)
+    assert found.kind == LOST
+    assert found.gain > 20.0
+    assert found.moment == pytest.approx(240.0, abs=4.0)
+    assert found.size == pytest.approx(lost, rel=0.3)
+    assert found.falls is (lost > 0)
+
+
+@pytest.mark.parametrize("part", [0.02, -0.02])
+def test_a_range_of_an_amplifier_is_told_with_its_force_and_its_part(part: float) -> None:
+    m = film_on(*cycles())
+    level = 0.4 * np.max(m.force)
+    found = most_probable(m, np.where(m.force > level, part * m.force, 0.0), 4412)
+    assert found.kind == RANGE
+    assert found.gain > 20.0
+    assert found.relative
+    assert found.level == pytest.approx(level, rel=0.1)
+    assert found.size == pytest.approx(part, rel=0.4)
+
+
+def test_what_the_disc_meets_is_told_with_where_it_is_and_never_pulls() -> None:
+    m = film_on(*cycles())
+    push = 25 * SD * np.maximum(m.deflection - 0.032, 0.0) / 0.008
+    found = most_probable(m, push, 4413)
+    assert found.kind == STOP
+    assert found.gain > 10.0
+    assert found.level == pytest.approx(0.032, abs=0.0015)
+    assert found.size == pytest.approx(25 * SD, rel=0.3)
+    assert kind(foreign(*searched(m, -push, 4413)), STOP).gain < 0.0
+
+
+def test_what_comes_and_goes_is_told_with_when_it_begins_and_how_soon_it_is_largest() -> None:
+    m = film_on(*cycles())
+    x = np.maximum(m.time - 150.0, 0.0) / 12.0
+    found = most_probable(m, 0.05 * m.force * x * np.exp(1 - x), 4414)
+    assert found.kind == PASSING
+    assert found.gain > 20.0
+    assert found.relative
+    assert found.moment == pytest.approx(150.0, abs=6.0)
+    assert found.lasts == pytest.approx(12.0, rel=0.5)
+    assert found.size == pytest.approx(0.05, rel=0.4)
 
 
 def test_a_limit_is_looked_for_beside_every_energy_and_other_things_beside_the_bases() -> None:
