@@ -355,6 +355,8 @@ class ForeignThresholds:
     """Readings that are needed to tell it."""
     size: float = 0.03
     """Of the largest force: the expected size of a step or a wave."""
+    sizes: tuple[float, ...] = (0.25, 1.0, 4.0)
+    """Times that or what else is expected of a kind, each as probable: what goes wrong is a thousandth or a tenth."""
     places: int = 160
     """Moments of a step that are tried, at most."""
     margin: float = 0.04

@@ -90,13 +90,13 @@ def _of_family(base: Candidate, family: Family, search: Search, _before: Foreign
     # Beside noise and form error as they are expected: what is foreign has driven the fitted ones up.
     plain = np.minimum(base.theta, model.priors[:, 0])
     pieces = family.pieces(len(search.measurement))
-    gains, signed = np.concatenate([_gains(search, model, plain, part, family.width) for part in pieces], axis=1)
+    gains, signed = np.concatenate([_gains(search, model, plain, part, family.width) for part in pieces], axis=2)
     sure = float(np.log(2)) if family.upward else 0.0  # half of the prior is twice as high
     if family.upward:
         gains = np.where(signed > 0, gains, IMPOSSIBLE)
-    best = int(np.argmax(gains))
-    members = family.traces(np.array([best]))
-    spread = float(np.logaddexp.reduce(gains) - np.log(gains.size) - gains[best])
+    size, best = (int(i) for i in np.unravel_index(np.argmax(gains), gains.shape))
+    members = FOREIGN.sizes[size] * family.traces(np.array([best]))
+    spread = float(np.logaddexp.reduce(gains, axis=None) - np.log(gains.size) - gains[size, best])
     wider = extended(model, [Block(search.noise.white(members))])
     z = weighed(wider, base.theta)
     own = wider.mean(z.theta)[-family.width :]
@@ -105,22 +105,24 @@ def _of_family(base: Candidate, family: Family, search: Search, _before: Foreign
     if family.upward and own[0] <= 0:
         gain = IMPOSSIBLE
     found = Foreign(family.kind, base, gain, spread, trace=trace, share=_share(search, base, trace))
-    return family.told(found, best, float(own[0]))
+    return family.told(found, best, FOREIGN.sizes[size] * float(own[0]))
 
 
 def _gains(search: Search, model: Linear, theta: Array, traces: Array, width: int) -> tuple[Array, Array]:
-    """(2, m): of each group of ``width`` columns s the gain, and the first of its coefficients,
+    """Of each group of ``width`` columns s that is expected to be z = `FOREIGN.sizes` times as large, (Z, m) each: the
+    gain, and the first of its coefficients,
 
-    ln K = r^T P s c / 2 - ln |1 + s^T P s| / 2,    c = (1 + s^T P s)^-1 s^T P r.
+    ln K = z r^T P s c / 2 - ln |1 + z^2 s^T P s| / 2,    c = (1 + z^2 s^T P s)^-1 z s^T P r.
     """
     n, count = traces.shape
     white = search.noise.white(traces)
     freed = model.freed(theta, white)
-    a = (freed.T @ model.data).reshape(count // width, width)
+    z = np.array(FOREIGN.sizes)[:, None, None]
+    a = z * (freed.T @ model.data).reshape(count // width, width)
     f, w = (v.reshape(n, count // width, width) for v in (freed, white))
-    gram = np.einsum("nmi,nmj->mij", w, f) + np.eye(width)
-    solved = np.linalg.solve(gram, a[:, :, None])[:, :, 0]
-    return np.asarray(0.5 * np.sum(a * solved, axis=1) - 0.5 * np.linalg.slogdet(gram)[1]), solved[:, 0]
+    gram = z[..., None] ** 2 * np.einsum("nmi,nmj->mij", w, f) + np.eye(width)
+    solved = np.linalg.solve(gram, a[..., None])[..., 0]
+    return np.asarray(0.5 * np.sum(a * solved, axis=-1) - 0.5 * np.linalg.slogdet(gram)[1]), solved[..., 0]
 
 
 def _share(search: Search, base: Candidate, trace: Array) -> float:
