@@ -12,7 +12,7 @@ CAUSES = {
     LOST: ", as by a drive that loses steps, a counter that slips, or a film that lets go once.",
     WAVE: ", as a drive, a gear or a vibration would make it.",
     PLAY: ": after each reversal the film is behind the counter.",
-    STOP: ", as a stop, a cable or a rod that rubs would be.",
+    STOP: ", as a stop, a cable or a rod that touches would be.",
     RANGE: ", as an amplifier has it whose ranges do not agree.",
 }
 ADVICE = {
@@ -21,7 +21,7 @@ ADVICE = {
     LOST: "Measure the travel of the disc itself, or lift more slowly.",
     WAVE: "Look at the drive, its gear, and what vibrates.",
     PLAY: "Take the play out of the drive, and test again.",
-    STOP: "Look for what disc or rod meets there, and test again.",
+    STOP: "Look for what is in the way there, and test again.",
     RANGE: "Fix the range of the amplifier, and test again.",
     CLIPPED: "Leave these readings out, or take a larger load cell.",
 }
@@ -46,7 +46,7 @@ def foreign_clause(f: Foreign, shown: Units) -> str:
     if f.kind == PLAY:
         return f"a play of {size_in_words(f.size, 'm', shown)} in the drive"
     if f.kind == STOP:
-        return f"something that the disc meets at {size_in_words(f.level, 'm', shown)}"
+        return f"something that is met at {size_in_words(f.level, 'm', shown)}"
     if f.kind == RANGE:
         return f"a gain that is {step} {larger} above {size_in_words(f.level, 'N', shown)}"
     if f.kind == CLIPPED:

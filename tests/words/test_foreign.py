@@ -27,7 +27,7 @@ TOLD = {
     LOST: (Foreign(LOST, BASE, 9.0, size=3e-4, moment=7.5), "0.3 mm less than it is read from 7.5 s on"),
     WAVE: (Foreign(WAVE, BASE, 9.0, size=0.005, period=0.002, against="deflection"), "5 mN every 2 mm"),
     PLAY: (Foreign(PLAY, BASE, 9.0, size=2e-4), "play of 0.2 mm in the drive"),
-    STOP: (Foreign(STOP, BASE, 9.0, size=0.05, level=0.03), "meets at 30 mm"),
+    STOP: (Foreign(STOP, BASE, 9.0, size=0.05, level=0.03), "is met at 30 mm"),
     RANGE: (Foreign(RANGE, BASE, 9.0, size=-0.03, relative=True, level=0.5), "3 % smaller above 500 mN"),
     CLIPPED: (Foreign(CLIPPED, BASE, 9.0, size=0.9, place=99), "limit of 900 mN from reading 100 on"),
     UNNAMED: (Foreign(UNNAMED, BASE, 9.0, size=0.015, relative=True), "about 1.5 % of the force"),

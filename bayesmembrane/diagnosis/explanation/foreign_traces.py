@@ -55,7 +55,7 @@ def families(m: Measurement, base: Candidate) -> list[Family]:
 
 def bending(m: Measurement, base: Candidate) -> list[Family]:
     """Those for which a film that is fitted through them takes another energy."""
-    return [steps(m, base), _lost(m, base), _ranges(m, base), _stops(m, base)]
+    return [_steps(m, base), _lost(m, base), _ranges(m, base), _stops(m, base)]
 
 
 def _places(m: Measurement) -> Array:
@@ -64,30 +64,30 @@ def _places(m: Measurement) -> Array:
     return np.unique(np.linspace(*ends, min(FOREIGN.places, n)).astype(int))
 
 
-def steps(m: Measurement, base: Candidate) -> Family:
-    """Steps of the force that take several times, and what comes to rest in several: by a constant first, then by a
-    factor.
-    """
+def _steps(m: Measurement, base: Candidate) -> Family:
+    """Steps of the force that take several times, and what comes to rest in several."""
     kinds = [partial(_stepping, width) for width in FOREIGN.widths] + [partial(_resting, t) for t in FOREIGN.rests]
-    largest, fitted = float(np.max(np.abs(m.force))), m.force - base.residual
-
-    def told(found: Foreign, scale: int, _: int, coefficient: float) -> Foreign:
-        return replace(found, size=coefficient * FOREIGN.size * (1.0 if scale else largest), relative=bool(scale))
-
-    return _at_moments(m, SUDDEN, kinds, [FOREIGN.size * largest, FOREIGN.size * fitted], told)
+    return _changes(m, base, SUDDEN, kinds)
 
 
 def _passing(m: Measurement, base: Candidate) -> Family:
-    """What comes and goes, as a draught or a lamp makes it: by a constant first, then by a factor."""
+    """What comes and goes, as a draught or a lamp makes it."""
+    span = float(np.ptp(m.path.clock[m.on_path]))
     kinds = [partial(_coming_and_going, t) for t in FOREIGN.passes]
+    return _changes(m, base, PASSING, kinds, [span * t for t in FOREIGN.passes])
+
+
+def _changes(
+    m: Measurement, base: Candidate, kind: str, courses: Sequence[Callable[[Array], Array]], lasts: Sequence[float] = ()
+) -> Family:
+    """Changes of the force by a constant first, then by a factor."""
     largest, fitted = float(np.max(np.abs(m.force))), m.force - base.residual
 
-    def told(found: Foreign, scale: int, kind: int, coefficient: float) -> Foreign:
-        lasts = FOREIGN.passes[kind] * float(np.ptp(m.path.clock[m.on_path]))
+    def told(found: Foreign, scale: int, course: int, coefficient: float) -> Foreign:
         size = coefficient * FOREIGN.size * (1.0 if scale else largest)
-        return replace(found, size=size, relative=bool(scale), lasts=lasts)
+        return replace(found, size=size, relative=bool(scale), lasts=lasts[course] if lasts else 0.0)
 
-    return _at_moments(m, PASSING, kinds, [FOREIGN.size * largest, FOREIGN.size * fitted], told)
+    return _at_moments(m, kind, courses, [FOREIGN.size * largest, FOREIGN.size * fitted], told)
 
 
 def _lost(m: Measurement, base: Candidate) -> Family:
@@ -159,7 +159,7 @@ def _ranges(m: Measurement, base: Candidate) -> Family:
 
 
 def _stops(m: Measurement, _: Candidate) -> Family:
-    """What is met at some deflection, and pushes against the disc from there on."""
+    """What is met at some deflection, and pushes back from there on."""
     most, largest = float(np.max(m.deflection)), float(np.max(np.abs(m.force)))
     levels = most * np.linspace(*FOREIGN.met_at, FOREIGN.levels)
 
