@@ -16,7 +16,7 @@ from bayesmembrane.calibration.prior import JointPrior
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.convexity import STABLE_ONLY
+from bayesmembrane.physics.convexity import FREE
 from bayesmembrane.physics.form_error import traces
 from bayesmembrane.physics.forward import AT_ONCE, Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -183,9 +183,9 @@ class Posterior:
 
     @property
     def without_convexity(self) -> Posterior | None:
-        """The same with a convexity prior that asks nothing (`STABLE_ONLY`); None if its own does not, either."""
+        """The same with a convexity prior that asks nothing; None if its own does not, either."""
         h = self.hypothesis
-        return replace(self, hypothesis=replace(h, convexity=STABLE_ONLY)) if h.convexity.restricts else None
+        return replace(self, hypothesis=replace(h, convexity=FREE)) if h.convexity.restricts else None
 
     @property
     def size(self) -> int:

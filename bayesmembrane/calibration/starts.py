@@ -122,7 +122,7 @@ def try_points(
 
 def candidates(posterior: Posterior, rng: np.random.Generator) -> Array:
     """(M, k): prior draws brought to their best modulus, and draws around the valleys that a descent finds from them,
-    with noise coordinates that suit their residuals. Convexity is not asked for.
+    with noise coordinates that suit their residuals. Of the convexity prior only ellipticity is asked for.
     """
     few = shortened(posterior.measurement, SCREENED_BY)
     spare = Spared.NOT_ELLIPTIC if posterior.hypothesis.convexity.restricts else Spared.NONE

@@ -354,7 +354,7 @@ class ForeignThresholds:
     least_points: int = 60
     """Readings that are needed to tell it."""
     size: float = 0.03
-    """Of the largest force: the expected size of a step or a wave."""
+    """Of the largest force: the expected size of a change, a gain or what is met; a wave has a third of it."""
     sizes: tuple[float, ...] = (0.25, 1.0, 4.0)
     """Times that or what else is expected of a kind, each as probable: what goes wrong is a thousandth or a tenth."""
     places: int = 160

@@ -207,7 +207,8 @@ def _program(m: Measurement, top: float, wait: float) -> OnFilm:
     for peak in HELD_AT:
         leg = up[up <= peak * top * (1 + SAME)]
         legs += [leg, np.full(WAIT, leg[-1]), leg[::-1], np.zeros(WAIT)]
-    slow, fast = np.concatenate([*legs, up, up[::-1]]), np.concatenate([up, up[::-1]])
+    back = up[-2::-1]  # it turns at once
+    slow, fast = np.concatenate([*legs, up, back]), np.concatenate([up[1:], back])
     pace = np.repeat([1.0, FASTER], [slow.size, fast.size])
     test = FurtherTest(Kind.PROGRAM, hold=wait, speed=FASTER)
     return _moved(m, test, np.concatenate([slow, fast]), pace)

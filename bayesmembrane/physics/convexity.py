@@ -144,14 +144,7 @@ class Free(ConvexityMode):
         return np.full(len(states.films), np.inf)
 
 
-@dataclass(frozen=True)
-class StableOnly(Free):
-    """Nothing is asked, and of a film that loses ellipticity on its way no more is wanted than that it does."""
-
-    spare = Spared.NOT_ELLIPTIC
-
-
-REACHED, BOX, ELLIPTIC, FREE, STABLE_ONLY = Reached(), Box(), Elliptic(), Free(), StableOnly()
+REACHED, BOX, ELLIPTIC, FREE = Reached(), Box(), Elliptic(), Free()
 MODES: dict[str, ConvexityMode] = {m.name: m for m in (REACHED, BOX, ELLIPTIC, FREE)}
 RESTRICTING = tuple(m for m in MODES.values() if m.restricts)
 """The modes that exclude films, the strongest claim about the measurement first."""

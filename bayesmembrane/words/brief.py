@@ -298,7 +298,7 @@ def _unknown(course: Course) -> str:
     if (strange := _strange(d)) is not None:
         beside = listed(effect_title(n) for n in strange.base.names)
         beside = f", beside {beside}" if beside and not sure else ""
-        return f"{start}{foreign_clause(strange, d.rig.shown(d.thickness))}{beside}"
+        return f"{start}{foreign_clause(strange, d.rig, d.thickness)}{beside}"
     if d.members:
         return f"{start if d.firm else ''}nothing{further} is named, for {why_not(d)}"
     if d.probabilities.effects.get(NOTHING, 0.0) >= 0.5:
@@ -311,7 +311,7 @@ def _unknown(course: Course) -> str:
 def _beside(d: Diagnosis) -> str:
     """What is foreign beside the effects, if that is more probable than not."""
     strange = _strange(d)
-    return "" if strange is None else f", beside {foreign_clause(strange, d.rig.shown(d.thickness))}"
+    return "" if strange is None else f", beside {foreign_clause(strange, d.rig, d.thickness)}"
 
 
 def _strange(d: Diagnosis) -> Foreign | None:

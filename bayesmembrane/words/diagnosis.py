@@ -368,7 +368,7 @@ def _beside(found: Diagnosis) -> str:
         return ""
     p = found.probabilities.something_found
     how = "Beside it" if p > 0.5 else f"Perhaps beside it ({percent(p)})"
-    return f" {how}: {foreign_sentence(found.foreign, _units(found))}"
+    return f" {how}: {foreign_sentence(found.foreign, found.rig, found.thickness)}"
 
 
 def _member(j: Judged, found: Diagnosis) -> str:
@@ -398,7 +398,7 @@ def _unknown(found: Diagnosis) -> str:
         beside = f" beside {' and '.join(effect_title(n) for n in base)}" if base else ""
         return (
             f"{_misses(found)}{_certain(found)}no effect of the library describes it{beside}. "
-            f"{foreign_sentence(found.foreign, units)}"
+            f"{foreign_sentence(found.foreign, found.rig, found.thickness)}"
         )
     shape = shape_in_words(found.shape, waves, found.rig, units)
     if found.members:

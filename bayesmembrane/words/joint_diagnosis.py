@@ -167,7 +167,7 @@ def _foreign(found: JointDiagnosis) -> str:
     m = next(t.measurement for t in found.tests if t.label == label)
     p = found.probabilities.something_found
     how = f"In {label}" if p > 0.5 else f"Perhaps in {label} ({percent(p)})"
-    return f"{how}: {foreign_sentence(f, m.rig.shown(m.specimen.thickness))}"
+    return f"{how}: {foreign_sentence(f, m.rig, m.specimen.thickness)}"
 
 
 def _left_out(found: JointDiagnosis) -> list[str]:

@@ -15,7 +15,7 @@ from bayesmembrane.calibration.posterior import Evaluation, Outcome, Posterior
 from bayesmembrane.calibration.prior import SCRAMBLES, JointPrior, Scrambled
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.sobol import scrambled_sobol
-from bayesmembrane.physics.convexity import STABLE_ONLY
+from bayesmembrane.physics.convexity import FREE
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -57,10 +57,10 @@ class JointPosterior:
 
     @property
     def without_convexity(self) -> JointPosterior | None:
-        """The same with a convexity prior that asks nothing (`STABLE_ONLY`); None if its own does not, either."""
+        """The same with a convexity prior that asks nothing; None if its own does not, either."""
         if not self.joint.convexity.restricts:
             return None
-        parts = [replace(p, hypothesis=replace(p.hypothesis, convexity=STABLE_ONLY)) for p in self.joint.parts]
+        parts = [replace(p, hypothesis=replace(p.hypothesis, convexity=FREE)) for p in self.joint.parts]
         return replace(self, joint=replace(self.joint, parts=tuple(parts)))
 
     @property

@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, extended, weighed
@@ -22,16 +23,14 @@ from bayesmembrane.diagnosis.thresholds import FOREIGN
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.form_error import LARGEST, LAW
 
-IMPOSSIBLE = -20.0
-"""ln of the Bayes factor of what has the wrong sign."""
-
 
 def beside(search: Search, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
-    """What is foreign beside the ``bases``, and a step or a limit beside the ``others`` too; the most probable first.
+    """What is foreign beside the ``bases``, what is `bending` or a limit beside the ``others`` too; the most probable
+    first.
 
     A film that is fitted through one of these takes another energy for it, so that the energy that is most probable
     without one says little: of a step of the load cell's zero 7 in ln of the Bayes factor were told beside that, and 36
-    beside three others. Waves and plays leave traces that no energy has.
+    beside three others. What comes and goes, waves and plays leave traces that no energy has.
     """
     found = [f for base in bases for f in foreign(search, base)]
     if len(search.measurement) >= FOREIGN.least_points:
@@ -90,39 +89,38 @@ def _of_family(base: Candidate, family: Family, search: Search, _before: Foreign
     # Beside noise and form error as they are expected: what is foreign has driven the fitted ones up.
     plain = np.minimum(base.theta, model.priors[:, 0])
     pieces = family.pieces(len(search.measurement))
-    gains, signed = np.concatenate([_gains(search, model, plain, part, family.width) for part in pieces], axis=2)
-    sure = float(np.log(2)) if family.upward else 0.0  # half of the prior is twice as high
-    if family.upward:
-        gains = np.where(signed > 0, gains, IMPOSSIBLE)
-    size, best = (int(i) for i in np.unravel_index(np.argmax(gains), gains.shape))
+    parts = [_gains(search, model, plain, part, family) for part in pieces]
+    gains, sure = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
+    size, best = (int(i) for i in np.unravel_index(np.argmax(gains + sure), gains.shape))
     members = FOREIGN.sizes[size] * family.traces(np.array([best]))
-    spread = float(np.logaddexp.reduce(gains, axis=None) - np.log(gains.size) - gains[size, best])
+    spread = float(np.logaddexp.reduce(gains + sure, axis=None) - np.log(gains.size) - gains[size, best])
     wider = extended(model, [Block(search.noise.white(members))])
     z = weighed(wider, base.theta)
     own = wider.mean(z.theta)[-family.width :]
     trace = members @ own
-    gain = z.log_evidence - weighed(model, base.theta).log_evidence + spread + sure
-    if family.upward and own[0] <= 0:
-        gain = IMPOSSIBLE
+    gain = float(z.log_evidence - weighed(model, base.theta).log_evidence + spread)
     found = Foreign(family.kind, base, gain, spread, trace=trace, share=_share(search, base, trace))
     return family.told(found, best, FOREIGN.sizes[size] * float(own[0]))
 
 
-def _gains(search: Search, model: Linear, theta: Array, traces: Array, width: int) -> tuple[Array, Array]:
-    """Of each group of ``width`` columns s that is expected to be z = `FOREIGN.sizes` times as large, (Z, m) each: the
-    gain, and the first of its coefficients,
+def _gains(search: Search, model: Linear, theta: Array, traces: Array, family: Family) -> tuple[Array, Array]:
+    """Of each group of columns s that is expected to be z = `FOREIGN.sizes` times as large, (Z, m) each: the gain
 
-    ln K = z r^T P s c / 2 - ln |1 + z^2 s^T P s| / 2,    c = (1 + z^2 s^T P s)^-1 z s^T P r.
+    ln K = z r^T P s c / 2 - ln |1 + z^2 s^T P s| / 2,    c = (1 + z^2 s^T P s)^-1 z s^T P r,
+
+    and what is to be added where only c > 0 is one of the family: ln 2 Phi(c (1 + z^2 s^T P s)^(1/2)), else 0.
     """
-    n, count = traces.shape
+    n, width = len(traces), family.width
     white = search.noise.white(traces)
     freed = model.freed(theta, white)
     z = np.array(FOREIGN.sizes)[:, None, None]
-    a = z * (freed.T @ model.data).reshape(count // width, width)
-    f, w = (v.reshape(n, count // width, width) for v in (freed, white))
+    a = z * (freed.T @ model.data).reshape(-1, width)
+    f, w = (v.reshape(n, -1, width) for v in (freed, white))
     gram = z[..., None] ** 2 * np.einsum("nmi,nmj->mij", w, f) + np.eye(width)
     solved = np.linalg.solve(gram, a[..., None])[..., 0]
-    return np.asarray(0.5 * np.sum(a * solved, axis=-1) - 0.5 * np.linalg.slogdet(gram)[1]), solved[..., 0]
+    gains = 0.5 * np.sum(a * solved, axis=-1) - 0.5 * np.linalg.slogdet(gram)[1]
+    above = solved[..., 0] * np.sqrt(gram[..., 0, 0])
+    return gains, np.log(2) + log_ndtr(above) if family.upward else np.zeros(gains.shape)
 
 
 def _share(search: Search, base: Candidate, trace: Array) -> float:

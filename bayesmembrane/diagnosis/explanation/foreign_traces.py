@@ -14,7 +14,7 @@ from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.detection.periodicity import most_waves
 from bayesmembrane.diagnosis.explanation.foreign import LOST, PASSING, PLAY, RANGE, STOP, SUDDEN, WAVE, Foreign
-from bayesmembrane.diagnosis.thresholds import DETECTION, FOREIGN
+from bayesmembrane.diagnosis.thresholds import DETECTION, FOREIGN, TINY
 from bayesmembrane.ground.parameters import Array
 
 PIECE = 2**18
@@ -46,16 +46,21 @@ class Family:
 
 
 def families(m: Measurement, base: Candidate) -> list[Family]:
-    """Every family that can be looked for beside ``base``."""
-    out = [*bending(m, base), _passing(m, base), _waves(m)]
-    if np.any(m.leg < 0):
+    """Every family that can be looked for beside ``base``; where readings have no order nothing comes at a moment."""
+    out = bending(m, base)
+    if m.rig.has_path:
+        out += [_passing(m, base), _waves(m)]
+    if m.rig.has_path and np.any(m.leg < 0):
         out.append(_plays(m, base))
     return out
 
 
 def bending(m: Measurement, base: Candidate) -> list[Family]:
     """Those for which a film that is fitted through them takes another energy."""
-    return [_steps(m, base), _lost(m, base), _ranges(m, base), _stops(m, base)]
+    out = [_ranges(m, base)]
+    if m.rig.has_path:
+        out += [_steps(m, base), _lost(m, base), _stops(m, base)]
+    return out
 
 
 def _places(m: Measurement) -> Array:
@@ -165,7 +170,8 @@ def _stops(m: Measurement, _: Candidate) -> Family:
 
     def traces(numbers: NDArray[np.intp]) -> Array:
         at = levels[numbers]
-        return np.asarray(FOREIGN.size * largest * np.maximum(m.deflection[:, None] - at, 0.0) / (most - at))
+        beyond = np.maximum(m.deflection[:, None] - at, 0.0) / np.maximum(most - at, TINY)
+        return np.asarray(FOREIGN.size * largest * beyond)
 
     def told(found: Foreign, best: int, coefficient: float) -> Foreign:
         return replace(found, size=coefficient * FOREIGN.size * largest, level=float(levels[best]))
@@ -218,7 +224,7 @@ def _phase(place: Array) -> Array:
 
 
 def _plays(m: Measurement, base: Candidate) -> Family:
-    """-dF/d(deflection) times how far a play of the drive is taken up: 0 on loading, 1 on unloading."""
+    """dF/d(deflection) times how far a play of the drive is taken up: 0 on loading, 1 on unloading."""
     path = m.path
     fitted = m.force - base.residual
     slope = _slope(m.deflection, fitted)
@@ -234,9 +240,9 @@ def _plays(m: Measurement, base: Candidate) -> Family:
     lags = unit * np.column_stack(out)
 
     def told(found: Foreign, _: int, coefficient: float) -> Foreign:
-        return replace(found, size=abs(coefficient) * unit)
+        return replace(found, size=coefficient * unit)
 
-    return Family(PLAY, lags.shape[1], lambda numbers: lags[:, numbers], told)
+    return Family(PLAY, lags.shape[1], lambda numbers: lags[:, numbers], told, upward=True)
 
 
 def _slope(deflection: Array, force: Array) -> Array:

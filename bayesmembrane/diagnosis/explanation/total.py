@@ -12,7 +12,7 @@ import numpy as np
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
+from bayesmembrane.diagnosis.explanation.foreign import LOST, Foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown, key_of
 from bayesmembrane.diagnosis.explanation.neighbours import NEGLIGIBLE, spread
 from bayesmembrane.diagnosis.explanation.promise import promised
@@ -278,14 +278,17 @@ def _like_a_tear(
 
 
 def _tears(f: Foreign, every: Sequence[Candidate], search: Weighing) -> list[Candidate]:
-    """The same energy and set as beside a fall, with an effect that comes so; fitting not much worse."""
+    """The same energy and set as beside a fall, with an effect that comes so; fitting not much worse.
+
+    Lost steps are what a clamp that slips once leaves, too.
+    """
     return [
         c
         for c in every
         if f.falls
         and c.hypothesis.material is f.base.hypothesis.material
         and len(c.names) == len(f.base.names) + 1
-        and all(e.sudden or e.name in f.base.names for e in c.hypothesis.effects)
+        and all(e.sudden or (f.kind == LOST and e.shortens) or e.name in f.base.names for e in c.hypothesis.effects)
         and -_fits_better(c, f, search) < TWINS.behind
     ]
 

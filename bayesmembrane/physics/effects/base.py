@@ -119,6 +119,7 @@ class Effect(ABC):
     second : (part, place, second place), the coordinates that say what part of what comes at once comes in a second
         event, and where the two are; None where there is only one
     sudden : True if it may come at any moment, which no test tells from a fall of the force that no effect describes
+    shortens : True if it takes way from the film that the disc has gone, as a drive does that loses steps
     odds : how often it is met beside the others, before anything is measured
     rank : orders effects within a stage; equal ranks go by name
 
@@ -148,6 +149,7 @@ class Effect(ABC):
     of_many_shapes: ClassVar[bool] = False
     twins_one_way: ClassVar[tuple[str, ...]] = ()
     sudden: ClassVar[bool] = False
+    shortens: ClassVar[bool] = False
     begins: ClassVar[str] = ""
     second: ClassVar[tuple[str, str, str] | None] = None
     odds: ClassVar[float] = 1.0

@@ -14,7 +14,7 @@ from bayesmembrane.diagnosis.explanation import total
 from bayesmembrane.diagnosis.explanation import visible as visible_module
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS, Beliefs
 from bayesmembrane.diagnosis.explanation.case import OpenCase
-from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, UNNAMED, Foreign
+from bayesmembrane.diagnosis.explanation.foreign import LOST, SUDDEN, UNNAMED, Foreign
 from bayesmembrane.diagnosis.explanation.growth import Grown
 from bayesmembrane.diagnosis.explanation.total import ANOTHER_LAW, NOTHING, UNLISTED
 from bayesmembrane.diagnosis.thresholds import TWINS
@@ -205,6 +205,15 @@ def test_a_fall_that_stays_is_at_most_twelve_times_less_probable_than_a_tear_tha
             assert least(left, -0.1, some) == pytest.approx(3.0 - np.log(BELIEFS.apart))
     for left, size, one in ((30.0, 0.1, torn), (30.0 + 2.1 * far, -0.1, torn), (30.0, -0.1, softer)):
         assert least(left, size, one) == -np.inf
+
+
+@pytest.mark.parametrize(("kind", "size", "held"), [(LOST, 1e-3, True), (LOST, -1e-3, False), (SUDDEN, -0.1, False)])
+def test_a_clamp_that_slips_is_held_against_lost_steps_and_not_against_a_fall(
+    kind: str, size: float, held: bool
+) -> None:
+    base, slid = candidate("friction", log_evidence=-50.0), candidate("friction", "clamp_slip", log_evidence=-20.0)
+    search = cast(Search, cast(Any, SimpleNamespace(squares=leaving(base, LEFT, LEFT))))
+    assert (total._tears(Foreign(kind, base, 9.0, size=size), [base, slid], search) == [slid]) is held
 
 
 @pytest.mark.parametrize("ahead", [-20.0, 0.0, 15.0])
