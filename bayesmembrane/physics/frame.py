@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from bayesmembrane.ground.parameters import Array
 
-MOST_ITERATIONS = 40
+MOST_ITERATIONS, QUICK, QUICK_LOST = 40, 15, 4
+"""Turns of a search, at most; of one in which what a frame remembers moves; and of one of a film without a force."""
 CLOSED = 1e-11  # of the largest deflection: so far what both give way may be from the measured one
 SHORT, STEEP = 1e-7, 5.0  # a secant over a shorter step is round-off, a steeper one no slope
 LONG, TURNS = 0.1, 4
@@ -33,10 +34,25 @@ def in_series(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """(delta (B, N) m, F (B, N) N, found (B,)): F = film(delta) with delta + frame(F) = ``measured`` (B, N) m.
 
-    The N points are in the order of the test: a frame may remember the largest force so far. Where the force is larger
-    than ever it is that of a frame that remembers nothing, so that this one comes first, or the forces of ``start``
-    (B, N) N do; then what is remembered stands still in each pass, until it does so from one to the next. Where the
-    film has no force there is nothing to be remembered.
+    The N points are in the order of the test: a frame may remember the largest force so far. It remembers what the
+    forces are in each turn of a search; what that does not find is sought with what is remembered standing still.
+    """
+    delta, force, found = _closed(film, frame, measured, start, None)
+    if not np.all(found):
+        rows = np.flatnonzero(~found)
+        own = None if start is None else start[rows]
+        part = _standing_still(partial(_of, film, rows), partial(_of, frame, rows), measured[rows], own)
+        delta[rows], force[rows], found[rows] = part
+    return delta, force, found
+
+
+def _standing_still(
+    film: Film, frame: Frame, measured: Array, start: Array | None
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """`in_series` where what is remembered stands still in each of several passes, until it does from one to the next.
+
+    Where the force is larger than ever it is that of a frame that remembers nothing, so that this one comes first, or
+    the forces of ``start`` (B, N) N do. Where the film has no force there is nothing to be remembered.
     """
     delta, force, found = _closed(film, frame, measured, start, _peaks_before(start, measured))
     peaks, rows, reach = _peaks_before(start, measured), np.arange(len(measured)), _reach(measured)
@@ -56,9 +72,9 @@ def in_series(
 
 
 def _closed(
-    film: Film, frame: Frame, measured: Array, start: Array | None, peaks: Array
+    film: Film, frame: Frame, measured: Array, start: Array | None, known: Array | None
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """`in_series` with a frame that remembers ``peaks`` (B, N) N as the largest forces before.
+    """`in_series` with a frame that remembers the forces ``known`` (B, N) N as the largest before; None: those before.
 
     Newton's method for the force, from ``start`` (B, N) N or from a frame that is rigid. A frame that yields like a
     power of the force less than one is without bounds soft at no force, where a tangent leads astray: long steps are
@@ -71,27 +87,30 @@ def _closed(
     # Forces of the frame that were too little, since the film has none where they leave it, and that were too much.
     low, high = np.full(measured.shape, -np.inf), np.full(measured.shape, np.inf)
     before = np.full((2, *measured.shape), np.nan)
-    for turn in range(MOST_ITERATIONS):
-        yielded, soft = frame(rows, held, peaks[rows])
+    for turn in range(MOST_ITERATIONS if known is not None else QUICK):
+        peaks = _peaks_before(held, held) if known is None else known[rows]
+        yielded, soft = frame(rows, held, peaks)
         at = measured[rows] - yielded
         pull, slope = film(rows, at)
         lost, slope = np.isnan(pull), _seen(at - before[0], pull - before[1], slope, SHORT * reach)
         with np.errstate(all="ignore"):
             step = (pull - held) / (1 + soft * slope)
             near = np.abs(step) * soft <= CLOSED * reach
-        here = np.all(near | (lost & (np.isnan(held) | (turn >= PATIENT))), axis=1)
+        here = np.all(near | (lost & (np.isnan(held) | (turn >= PATIENT)) & (known is not None)), axis=1)
         delta[rows[here]], force[rows[here]], found[rows[here]] = at[here], pull[here], True
         if np.all(here):
             break
         new = held + step
         far = np.nonzero(~here[:, None] & (np.abs(step) > LONG * np.abs(held)))
-        peak = peaks[rows[far[0]], far[1]]
-        new[far] = _along(partial(frame, rows[far[0]]), (pull + slope * yielded)[far], slope[far], held[far], peak)
+        own = partial(frame, rows[far[0]])
+        new[far] = _along(own, (pull + slope * yielded)[far], slope[far], held[far], peaks[far])
         low, high = np.where(lost, held, low), np.where(~lost & (pull < held), held, high)
         with np.errstate(invalid="ignore"):
             between = np.where(np.isinf(high), MORE * np.abs(held), 0.5 * (low + high))
         new = np.where(lost | (new <= low), between, new)
-        some, before = ~here, np.stack([at, pull])[:, ~here]
+        # Where the film has no force nothing may be remembered: such rows are left to those who know what is.
+        some = ~here & ~(np.any(lost, axis=1) & (turn >= QUICK_LOST) & (known is None))
+        before = np.stack([at, pull])[:, some]
         rows, held, low, high = rows[some], new[some], low[some], high[some]
     return delta, force, found
 

@@ -82,7 +82,7 @@ def test_a_lost_station_leaves_the_curve_after_it() -> None:
     assert plain[2].all()
     assert beyond[2].all()
     assert np.isnan(beyond[1][0, 9])
-    assert np.delete(beyond[1], 9, axis=1) == pytest.approx(plain[1], rel=1e-9)
+    assert np.delete(beyond[1], 9, axis=1) == pytest.approx(plain[1], rel=1e-8)  # each to 1e-11 of its largest way
 
 
 def test_no_film_near_locking_is_lost_for_a_frame_that_seats() -> None:
