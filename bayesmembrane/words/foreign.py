@@ -8,11 +8,11 @@ from bayesmembrane.diagnosis.thresholds import WORDS
 from bayesmembrane.words.units import size_in_words
 
 CAUSES = {
-    SUDDEN: ": look for a change of temperature, a knock or a tear then.",
+    SUDDEN: "; look for a change of temperature, a knock or a tear then.",
     PASSING: ", as a draught, a lamp or a hand near the film would make it.",
     LOST: ", as by a drive that loses steps, a counter that slips, or a clamp that lets go once.",
     WAVE: ", as a drive, a gear or a vibration would make it.",
-    PLAY: ": after each reversal the film is behind the counter.",
+    PLAY: "; after each reversal the film is behind the counter.",
     STOP: ", as a stop, a cable or a rod that touches would be.",
     RANGE: ", as an amplifier has it whose ranges do not agree.",
 }
