@@ -25,7 +25,6 @@ PEAKS = (0.5, 0.75, 1.0, 1.0)  # what remembers the past shows on rising peaks, 
 FASTER = 10.0  # a decade shows rate and relaxation
 HELD = 2.0  # times the loading of the same test: as long is waited at the top, and at rest
 WAIT = 120  # readings of a hold
-HELD_AT, COARSE = (0.5, 1.0), 120  # peaks of the cycles with holds, and readings of a leg of them
 SAME = 1e-9  # relative: deflections closer than this are one
 
 
@@ -40,7 +39,6 @@ class Kind(Enum):
     CYCLES = "cycles"
     FASTER = "faster"
     HOLD = "hold"
-    PROGRAM = "cycles with holds"
     OTHER_SIZE = "other size"
     BLANK = "blank run"
 
@@ -185,10 +183,9 @@ def other_motions(m: Measurement) -> Iterator[OnFilm]:
         standing = [np.full(WAIT, at) for at in (top, 0.0)]
         twice = [up, standing[0], up[::-1], standing[1], up, up[::-1]]
         yield _moved(m, FurtherTest(Kind.HOLD, hold=wait), np.concatenate(twice))
-        yield _program(m, top, wait)
     for words, rig in rig_of(m).variants():
         test = FurtherTest(Kind.OTHER_SIZE, change=words)
-        trial = _test(replace(m, rig=rig), test, again, test.speed)
+        trial = _test(replace(m, rig=rig), test, again)
         yield OnFilm(test, trial, trial.deflection)
 
 
@@ -198,38 +195,22 @@ def _between(m: Measurement, test: FurtherTest, readings: int) -> OnFilm:
     return OnFilm(test, replace(m, full_range=float(np.max(at))), at)
 
 
-def _program(m: Measurement, top: float, wait: float) -> OnFilm:
-    """Cycles to half of ``top`` and to all of it, with holds at every peak and at rest, one more without, and a last
-    one that is faster: what shows in one of the other motions alone shows in a part of this one.
-    """
-    up = np.linspace(top / COARSE, top, COARSE)
-    legs = []
-    for peak in HELD_AT:
-        leg = up[up <= peak * top * (1 + SAME)]
-        legs += [leg, np.full(WAIT, leg[-1]), leg[::-1], np.zeros(WAIT)]
-    back = up[-2::-1]  # it turns at once
-    slow, fast = np.concatenate([*legs, up, back]), np.concatenate([up[1:], back])
-    pace = np.repeat([1.0, FASTER], [slow.size, fast.size])
-    test = FurtherTest(Kind.PROGRAM, hold=wait, speed=FASTER)
-    return _moved(m, test, np.concatenate([slow, fast]), pace)
-
-
-def _moved(m: Measurement, test: FurtherTest, deflection: Array, pace: Array | float | None = None) -> OnFilm:
+def _moved(m: Measurement, test: FurtherTest, deflection: Array) -> OnFilm:
     """Through ``deflection``, by a film that remembers what was done to it before."""
     before = replace(m, force_sd=None, covariance=None)
-    both = one_after_another([before, _test(m, test, deflection, test.speed if pace is None else pace)])
+    both = one_after_another([before, _test(m, test, deflection)])
     trial = both.select(np.arange(len(m), len(both)))
     return OnFilm(test, trial, trial.deflection)
 
 
-def _test(m: Measurement, test: FurtherTest, deflection: Array, pace: Array | float) -> Measurement:
-    """Readings at ``deflection``, at the speed of the measurement times the ``pace``; what stands there more than once
-    in a row is waited for.
+def _test(m: Measurement, test: FurtherTest, deflection: Array) -> Measurement:
+    """Readings at ``deflection``, at the speed of the measurement times that of the test; what stands there more than
+    once in a row is waited for.
     """
     steps = np.abs(np.diff(deflection, prepend=0.0))
     time = None
     if m.path.time is not None:
-        moving = np.maximum(steps, 1e-9) / (pace * _speed(m))
+        moving = np.maximum(steps, 1e-9) / (test.speed * _speed(m))
         time = np.cumsum(np.where(steps > 0, moving, np.maximum(moving, test.hold / WAIT)))
     force, reach = np.ones(deflection.size), m.full_range
     return Measurement(deflection, force, m.rig, m.specimen, time=time, full_range=reach, blank_run=m.blank_run)

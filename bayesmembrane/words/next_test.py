@@ -40,9 +40,6 @@ def spoken_test(test: FurtherTest, present: Fixture | None = None) -> str:
             return f"the same test {test.speed:g} times faster"
         case Kind.HOLD:
             return f"the same test with {test.hold:.3g} s holds, then again"
-        case Kind.PROGRAM:
-            held = f"with {test.hold:.3g} s holds at each peak and at rest"
-            return f"cycles to half and all of the range {held}, then one without and one {test.speed:g} times faster"
         case Kind.OTHER_SIZE:
             return f"the same test {test.change}"
         case Kind.BLANK:

@@ -134,20 +134,3 @@ def test_a_hold_is_waited_for_at_the_top_and_at_rest() -> None:
     assert [float(at[h[5]]) for h in held] == [0.03, 0.0]
     for readings in held:
         assert np.ptp(time[readings]) == pytest.approx(trial.test.hold, rel=0.05)
-
-
-def test_cycles_with_holds_end_in_one_without_and_a_faster_one() -> None:
-    timed = {t.test.kind: t for t in other_motions(film(timed=True))}
-    assert Kind.PROGRAM not in {t.test.kind for t in other_motions(film())}
-    trial = timed[Kind.PROGRAM]
-    time, at = trial.measurement.time, trial.deflection
-    assert time is not None
-    assert np.all(np.diff(time) > 0)
-    held = trial.measurement.holds
-    assert [float(at[h[5]]) for h in held] == pytest.approx([0.015, 0.0, 0.03, 0.0])
-    for readings in held:
-        assert np.ptp(time[readings]) == pytest.approx(trial.test.hold, rel=0.05)
-    assert float(np.max(at)) == 0.03
-    speed, last = np.abs(np.diff(at)) / np.diff(time), slice(-230, None)
-    assert np.all(np.diff(at)[last] != 0)
-    np.testing.assert_allclose(speed[last], trial.test.speed * speed[10], rtol=1e-6)

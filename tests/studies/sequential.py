@@ -41,7 +41,7 @@ GROUPS = ("single", "pair", "triple")
 TESTS = 2
 READINGS = 480
 """Of a further test, at most: evenly among those that it was simulated with."""
-SAME_RIG = (Kind.UNLOADING, Kind.CYCLES, Kind.FASTER, Kind.HOLD, Kind.PROGRAM)
+SAME_RIG = (Kind.UNLOADING, Kind.CYCLES, Kind.FASTER, Kind.HOLD)
 FRAME = "machine_compliance"
 BLANK_READINGS = 60
 TRAVEL_SD = 1e-6
