@@ -114,7 +114,7 @@ def test_what_is_not_in_the_library_gets_no_name(tmp_path) -> None:
     _, found = answered(tmp_path, "ripple", "gent", "staircase", "white", 521)
     assert found.verdict == "unknown"
     assert found.effects == ()
-    assert "repeats every" in sentence(found)
+    assert "A wave of " in sentence(found)
 
 
 def test_a_wrongly_declared_family_is_not_blamed_on_the_instrument(tmp_path) -> None:
