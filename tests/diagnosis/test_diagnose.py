@@ -137,7 +137,7 @@ def test_the_moment_of_a_sudden_change_is_told(tmp_path) -> None:
     assert found.probabilities.foreign["sudden_change"] > VERDICT.foreign_told
     assert "A sudden" in sentence(found)
     moment = data.truth["effects"]["temperature_step"]["when"] * data.time_s[-1]
-    assert float(sentence(found).split(" % at ")[-1].split(" s ")[0]) == pytest.approx(moment, abs=6)
+    assert float(sentence(found).split(" % at ")[-1].split(" s")[0]) == pytest.approx(moment, abs=6)
 
 
 @pytest.mark.study
