@@ -86,8 +86,8 @@ class Beliefs:
     right."""
     unlisted: float = 0.06
     """Part of what is told of sets of effects, where none stands out, that is told of a fault of no known kind beside
-    them: two in five of what is `foreign`, for drives that lose steps, joints that take hold late or amplifiers that
-    change their range leave nearly what effects leave. Of 486 films of the two generators of `flatter`, of which 58
+    them: two in five of what is `foreign`, for joints that take hold late, discs that lean or faults that nobody
+    thought of leave nearly what effects leave. (Chosen when lost steps and ranges of an amplifier were among these.) Of 486 films of the two generators of `flatter`, of which 58
     have such a fault, about 345 had an answer in which no set stands out, and 22 of these a fault that was not seen
     (6 %). Reckoned from stored sums of 204: the truth in the 95 % set of 188 instead of 184, log score -2.31 instead of
     -2.39; with 0.04 185 and -2.32, with 0.1 188 and -2.30."""
