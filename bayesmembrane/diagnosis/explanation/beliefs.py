@@ -87,10 +87,10 @@ class Beliefs:
     unlisted: float = 0.06
     """Part of what is told of sets of effects, where none stands out, that is told of a fault of no known kind beside
     them: two in five of what is `foreign`, for joints that take hold late, discs that lean or faults that nobody
-    thought of leave nearly what effects leave. (Chosen when lost steps and ranges of an amplifier were among these.) Of 486 films of the two generators of `flatter`, of which 58
-    have such a fault, about 345 had an answer in which no set stands out, and 22 of these a fault that was not seen
-    (6 %). Reckoned from stored sums of 204: the truth in the 95 % set of 188 instead of 184, log score -2.31 instead of
-    -2.39; with 0.04 185 and -2.32, with 0.1 188 and -2.30."""
+    thought of leave nearly what effects leave. (Chosen when lost steps and ranges of an amplifier were among these.) Of
+    486 films of the two generators of `flatter`, of which 58 have such a fault, about 345 had an answer in which no set
+    stood out, and 22 of these a fault that was not seen (6 %). Reckoned from stored sums of 204: the truth in the 95 %
+    set of 188 instead of 184, log score -2.31 instead of -2.39; with 0.04 185 and -2.32, with 0.1 188 and -2.30."""
     farther: float = 0.3
     """Part of that which is told of sets two steps away."""
     declared: float = 1 / 3
