@@ -15,7 +15,6 @@ from bayesmembrane.ground.errors import SettingsError, unknown_name
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.forward import Forward, Prediction, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
-from bayesmembrane.physics.mechanics.request import Spared
 from bayesmembrane.physics.rigs.base import rig_of
 
 LOSSES = ("euclidean", "weighted")
@@ -34,16 +33,9 @@ class _LevelError(Exception):
 
 
 class Objective:
-    """r(x) = L^-1 (F(x) - y) of coordinates that shape the curve, with its Jacobian; none of films that are spared."""
+    """r(x) = L^-1 (F(x) - y) of coordinates that shape the curve, with its Jacobian."""
 
-    def __init__(
-        self,
-        hypothesis: Hypothesis,
-        measurement: Measurement,
-        loss: str,
-        solve: Solve,
-        spare: Spared = Spared.NONE,
-    ) -> None:
+    def __init__(self, hypothesis: Hypothesis, measurement: Measurement, loss: str, solve: Solve) -> None:
         if loss not in LOSSES:
             raise unknown_name("loss", loss, LOSSES)
         if loss == "weighted" and measurement.force_sd is None:
@@ -56,7 +48,7 @@ class Objective:
         weighted, covariance = loss == "weighted", measurement.covariance
         self.root = np.linalg.cholesky(covariance) if weighted and covariance is not None else None
         self.sd = measurement.force_sd if weighted and covariance is None else None
-        self.forward, self.spare = Forward(hypothesis, measurement, measurement.deflection, solve), spare
+        self.forward = Forward(hypothesis, measurement, measurement.deflection, solve)
         self.parameters = hypothesis.parameters[: hypothesis.curve_size]
         self.low, self.high = np.array([p.bounds for p in self.parameters], dtype=float).T
         self._last: tuple[Array, Array, Array] | None = None
@@ -69,7 +61,7 @@ class Objective:
 
     def batch(self, x: Array) -> tuple[Array, Array]:
         """r (B, N) and J (B, N, k) of x (B, k); nan where there is no curve."""
-        p = self.forward(x, sensitivities=True, reached=False, spare=self.spare)
+        p = self.forward(x, sensitivities=True, reached=False)
         assert p.sensitivity is not None
         r, j = p.force - self.measurement.force, p.sensitivity
         if self.root is None and self.sd is None:
@@ -101,7 +93,7 @@ class Objective:
         F(s c) = s F(c), so that s = <F, y> / <F, F> is exact.
         """
         scales = np.asarray(self.hypothesis.material.scales)
-        force = self.whiten(self.forward.film_force(films, self.spare).T)
+        force = self.whiten(self.forward.film_force(films).T)
         y = self.whiten(self.measurement.force)
         with np.errstate(all="ignore"):
             s = y @ force / np.sum(force**2, axis=0)

@@ -17,7 +17,6 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.numbers import bisected
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.forward import AT_ONCE
-from bayesmembrane.physics.mechanics.request import Spared
 
 BROAD, CLOSE, ROUNDS, EACH = 256, 256, 5, 192
 HALVINGS = 40  # of the interval of tempering powers
@@ -122,11 +121,10 @@ def try_points(
 
 def candidates(posterior: Posterior, rng: np.random.Generator) -> Array:
     """(M, k): prior draws brought to their best modulus, and draws around the valleys that a descent finds from them,
-    with noise coordinates that suit their residuals. Of the convexity prior only ellipticity is asked for.
+    with noise coordinates that suit their residuals. Convexity is not asked for.
     """
     few = shortened(posterior.measurement, SCREENED_BY)
-    spare = Spared.NOT_ELLIPTIC if posterior.hypothesis.convexity.restricts else Spared.NONE
-    objective = Objective(posterior.hypothesis, few, "euclidean", posterior.solve, spare)
+    objective = Objective(posterior.hypothesis, few, "euclidean", posterior.solve)
     pool, size = objective.pool(rng)
     each = len(posterior.measurement) / len(few)
     close = _around_valleys(objective, pool, size[0] / np.sqrt(len(few)), each, rng)

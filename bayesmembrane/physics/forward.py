@@ -265,16 +265,16 @@ class Forward:
     def _films(self, films: Array, sensitivities: bool, solver: str, spare: Spared) -> Films:
         return Films(self.hypothesis.material, films, sensitivities, spare, solver, self.solve)
 
-    def film_force(self, films: Array, spare: Spared = Spared.NONE) -> Array:
+    def film_force(self, films: Array) -> Array:
         """(B, N) N: forces of films (B, n) without effects at ``deflection``; nan where there is none."""
         if not self.composes:
-            return self.curves(films, self.deflection, spare=spare).force
+            return self.curves(films, self.deflection).force
         plain = replace(self, hypothesis=replace(self.hypothesis, effects=()))
         rows = max(1, AT_ONCE // plain.path.deflection.size)
         found = []
         for part in [films[i : i + rows] for i in range(0, len(films), rows)] or [films]:
             nothing = np.empty((len(part), 0))
-            found.append(plain.composition(plain.law(part, nothing, spare=spare)[0], nothing)[0][:, plain._here])
+            found.append(plain.composition(plain.law(part, nothing)[0], nothing)[0][:, plain._here])
         return np.concatenate(found)
 
     @property

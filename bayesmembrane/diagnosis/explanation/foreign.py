@@ -30,7 +30,6 @@ class Foreign:
     relative : see ``size``
     place : number of the reading at which a step comes, else 0
     level : force, N, from which on an amplifier has another range, or deflection, m, from which on something is met
-    lasts : s, how soon a passing change is largest
     moment : its time in s, or None
     on_clock : the same on the clock of the test (`Motion.clock`), s
     period : of a wave, s or m
@@ -53,7 +52,6 @@ class Foreign:
     period: float = 0.0
     against: str = ""
     level: float = 0.0
-    lasts: float = 0.0
     share: float = 0.0
     trace: Array | None = None
     soft: float = 0.0

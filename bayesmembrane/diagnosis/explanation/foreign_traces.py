@@ -77,20 +77,16 @@ def _steps(m: Measurement, base: Candidate) -> Family:
 
 def _passing(m: Measurement, base: Candidate) -> Family:
     """What comes and goes, as a draught or a lamp makes it."""
-    span = float(np.ptp(m.path.clock[m.on_path]))
-    kinds = [partial(_coming_and_going, t) for t in FOREIGN.passes]
-    return _changes(m, base, PASSING, kinds, [span * t for t in FOREIGN.passes])
+    return _changes(m, base, PASSING, [partial(_coming_and_going, t) for t in FOREIGN.passes])
 
 
-def _changes(
-    m: Measurement, base: Candidate, kind: str, courses: Sequence[Callable[[Array], Array]], lasts: Sequence[float] = ()
-) -> Family:
+def _changes(m: Measurement, base: Candidate, kind: str, courses: Sequence[Callable[[Array], Array]]) -> Family:
     """Changes of the force by a constant first, then by a factor."""
     largest, fitted = float(np.max(np.abs(m.force))), m.force - base.residual
 
-    def told(found: Foreign, scale: int, course: int, coefficient: float) -> Foreign:
+    def told(found: Foreign, scale: int, coefficient: float) -> Foreign:
         size = coefficient * FOREIGN.size * (1.0 if scale else largest)
-        return replace(found, size=size, relative=bool(scale), lasts=lasts[course] if lasts else 0.0)
+        return replace(found, size=size, relative=bool(scale))
 
     return _at_moments(m, kind, courses, [FOREIGN.size * largest, FOREIGN.size * fitted], told)
 
@@ -100,7 +96,7 @@ def _lost(m: Measurement, base: Candidate) -> Family:
     unit = FOREIGN.lost * m.path.full_range
     slope = unit * _slope(m.deflection, m.force - base.residual)
 
-    def told(found: Foreign, _: int, __: int, coefficient: float) -> Foreign:
+    def told(found: Foreign, _: int, coefficient: float) -> Foreign:
         return replace(found, size=coefficient * unit)
 
     return _at_moments(m, LOST, [partial(_stepping, FOREIGN.widths[0])], [-slope], told)
@@ -111,9 +107,9 @@ def _at_moments(
     kind: str,
     courses: Sequence[Callable[[Array], Array]],
     scales: Sequence[Array | float],
-    told: Callable[[Foreign, int, int, float], Foreign],
+    told: Callable[[Foreign, int, float], Foreign],
 ) -> Family:
-    """Every course after every moment, by every scale (N,) N in turn; ``told`` is given numbers of scale and course."""
+    """Every course after every moment, by every scale (N,) N in turn; ``told`` is given the number of the scale."""
     clock, places = m.path.clock[m.on_path], _places(m)
     each = len(courses) * places.size
     by = np.stack([np.broadcast_to(np.asarray(s, dtype=float), clock.shape) for s in scales], axis=1)
@@ -129,7 +125,7 @@ def _at_moments(
         place = int(places[best % places.size])
         moment = None if m.time is None else float(m.time[place])
         found = replace(found, place=place, moment=moment, on_clock=float(clock[place]))
-        return told(found, best // each, best % each // places.size, coefficient)
+        return told(found, best // each, coefficient)
 
     return Family(kind, len(scales) * each, traces, placed)
 
