@@ -19,22 +19,22 @@ SMALLEST = 1e-4  # of the full range: below it a negative power is without bound
 class Hysteresis(Carried):
     """F = F0 + level z [(1 - steady) |F0| |delta / D|^grows + steady min(max |F0|, 10 |F0|)], a pull no less than 0.
 
-    On each leg z = z_r + s u a / (t a + u), with s = +1 loading, -1 unloading, u the way since the reversal, z_r the z
-    there and a = 1 - s z_r what is left to turn; half of it is turned at u = t a. Of the way a part ``by_force`` is
-    counted in force, the rest in deflection, each over its full range (`way_of`): sliders within the film know the one
-    or the other. The length is t = travel (1 - similar + similar A), with A the way of the leg before the reversal (1
-    for the first loading): the same in all cycles, or small in small cycles. z = 0 at the start, and max |F0| is the
-    largest so far.
+    On each leg z = z_r + s a [1 - exp(-u / (t a))], with s = +1 loading, -1 unloading, u the way since the reversal,
+    z_r the z there and a = 1 - s z_r what is left to turn: it begins as steeply after any reversal. Of the way a part
+    ``by_force`` is counted in force, the rest in deflection, each over its full range (`way_of`): sliders within the
+    film know the one or the other. The length is t = travel (1 - similar + similar A), with A the way of the leg before
+    the reversal (1 for the first loading): the same in all cycles, or small in small cycles. z = 0 at the start, and
+    max |F0| is the largest so far.
 
-    The reference's friction is constant in N (steady = 1); that of a filled rubber grows with the force that it carries
+    Berg's friction is constant in N (steady = 1); that of a filled rubber grows with the force that it carries
     (grows = 0), or, where the film lags behind the disc by a length, with the slope of the curve (about -1).
     """
 
     name: ClassVar[str] = "hysteresis"
     title: ClassVar[str] = "hysteresis of the material"
     reference: ClassVar[str] = (
-        "M. Berg, Veh. Syst. Dyn. 30 (1998) 197; M. Sjoberg, L. Kari, Nonlinear Dyn. 33 (2003) 323; "
-        "W. D. Iwan, J. Appl. Mech. 33 (1966) 893"
+        "P. R. Dahl, AIAA J. 14 (1976) 1675; M. Berg, Veh. Syst. Dyn. 30 (1998) 197; "
+        "M. Sjoberg, L. Kari, Nonlinear Dyn. 33 (2003) 323; W. D. Iwan, J. Appl. Mech. 33 (1966) 893"
     )
     signature: ClassVar[str] = (
         "Unloading below loading in every cycle and at any speed: closed loops, wider at larger forces or as wide at "
@@ -97,7 +97,7 @@ def turned(travel: Array, similar: Array, come: Array, path: Motion) -> Array:
         # How far the leg has come: jitter within it is no way.
         way = np.maximum.accumulate(np.maximum(sign * (come[:, part] - start), 0.0), axis=1)
         length, rest = travel * (1 - similar + similar * before), 1.0 - sign * z
-        out[:, part] = z + sign * way * rest / np.maximum(length * rest + way, 1e-12)
+        out[:, part] = z - sign * rest * np.expm1(-way / np.maximum(length * rest, 1e-12))
         before, z, start = way[:, -1:], out[:, part[-1:]], come[:, part[-1:]]
     return out
 

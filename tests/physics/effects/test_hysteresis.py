@@ -73,11 +73,26 @@ def test_a_small_loop_within_a_large_one_is_similar_or_flatter() -> None:
     assert scaled > 1.2 * fixed
 
 
-def test_half_is_turned_at_the_length_times_what_is_left() -> None:
+def test_it_turns_to_one_in_e_at_the_length_times_what_is_left() -> None:
     d = triangles(1.0, 0.0, points=2001)
     z = loop(d, 0.1, 0.0)
-    assert z[np.argmin(np.abs(d[:2000] - 0.1))] == pytest.approx(0.5, abs=2e-3)
-    assert np.all(np.abs(z) < 1)
+    assert 1 - z[np.argmin(np.abs(d[:2000] - 0.1))] == pytest.approx(np.exp(-1), abs=2e-3)
+    assert 1 + z[2000 + np.argmin(np.abs(d[2000:] - 0.8))] == pytest.approx(2 * np.exp(-1), abs=4e-3)
+    assert np.all(np.abs(z) <= 1)
+
+
+def test_the_law_of_dahl_is_followed() -> None:
+    """dz/du = (s - z) / L, in steps of its exact solution, beside a force that grows with the deflection's cube."""
+    d = triangles(0.03, 0.0, 0.04, 0.01, 0.04, 0.0, points=60)
+    elastic, z = (d / 0.04) ** 3, np.zeros(d.size)
+    for i, step in enumerate(np.diff(d)):
+        z[i + 1] = np.sign(step) - (np.sign(step) - z[i]) * np.exp(-abs(step) / 3e-3)
+
+    def rest(q: np.ndarray) -> np.ndarray:
+        return carried(d, elastic, q[0], np.exp(q[1]), q[2], 0.0, 0.0, 0.0) - elastic * (1 + 0.05 * z)
+
+    left = least_squares(rest, (0.04, np.log(0.05), 0.3), bounds=([0, np.log(2e-3), 0], [0.9, np.log(2.0), 1.0])).fun
+    assert np.linalg.norm(left) < 0.02 * np.linalg.norm(0.05 * elastic * z)
 
 
 def test_a_film_at_rest_stays_where_it_is_and_jitter_is_no_way() -> None:
