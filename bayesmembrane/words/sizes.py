@@ -7,9 +7,8 @@ from collections.abc import Iterable
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.standard import expected_size
-from bayesmembrane.diagnosis.joint.effects import AT
 from bayesmembrane.ground.registry import components
-from bayesmembrane.physics.effects.base import Effect, EffectParameter
+from bayesmembrane.physics.effects.base import AT, Effect, EffectParameter
 from bayesmembrane.words.language import spoken_parameter
 from bayesmembrane.words.units import SCALES, Units, size_in_words
 

@@ -19,7 +19,7 @@ from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.detection.detect import Detection, detect
 from bayesmembrane.diagnosis.detection.scores import Signature
 from bayesmembrane.diagnosis.explanation.foreign import Foreign
-from bayesmembrane.diagnosis.explanation.foreign_search import beside
+from bayesmembrane.diagnosis.explanation.foreign_search import beside, the_only
 from bayesmembrane.diagnosis.explanation.limit import log_evidence_alone
 from bayesmembrane.diagnosis.explanation.twins import Pairs, twins, twins_in_time, twins_one_way
 from bayesmembrane.diagnosis.reference.inferred import own_noise
@@ -165,7 +165,7 @@ class OpenCase(DiagnosisCase):
 
     def foreign(self, search: Weighing, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
         assert isinstance(search, Search)
-        return beside(search, bases, others)
+        return beside(the_only(search), bases, others)
 
     def log_evidence_of_limit(self, search: Weighing, bases: Sequence[Candidate]) -> float:
         assert isinstance(search, Search)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.limit import Limit
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.effects.base import AT, Effect
 
 SUDDEN, PASSING, LOST = "sudden_change", "passing_change", "lost_steps"
 """The force changes at a moment, or for a while; the zero of the deflection does."""
@@ -38,6 +39,7 @@ class Foreign:
     trace : (N,) N, what it changes
     soft : of a limit, over what part of it the reading yields; 0 where it is met at once
     limit : that limit
+    test, label : of several tests, the number and the label of the one that it is in
     """
 
     kind: str
@@ -56,11 +58,22 @@ class Foreign:
     trace: Array | None = None
     soft: float = 0.0
     limit: Limit | None = None
+    test: int | None = None
+    label: str = ""
+
+    @property
+    def key(self) -> str:
+        """Kind, and the test that it is in: what is foreign in two tests is two things."""
+        return self.kind if self.test is None else f"{self.kind}{AT}{self.label}"
 
     @property
     def falls(self) -> bool:
         """True if the force falls at some moment, and stays lower."""
         return (self.kind == SUDDEN and self.size < 0) or (self.kind == LOST and self.size > 0)
+
+    def where(self, effect: Effect) -> bool:
+        """True if ``effect`` is at work in the test that this is in."""
+        return self.test is None or effect.within(self.test) is not None
 
     def counted(self, counts: float) -> float:
         """ln of the Bayes factor of which a part ``counts``: laws may be off, yet not where a thing could have been."""
@@ -69,4 +82,4 @@ class Foreign:
 
 def kinds_of(found: Sequence[Foreign]) -> int:
     """How many kinds were looked for."""
-    return len({f.kind for f in found})
+    return len({f.key for f in found})

@@ -5,8 +5,8 @@ members, each with its size integrated out beside all that the model can follow.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.special import log_ndtr
@@ -14,17 +14,72 @@ from scipy.special import log_ndtr
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, extended, weighed
 from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.foreign import CLIPPED, UNNAMED, Foreign
 from bayesmembrane.diagnosis.explanation.foreign_traces import Family, bending, families
 from bayesmembrane.diagnosis.explanation.limit import limit_of
 from bayesmembrane.diagnosis.reference.inferred import own_noise
+from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.diagnosis.thresholds import FOREIGN
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.form_error import LARGEST, LAW
 
 
-def beside(search: Search, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
+@dataclass(frozen=True, eq=False)
+class InTest:
+    """Where something foreign is looked for: in one test of those that a model is weighed by, or in the only one.
+
+    All of them weigh it, for what is foreign in one bends the film of the others, too.
+
+    weighing : of all
+    search : of this test alone
+    rows : where its readings stand among those of all
+    under : (whole, noise of this test): the same ``weighing`` with another noise here
+    alone : what a candidate claims of this test alone; None if no film gets there
+    """
+
+    weighing: Weighing
+    search: Search
+    rows: slice
+    under: Callable[[OwnNoise], Weighing]
+    alone: Callable[[Candidate], Candidate | None]
+
+    @cached_property
+    def smooth(self) -> Array:
+        return smooth_reference(self.search.measurement)
+
+    @property
+    def enough(self) -> bool:
+        """True if there are readings enough for anything to be looked for."""
+        return len(self.search.measurement) >= FOREIGN.least_points
+
+    def fitted(self, base: Candidate) -> Array:
+        """(N,) N, the forces of this test by ``base``."""
+        return np.asarray(self.search.measurement.force - base.residual[self.rows])
+
+    def slopes(self, base: Candidate) -> Array:
+        """(N, k) those of this test by the coordinates that it depends on."""
+        own = base.slopes[self.rows]
+        return np.asarray(own[:, np.any(own != 0, axis=0)])
+
+    def among(self, columns: Array) -> Array:
+        """(M, ...) of the readings of all tests, from (N, ...) of this one: zeros for the others."""
+        out = np.zeros((self.weighing.force.size, *columns.shape[1:]))
+        out[self.rows] = columns
+        return out
+
+    def with_noise(self, noise: OwnNoise) -> InTest:
+        """The same where the readings of this test have another ``noise``."""
+        return replace(self, weighing=self.under(noise), search=replace(self.search, noise=noise))
+
+
+def the_only(search: Search) -> InTest:
+    """The test of a model that is weighed by one."""
+    return InTest(search, search, slice(None), lambda noise: replace(search, noise=noise), lambda base: base)
+
+
+def beside(test: InTest, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
     """What is foreign beside the ``bases``, what is `bending` or a limit beside the ``others`` too; the most probable
     first.
 
@@ -32,86 +87,83 @@ def beside(search: Search, bases: Sequence[Candidate], others: Sequence[Candidat
     without one says little: of a step of the load cell's zero 7 in ln of the Bayes factor were told beside that, and 36
     beside three others. What comes and goes, waves and plays leave traces that no energy has.
     """
-    found = [f for base in bases for f in foreign(search, base)]
-    if len(search.measurement) >= FOREIGN.least_points:
-        smooth = smooth_reference(search.measurement)
-        for base in others:
-            finders: list[Finder] = [partial(_of_family, base, f) for f in bending(search.measurement, base)]
-            finders.append(partial(_clipped, base))
-            found += [f for f in (_with_its_own_noise(search, smooth, find) for find in finders) if f is not None]
+    if not test.enough:
+        return []
+    m, found = test.search.measurement, [f for base in bases for f in foreign(test, base)]
+    for base in others:
+        found += _found(test, base, bending(m, test.fitted(base)))
     return sorted(found, key=lambda f: -(f.gain + f.base.log_evidence))
 
 
-def foreign(search: Search, base: Candidate) -> list[Foreign]:
+def foreign(test: InTest, base: Candidate) -> list[Foreign]:
     """Every kind that can be looked for beside ``base``."""
-    m = search.measurement
-    if len(m) < FOREIGN.least_points:
-        return []
-    smooth = smooth_reference(m)
-    finders: list[Finder] = [partial(_of_family, base, f) for f in families(m, base)]
+    found = _found(test, base, families(test.search.measurement, test.fitted(base)))
+    return [*found, _unnamed(test, base)]
+
+
+def _found(test: InTest, base: Candidate, of: Sequence[Family]) -> list[Foreign]:
+    finders: list[Finder] = [partial(_of_family, base, f) for f in of]
     finders.append(partial(_clipped, base))
-    found = [_with_its_own_noise(search, smooth, find) for find in finders]
-    return [f for f in (*found, _unnamed(search, base)) if f is not None]
+    return [f for f in (_with_its_own_noise(test, find) for find in finders) if f is not None]
 
 
-Finder = Callable[[Search, Foreign | None], Foreign | None]
-"""Looks for one thing under the noise of a search; given what was found of it under another noise."""
+Finder = Callable[[InTest, Foreign | None], Foreign | None]
+"""Looks for one thing under the noise of a test; given what was found of it under another noise."""
 
 
-def _with_its_own_noise(search: Search, smooth: Array, find: Finder) -> Foreign | None:
+def _with_its_own_noise(test: InTest, find: Finder) -> Foreign | None:
     """What is found under the noise as it is, or under the one that is left beside what was found, if that is likelier.
 
     What is foreign looks like noise, and like noise with a memory: it hides in the one that is inferred without it.
     Both models are weighed under both noises, each of which is as likely as it makes the readings.
     """
-    found = find(search, None)
+    found = find(test, None)
     if found is None or found.trace is None or found.gain - found.chance < FOREIGN.promise:
         return found
     base = found.base
-    noise = own_noise(search.measurement, np.column_stack([smooth, base.slopes, found.trace]))
-    other = replace(search, noise=noise)
+    basis = np.column_stack([test.smooth, test.slopes(base), found.trace[test.rows]])
+    other = test.with_noise(own_noise(test.search.measurement, basis))
     again = find(other, found)
     if again is None:
         return found
-    apart = _plain_evidence(other, base) - _plain_evidence(search, base)
+    apart = _plain_evidence(other.weighing, base) - _plain_evidence(test.weighing, base)
     gain = again.gain + min(apart, 0.0)
     return replace(again, gain=gain) if gain > found.gain else found
 
 
-def _plain_evidence(search: Search, base: Candidate) -> float:
+def _plain_evidence(weighing: Weighing, base: Candidate) -> float:
     """ln Z of the model alone, comparable between noises."""
-    return weighed(search.linear(base), base.theta).log_evidence - search.noise.log_root
+    return weighed(weighing.linear(base), base.theta).log_evidence - weighing.noise.log_root
 
 
-def _of_family(base: Candidate, family: Family, search: Search, _before: Foreign | None) -> Foreign:
+def _of_family(base: Candidate, family: Family, test: InTest, _before: Foreign | None) -> Foreign:
     """The most probable member of a family beside ``base``, and the evidence of them all."""
-    model = search.linear(base)
+    model, white = test.weighing.linear(base), test.weighing.noise.white
     # Beside noise and form error as they are expected: what is foreign has driven the fitted ones up.
     plain = np.minimum(base.theta, model.priors[:, 0])
-    pieces = family.pieces(len(search.measurement))
-    parts = [_gains(search, model, plain, part, family) for part in pieces]
+    pieces = family.pieces(test.weighing.force.size)
+    parts = [_gains(model, plain, white(test.among(part)), family) for part in pieces]
     gains, sure = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
     size, best = (int(i) for i in np.unravel_index(np.argmax(gains + sure), gains.shape))
-    members = FOREIGN.sizes[size] * family.traces(np.array([best]))
+    members = test.among(FOREIGN.sizes[size] * family.traces(np.array([best])))
     spread = float(np.logaddexp.reduce(gains + sure, axis=None) - np.log(gains.size) - gains[size, best])
-    wider = extended(model, [Block(search.noise.white(members))])
+    wider = extended(model, [Block(white(members))])
     z = weighed(wider, base.theta)
     own = wider.mean(z.theta)[-family.width :]
     trace = members @ own
     gain = float(z.log_evidence - weighed(model, base.theta).log_evidence + spread)
-    found = Foreign(family.kind, base, gain, spread, trace=trace, share=_share(search, base, trace))
+    found = Foreign(family.kind, base, gain, spread, trace=trace, share=_share(test, base, trace))
     return family.told(found, best, FOREIGN.sizes[size] * float(own[0]))
 
 
-def _gains(search: Search, model: Linear, theta: Array, traces: Array, family: Family) -> tuple[Array, Array]:
-    """Of each group of columns s that is expected to be z = `FOREIGN.sizes` times as large, (Z, m) each: the gain
+def _gains(model: Linear, theta: Array, white: Array, family: Family) -> tuple[Array, Array]:
+    """Of each group of ``white`` columns s, expected to be z = `FOREIGN.sizes` times as large, (Z, m) each: the gain
 
     ln K = z r^T P s c / 2 - ln |1 + z^2 s^T P s| / 2,    c = (1 + z^2 s^T P s)^-1 z s^T P r,
 
     and what is to be added where only c > 0 is one of the family: ln 2 Phi(c (1 + z^2 s^T P s)^(1/2)), else 0.
     """
-    n, width = len(traces), family.width
-    white = search.noise.white(traces)
+    n, width = len(white), family.width
     freed = model.freed(theta, white)
     z = np.array(FOREIGN.sizes)[:, None, None]
     a = z * (freed.T @ model.data).reshape(-1, width)
@@ -123,9 +175,10 @@ def _gains(search: Search, model: Linear, theta: Array, traces: Array, family: F
     return gains, np.log(2) + log_ndtr(above) if family.upward else np.zeros(gains.shape)
 
 
-def _share(search: Search, base: Candidate, trace: Array) -> float:
-    """Part of the squares, beside the model's own slopes, that a trace takes away."""
-    white = search.noise.white(np.column_stack([base.slopes, trace, base.residual]))
+def _share(test: InTest, base: Candidate, trace: Array) -> float:
+    """Part of the squares of the test, beside the model's own slopes, that a trace takes away."""
+    columns = np.column_stack([test.slopes(base), trace[test.rows], base.residual[test.rows]])
+    white = test.search.noise.white(columns)
     q, _ = np.linalg.qr(white[:, :-2])
     t, r = (white[:, i] - q @ (q.T @ white[:, i]) for i in (-2, -1))
     return float((t @ r) ** 2 / max(float(t @ t) * float(r @ r), 1e-300))
@@ -134,29 +187,31 @@ def _share(search: Search, base: Candidate, trace: Array) -> float:
 # ---- kinds of their own ----------------------------------------------------------------------------------------------
 
 
-def _unnamed(search: Search, base: Candidate) -> Foreign | None:
+def _unnamed(test: InTest, base: Candidate) -> Foreign:
     """A smooth relative error of the whole curve along the test: memory of a kind that is not in the library.
 
     No larger than the error of a law may be: what is as large as the force itself would be any curve.
     """
-    fitted = search.measurement.force - base.residual
-    columns = search.noise.white(fitted[:, None] * search.factors.progress)
-    model = search.linear(base)
+    fitted, progress = test.fitted(base), test.search.factors.progress
+    columns = test.weighing.noise.white(test.among(fitted[:, None] * progress))
+    model = test.weighing.linear(base)
     wider = extended(model, [Block(columns, FOREIGN.ln_unnamed, float(np.log(LARGEST[LAW.name])))])
     z = weighed(wider)
     mean = wider.mean(z.theta)
-    trace = fitted * (search.factors.progress @ mean[-columns.shape[1] :])
+    trace = test.among(fitted * (progress @ mean[-columns.shape[1] :]))
     gain = z.log_evidence - weighed(model, base.theta).log_evidence
-    share = _share(search, base, trace)
+    share = _share(test, base, trace)
     return Foreign(UNNAMED, base, gain, size=float(np.exp(z.theta[-1])), relative=True, share=share, trace=trace)
 
 
-def _clipped(base: Candidate, search: Search, before: Foreign | None) -> Foreign | None:
-    """A load cell at its limit."""
-    found = limit_of(search, base, None if before is None else before.limit)
+def _clipped(base: Candidate, test: InTest, before: Foreign | None) -> Foreign | None:
+    """A load cell at its limit; weighed in its test alone, where readings there are set aside."""
+    alone = test.alone(base)
+    found = None if alone is None else limit_of(test.search, alone, None if before is None else before.limit)
     if found is None:
         return None
-    share = _share(search, base, found.trace)
+    trace = test.among(found.trace)
+    share = _share(test, base, trace)
     return Foreign(
         CLIPPED,
         base,
@@ -164,7 +219,7 @@ def _clipped(base: Candidate, search: Search, before: Foreign | None) -> Foreign
         size=found.force,
         place=found.first,
         share=share,
-        trace=found.trace,
+        trace=trace,
         soft=found.width,
         limit=found,
     )

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.detection.periodicity import most_waves
 from bayesmembrane.diagnosis.explanation.foreign import LOST, PASSING, PLAY, RANGE, STOP, SUDDEN, WAVE, Foreign
 from bayesmembrane.diagnosis.thresholds import DETECTION, FOREIGN, TINY
@@ -45,21 +44,24 @@ class Family:
             yield self.traces(np.arange(first, min(first + step, self.count)))
 
 
-def families(m: Measurement, base: Candidate) -> list[Family]:
-    """Every family that can be looked for beside ``base``; where readings have no order nothing comes at a moment."""
-    out = bending(m, base)
+def families(m: Measurement, fitted: Array) -> list[Family]:
+    """Every family that can be looked for beside a model with these ``fitted`` forces (N,), N.
+
+    Where readings have no order nothing comes at a moment.
+    """
+    out = bending(m, fitted)
     if m.rig.has_path:
-        out += [_passing(m, base), _waves(m)]
+        out += [_passing(m, fitted), _waves(m)]
     if m.rig.has_path and np.any(m.leg < 0):
-        out.append(_plays(m, base))
+        out.append(_plays(m, fitted))
     return out
 
 
-def bending(m: Measurement, base: Candidate) -> list[Family]:
+def bending(m: Measurement, fitted: Array) -> list[Family]:
     """Those for which a film that is fitted through them takes another energy."""
-    out = [_ranges(m, base)]
+    out = [_ranges(m, fitted)]
     if m.rig.has_path:
-        out += [_steps(m, base), _lost(m, base), _stops(m, base)]
+        out += [_steps(m, fitted), _lost(m, fitted), _stops(m)]
     return out
 
 
@@ -69,20 +71,20 @@ def _places(m: Measurement) -> Array:
     return np.unique(np.linspace(*ends, min(FOREIGN.places, n)).astype(int))
 
 
-def _steps(m: Measurement, base: Candidate) -> Family:
+def _steps(m: Measurement, fitted: Array) -> Family:
     """Steps of the force that take several times, and what comes to rest in several."""
     kinds = [partial(_stepping, width) for width in FOREIGN.widths] + [partial(_resting, t) for t in FOREIGN.rests]
-    return _changes(m, base, SUDDEN, kinds)
+    return _changes(m, fitted, SUDDEN, kinds)
 
 
-def _passing(m: Measurement, base: Candidate) -> Family:
+def _passing(m: Measurement, fitted: Array) -> Family:
     """What comes and goes, as a draught or a lamp makes it."""
-    return _changes(m, base, PASSING, [partial(_coming_and_going, t) for t in FOREIGN.passes])
+    return _changes(m, fitted, PASSING, [partial(_coming_and_going, t) for t in FOREIGN.passes])
 
 
-def _changes(m: Measurement, base: Candidate, kind: str, courses: Sequence[Callable[[Array], Array]]) -> Family:
+def _changes(m: Measurement, fitted: Array, kind: str, courses: Sequence[Callable[[Array], Array]]) -> Family:
     """Changes of the force by a constant first, then by a factor."""
-    largest, fitted = float(np.max(np.abs(m.force))), m.force - base.residual
+    largest = float(np.max(np.abs(m.force)))
 
     def told(found: Foreign, scale: int, coefficient: float) -> Foreign:
         size = coefficient * FOREIGN.size * (1.0 if scale else largest)
@@ -91,10 +93,10 @@ def _changes(m: Measurement, base: Candidate, kind: str, courses: Sequence[Calla
     return _at_moments(m, kind, courses, [FOREIGN.size * largest, FOREIGN.size * fitted], told)
 
 
-def _lost(m: Measurement, base: Candidate) -> Family:
+def _lost(m: Measurement, fitted: Array) -> Family:
     """-dF/d(deflection) from some moment on: the drive lost steps, or the counter its zero."""
     unit = FOREIGN.lost * m.path.full_range
-    slope = unit * _slope(m.deflection, m.force - base.residual)
+    slope = unit * _slope(m.deflection, fitted)
 
     def told(found: Foreign, _: int, coefficient: float) -> Foreign:
         return replace(found, size=coefficient * unit)
@@ -144,9 +146,8 @@ def _coming_and_going(time: float, since: Array) -> Array:
     return np.asarray(x * np.exp(1 - x))
 
 
-def _ranges(m: Measurement, base: Candidate) -> Family:
+def _ranges(m: Measurement, fitted: Array) -> Family:
     """The force times a factor, where it is larger than some force: an amplifier that changes its range."""
-    fitted = m.force - base.residual
     largest = float(np.max(np.abs(m.force)))
     levels = largest * np.linspace(*FOREIGN.within, FOREIGN.levels)
 
@@ -159,7 +160,7 @@ def _ranges(m: Measurement, base: Candidate) -> Family:
     return Family(RANGE, levels.size, traces, told)
 
 
-def _stops(m: Measurement, _: Candidate) -> Family:
+def _stops(m: Measurement) -> Family:
     """What is met at some deflection, and pushes back from there on."""
     most, largest = float(np.max(m.deflection)), float(np.max(np.abs(m.force)))
     levels = most * np.linspace(*FOREIGN.met_at, FOREIGN.levels)
@@ -219,10 +220,9 @@ def _phase(place: Array) -> Array:
     return np.asarray(2 * np.pi * ((place - place.min()) / span))
 
 
-def _plays(m: Measurement, base: Candidate) -> Family:
+def _plays(m: Measurement, fitted: Array) -> Family:
     """dF/d(deflection) times how far a play of the drive is taken up: 0 on loading, 1 on unloading."""
     path = m.path
-    fitted = m.force - base.residual
     slope = _slope(m.deflection, fitted)
     unit = FOREIGN.play * path.full_range
     out = []

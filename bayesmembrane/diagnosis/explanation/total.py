@@ -12,7 +12,7 @@ import numpy as np
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.foreign import LOST, Foreign, kinds_of
+from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown, key_of
 from bayesmembrane.diagnosis.explanation.neighbours import NEGLIGIBLE, spread
 from bayesmembrane.diagnosis.explanation.promise import promised
@@ -167,7 +167,7 @@ def summed(grown: Grown) -> Total:
             raised[names] += max(w - float(np.log(BELIEFS.apart)) - best - nothing, 0.0)
     every.sort(key=weight, reverse=True)
     terms = [(c, NOTHING, weight(c) + nothing) for c in every]
-    terms += [(f.base, f.kind, max(w, low)) for f, w, low in zip(told, strange, least, strict=True)]
+    terms += [(f.base, f.key, max(w, low)) for f, w, low in zip(told, strange, least, strict=True)]
     guessed = [(key, w + raised[key[1]] + nothing) for key, w in others.items()]
     p = _normalised(np.array([*(w for _, _, w in terms), *(w for _, w in guessed)]))
     parts = [(c.hypothesis.material.name, set_name(c, given), kind) for c, kind, _ in terms]
@@ -288,7 +288,7 @@ def _tears(f: Foreign, every: Sequence[Candidate], search: Weighing) -> list[Can
         if f.falls
         and c.hypothesis.material is f.base.hypothesis.material
         and len(c.names) == len(f.base.names) + 1
-        and all(e.sudden or (f.kind == LOST and e.shortens) or e.name in f.base.names for e in c.hypothesis.effects)
+        and all(e.name in f.base.names or (f.kind in e.like_foreign and f.where(e)) for e in c.hypothesis.effects)
         and -_fits_better(c, f, search) < TWINS.behind
     ]
 

@@ -92,7 +92,7 @@ def explained(case: DiagnosisCase) -> tuple[Weighing, Verdict]:
 def _falls(total: Total) -> list[Foreign]:
     """Falls of the force that are worth a word."""
     p = total.probabilities
-    return [f for f in total.foreign if f.falls and p.foreign.get(f.kind, 0.0) > VERDICT.foreign_told]
+    return [f for f in total.foreign if f.falls and p.foreign.get(f.key, 0.0) > VERDICT.foreign_told]
 
 
 def _unfitted_rivals(total: Total, given: Sequence[str]) -> list[frozenset[str]]:
@@ -181,7 +181,7 @@ def _strange(total: Total, given: Sequence[str]) -> Foreign | None:
     if p.something_found <= VERDICT.foreign_told:
         return None
     first, kind = next(key for key in total.joint if key[1] not in (NOTHING, *CONCLUDED))
-    same = [f for f in total.foreign if f.kind == kind]
+    same = [f for f in total.foreign if f.key == kind]
     return next((f for f in same if set_name(f.base, given) == first), same[0])
 
 
@@ -241,7 +241,7 @@ def _foreign_first(case: DiagnosisCase, found: Sequence[Foreign], plain: Mapping
     for f in found:
         if f.gain > BELIEFS.supported:
             weight = plain[f.base.hypothesis.material.name] + f.gain + BELIEFS.log_foreign(kinds)
-            strange[f.kind] = float(np.logaddexp(strange.get(f.kind, -np.inf), weight))
+            strange[f.key] = float(np.logaddexp(strange.get(f.key, -np.inf), weight))
     return _shares(strange)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -18,14 +18,14 @@ from bayesmembrane.diagnosis.detection.lack_of_fit import lack_of_fit
 from bayesmembrane.diagnosis.detection.scores import Signature, score_test
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase, OpenCase, Question, Tell, renewed, seen_elsewhere
 from bayesmembrane.diagnosis.explanation.foreign import Foreign
-from bayesmembrane.diagnosis.explanation.foreign_search import beside
+from bayesmembrane.diagnosis.explanation.foreign_search import InTest, beside
 from bayesmembrane.diagnosis.explanation.twins import Near, Pairs, one_speed, twins, twins_in_time, twins_one_way
-from bayesmembrane.diagnosis.joint.effects import AT, EffectInTests, effects_in_tests
+from bayesmembrane.diagnosis.joint.effects import EffectInTests, effects_in_tests
 from bayesmembrane.diagnosis.joint.search import JointSearch, joint_noise
 from bayesmembrane.diagnosis.reference.noise import Whitened, whitened
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.effects.base import Effect
+from bayesmembrane.physics.effects.base import AT, Effect
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 
@@ -84,21 +84,18 @@ class JointCase(DiagnosisCase):
         return -np.inf
 
     def foreign(self, search: Weighing, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
-        """What is foreign in one of the tests, weighed in that test alone."""
+        """What is foreign in one of the tests."""
         assert isinstance(search, JointSearch)
         found: list[Foreign] = []
-        for i, (part, label) in enumerate(zip(search.parts, self.labels, strict=True)):
-            whole: dict[int, Candidate] = {}
-            own: list[list[Candidate]] = [[], []]
-            for group, several in zip(own, (bases, others), strict=True):
-                for c in several:
-                    if (here := search.restricted(c, i)) is not None:
-                        whole[id(here)] = c
-                        group.append(here)
-            found += [
-                replace(f, base=whole[id(f.base)], kind=f"{f.kind}{AT}{label}") for f in beside(part, own[0], own[1])
-            ]
+        for i, label in enumerate(self.labels):
+            found += [replace(f, test=i, label=label) for f in beside(in_test(search, i), bases, others)]
         return sorted(found, key=lambda f: -(f.gain + f.base.log_evidence))
+
+
+def in_test(search: JointSearch, number: int) -> InTest:
+    """Where something foreign in one of the tests is looked for."""
+    part, rows = search.parts[number], search.rows[number]
+    return InTest(search, part, rows, partial(search.with_noise, number), partial(search.restricted, test=number))
 
 
 def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Question, tell: Tell) -> JointCase:

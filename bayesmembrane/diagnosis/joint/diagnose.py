@@ -16,7 +16,6 @@ from bayesmembrane.diagnosis.explanation.foreign import Foreign
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities
 from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, explained, undoubted
 from bayesmembrane.diagnosis.joint.case import JointCase, opened_jointly
-from bayesmembrane.diagnosis.joint.effects import AT
 from bayesmembrane.diagnosis.joint.search import JointSearch
 from bayesmembrane.diagnosis.left.heldout import Misfit, misfit_of
 from bayesmembrane.diagnosis.left.remaining import Remaining, remaining
@@ -25,6 +24,7 @@ from bayesmembrane.diagnosis.result import Thinned, thinning
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.ground.threads import one_thread
+from bayesmembrane.physics.effects.base import AT
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -172,7 +172,7 @@ def _concluded(
     best = found.members[0].candidate if known else null
     given = set(null.names)
     effects = [n for j in found.members for n in sorted(set(j.candidate.names) - given)] if known else []
-    told = None if found.foreign is None else _placed(found.foreign)
+    told = None if found.foreign is None else (found.foreign, found.foreign.label)
     return JointDiagnosis(
         verdict=verdict,
         effects=tuple(dict.fromkeys(effects)),
@@ -196,11 +196,6 @@ def _concluded(
 def _misfit(search: JointSearch, c: Candidate) -> Misfit:
     residual = search.adapted(c)
     return misfit_of(residual, search.noise.each, c.x.size, search.noise.white(residual))
-
-
-def _placed(f: Foreign) -> tuple[Foreign, str]:
-    kind, _, label = f.kind.partition(AT)
-    return replace(f, kind=kind), label
 
 
 def _member(case: JointCase, search: JointSearch, j: Judged, given: set[str]) -> JointMember:

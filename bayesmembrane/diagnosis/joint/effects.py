@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from bayesmembrane.physics.effects.base import Effect
-
-AT = "@"
+from bayesmembrane.physics.effects.base import AT, Effect
 
 
 @dataclass(frozen=True)
@@ -56,8 +54,11 @@ class EffectInTests(Effect):
         """Those of its first part: what comes in events is of the rig, and in one test."""
         return self.parts[0][1].second_places
 
+    def come_at(self, moment: float) -> list[dict[str, float]]:
+        """Those of the effect in the one test that it is in."""
+        return self.parts[0][1].come_at(moment) if len(self.parts) == 1 else []
+
     def within(self, test: int) -> Effect | None:
-        """The effect in one test; None if it is not at work there."""
         return dict(self.parts).get(test)
 
 
@@ -82,6 +83,8 @@ def in_tests(name: str, parts: Sequence[tuple[int, Effect]], one_clock: bool = T
             "exact": first.exact,
             "may_change": first.may_change,
             "second": first.second if len(parts) == 1 else None,
+            "begins": first.begins if len(parts) == 1 else "",
+            "like_foreign": first.like_foreign,
             "odds": first.odds,
             "remembers": first.remembers,
             "of_the_material": first.of_the_material,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import cast
@@ -211,6 +211,12 @@ class JointSearch(Weighing):
             each.append(own)
         mixed = [own[k] for k in range(max(map(len, each))) for own in each if k < len(own)]
         return [np.concatenate([x, nothing]) for x in mixed[: max(map(len, each))]]
+
+    def with_noise(self, test: int, noise: OwnNoise) -> JointSearch:
+        """The same with another noise of one test."""
+        each = [noise if i == test else p.noise for i, p in enumerate(self.parts)]
+        parts = tuple(replace(p, noise=n) for p, n in zip(self.parts, each, strict=True))
+        return replace(self, parts=parts, noise=joint_noise(each))
 
     def restricted(self, candidate: Candidate, test: int) -> Candidate | None:
         """What a hypothesis claims of one test, where it is, weighed there alone."""

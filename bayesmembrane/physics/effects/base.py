@@ -28,6 +28,9 @@ from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, Parameter, Prior
 from bayesmembrane.physics.reach import Reach
 
+AT = "@"
+"""Between the name of an effect, or of what is foreign, and the label of the one test of several that it is in."""
+
 
 @dataclass(frozen=True)
 class EffectParameter(Parameter):
@@ -118,8 +121,8 @@ class Effect(ABC):
     begins : the coordinate that says when it comes, in s since the start; "" where it comes with the way
     second : (part, place, second place), the coordinates that say what part of what comes at once comes in a second
         event, and where the two are; None where there is only one
-    sudden : True if it may come at any moment, which no test tells from a fall of the force that no effect describes
-    shortens : True if it takes way from the film that the disc has gone, as a drive does that loses steps
+    like_foreign : kinds of what no effect describes (`diagnosis.explanation.foreign`) that leave what this one leaves:
+        what comes at any moment is a fall of the force, what takes way from the film steps that a drive has lost
     odds : how often it is met beside the others, before anything is measured
     rank : orders effects within a stage; equal ranks go by name
 
@@ -148,8 +151,7 @@ class Effect(ABC):
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ()
     of_many_shapes: ClassVar[bool] = False
     twins_one_way: ClassVar[tuple[str, ...]] = ()
-    sudden: ClassVar[bool] = False
-    shortens: ClassVar[bool] = False
+    like_foreign: ClassVar[tuple[str, ...]] = ()
     begins: ClassVar[str] = ""
     second: ClassVar[tuple[str, str, str] | None] = None
     odds: ClassVar[float] = 1.0
@@ -202,6 +204,10 @@ class Effect(ABC):
     def starts(self) -> list[dict[str, float]]:
         """Shapes by name from which searches for it start, beside the typical ones."""
         return []
+
+    def within(self, test: int) -> Effect | None:
+        """The effect in one of several tests (their number); None if it is not at work there."""
+        return self
 
     def come_at(self, moment: float) -> list[dict[str, float]]:
         """Shapes by name from which it is searched for where it is seen to come at a ``moment`` (s on the clock)."""

@@ -49,7 +49,7 @@ class ClampSlip(Slack):
         "below loading, reloading on the unloading curve, and no return to the first curve."
     )
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("permanent_set",)  # both are a film that has become longer
-    shortens: ClassVar[bool] = True
+    like_foreign: ClassVar[tuple[str, ...]] = ("lost_steps",)
     second: ClassVar[tuple[str, str, str] | None] = ("second", "place", "second_place")
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(

@@ -48,7 +48,7 @@ class Tearing(Carried):
     )
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("mullins",)  # with damage alone both are less by what was reached
     twins_one_way: ClassVar[tuple[str, ...]] = ("clamp_slip",)  # both are a force that falls; what slid is slack later
-    sudden: ClassVar[bool] = True
+    like_foreign: ClassVar[tuple[str, ...]] = ("sudden_change", "lost_steps")
     begins: ClassVar[str] = "moment"
     second: ClassVar[tuple[str, str, str] | None] = ("second", "moment", "second_moment")
     scales_with_modulus: ClassVar[bool] = True

@@ -20,7 +20,7 @@ from bayesmembrane.diagnosis.explanation.foreign import (
     WAVE,
     Foreign,
 )
-from bayesmembrane.diagnosis.explanation.foreign_search import beside, foreign
+from bayesmembrane.diagnosis.explanation.foreign_search import beside, foreign, the_only
 from bayesmembrane.diagnosis.reference.inferred import own_noise
 from bayesmembrane.diagnosis.reference.smooth import smooth_reference
 from bayesmembrane.ground.parameters import Array
@@ -53,6 +53,10 @@ def searched(m: Measurement, change: Array, seed: int, rho: float = 0.0) -> tupl
     return search, base
 
 
+def told(search: Search, base: Candidate) -> list[Foreign]:
+    return foreign(the_only(search), base)
+
+
 def kind(found: list[Foreign], name: str) -> Foreign:
     return next(f for f in found if f.kind == name)
 
@@ -72,7 +76,7 @@ def with_holds() -> tuple[Array, Array]:
 @pytest.mark.parametrize("path", [cycles, with_holds])
 def test_a_wave_of_the_deflection_is_found_with_its_length_with_and_without_holds(path) -> None:
     m = film_on(*path())
-    found = kind(foreign(*searched(m, SD * np.sin(2 * np.pi * m.deflection / PITCH + 1.0), 4401)), WAVE)
+    found = kind(told(*searched(m, SD * np.sin(2 * np.pi * m.deflection / PITCH + 1.0), 4401)), WAVE)
     assert found.gain > 20.0
     assert found.against == "deflection"
     assert found.period == pytest.approx(PITCH, rel=0.03)
@@ -85,9 +89,9 @@ def test_a_wave_that_was_taken_for_noise_with_a_memory_is_weighed_by_the_noise_b
     m = film_on(*cycles())
     search, base = searched(m, 1.5 * SD * np.sin(2 * np.pi * m.time / 9.0), 4402)
     assert search.noise.rho > 0.3
-    found = kind(foreign(search, base), WAVE)
-    monkeypatch.setattr(search_module, "_with_its_own_noise", lambda search, _, find: find(search, None))
-    before = kind(foreign(search, base), WAVE)
+    found = kind(told(search, base), WAVE)
+    monkeypatch.setattr(search_module, "_with_its_own_noise", lambda test, find: find(test, None))
+    before = kind(told(search, base), WAVE)
     assert found.gain > before.gain + 10.0
     assert found.period == pytest.approx(9.0, rel=0.03)
 
@@ -96,7 +100,7 @@ def test_a_wave_that_was_taken_for_noise_with_a_memory_is_weighed_by_the_noise_b
 def test_in_noise_nothing_is_foreign(seed: int, rho: float) -> None:
     m = film_on(*cycles())
     search, base = searched(m, np.zeros(len(m)), seed, rho)
-    assert max(f.gain for f in foreign(search, base)) < 1.0
+    assert max(f.gain for f in told(search, base)) < 1.0
 
 
 def test_legs_read_half_a_step_apart_show_no_wave_of_their_steps() -> None:
@@ -104,7 +108,7 @@ def test_legs_read_half_a_step_apart_show_no_wave_of_their_steps() -> None:
     up = np.linspace(1e-3, 0.04, 40)
     d = np.concatenate([up, up[::-1] - 5e-4, up, up[::-1] - 5e-4])
     loop = np.where(np.diff(d, prepend=0.0) > 0, 6 * SD, -6 * SD)
-    found = kind(foreign(*searched(film_on(d, np.arange(1.0, d.size + 1)), loop, 7)), WAVE)
+    found = kind(told(*searched(film_on(d, np.arange(1.0, d.size + 1)), loop, 7)), WAVE)
     assert found.period > 2e-3 or found.against == "time"
 
 
@@ -113,12 +117,12 @@ def test_what_has_no_name_is_smaller_than_the_force() -> None:
     d, time = triangle(240, (0.04, 0.04)), np.arange(1.0, 241)
     plain = film_on(d, time)
     loop = np.where(np.diff(d, prepend=0.0) > 0, 1.0, -1.0) * 0.9 * plain.force
-    assert kind(foreign(*searched(plain, loop, 11)), UNNAMED).size <= 0.4 + 1e-9
+    assert kind(told(*searched(plain, loop, 11)), UNNAMED).size <= 0.4 + 1e-9
 
 
 def test_a_step_is_told_with_its_moment_and_its_part_of_the_force() -> None:
     m = film_on(*cycles())
-    found = kind(foreign(*searched(m, 0.02 * m.force * (m.time > 140.0), 4408)), SUDDEN)
+    found = kind(told(*searched(m, 0.02 * m.force * (m.time > 140.0), 4408)), SUDDEN)
     assert found.gain > 20.0
     assert found.relative
     assert found.moment == pytest.approx(140.0, abs=4.0)
@@ -127,7 +131,7 @@ def test_a_step_is_told_with_its_moment_and_its_part_of_the_force() -> None:
 
 def most_probable(m: Measurement, change: Array, seed: int) -> Foreign:
     """Of all kinds, beside the plain fit of a film whose force is changed."""
-    return max(foreign(*searched(m, change, seed)), key=lambda f: f.gain)
+    return max(told(*searched(m, change, seed)), key=lambda f: f.gain)
 
 
 @pytest.mark.parametrize("lost", [0.4e-3, -0.4e-3])
@@ -163,7 +167,7 @@ def test_what_the_disc_meets_is_told_with_where_it_is_and_never_pulls() -> None:
     assert found.gain > 10.0
     assert found.level == pytest.approx(0.032, abs=0.0015)
     assert found.size == pytest.approx(25 * SD, rel=0.3)
-    assert kind(foreign(*searched(m, -push, 4413)), STOP).gain < 0.0
+    assert kind(told(*searched(m, -push, 4413)), STOP).gain < 0.0
 
 
 def test_what_comes_and_goes_is_told_with_when_it_begins() -> None:
@@ -182,7 +186,7 @@ def test_a_limit_is_looked_for_beside_every_energy_and_other_things_beside_the_b
     search, base = searched(m, np.minimum(m.force, 0.93 * np.max(m.force)) - m.force, 4409)
     other = search.fit(hypothesis("gent"), search.material_starts(hypothesis("gent")))
     assert other is not None
-    found = beside(search, [base], [other])
+    found = beside(the_only(search), [base], [other])
     limits = [f for f in found if f.kind == CLIPPED]
     assert {f.base.hypothesis.material.name for f in limits} == {"neo_hookean", "gent"}
     assert {f.base.hypothesis.material.name for f in found if f.kind == WAVE} == {"neo_hookean"}

@@ -62,6 +62,30 @@ def test_a_fault_of_one_test_is_found_in_that_test(tmp_path) -> None:
         assert " after" not in left
 
 
+def test_a_step_of_the_load_cell_in_one_test_bends_the_film_of_no_other(tmp_path) -> None:
+    """Weighed in its own test alone it had left the other one with a film of nobody's, and a drift had been sure."""
+    one, two = two_tests(tmp_path, "null", "neo_hookean", 1.0, 61022)
+    faulty = replace(one, force=one.force - 0.23 * (np.arange(len(one)) > 54))
+    found = diagnose_jointly(joint({"faulty": faulty, "sound": two}, hypothesis("gent")), declared=False, quick=True)
+    assert found.verdict == "unknown"
+    assert found.probabilities.effects["none"] > 0.9
+    assert found.probabilities.foreign["sudden_change@faulty"] > 0.9
+    assert "In faulty" in sentence(found) or "in faulty" in sentence(found)
+
+
+def test_a_tear_is_held_against_a_fall_in_its_own_test(tmp_path) -> None:
+    """Of a tear of 3 % a fall of the force leaves nearly as little: neither is a dozen times as probable."""
+    one, two = two_tests(tmp_path, "null", "neo_hookean", 1.0, 61023)
+    torn = replace(one, force=one.force * (1 - 0.03 * (np.arange(len(one)) > 54)))
+    found = diagnose_jointly(joint({"torn": torn, "sound": two}, hypothesis("gent")), declared=False, quick=True)
+    p = found.probabilities
+    tears = sum(q for name, q in p.effects.items() if "tearing@torn" in name)
+    falls = p.foreign["sudden_change@torn"]
+    assert tears + falls > 0.9
+    assert max(tears, falls) < 13 * min(tears, falls)
+    assert p.foreign.get("sudden_change@sound", 0.0) < 1e-3
+
+
 @pytest.mark.study
 def test_the_order_of_tests_does_not_matter(tmp_path) -> None:
     one, two = two_tests(tmp_path, "null", "neo_hookean", 1.0, 61014, factor=1.03)

@@ -1,7 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, UNNAMED
+from bayesmembrane.diagnosis.explanation.foreign_search import foreign, the_only
+from bayesmembrane.diagnosis.joint.case import in_test
 from bayesmembrane.diagnosis.joint.effects import effects_in_tests
 from bayesmembrane.diagnosis.joint.search import JointSearch, joint_noise
 from bayesmembrane.diagnosis.reference.inferred import own_noise
@@ -35,6 +40,37 @@ def test_one_test_together_equals_that_test(searches) -> None:
     assert other.log_evidence == pytest.approx(one.log_evidence, abs=1e-8)
     assert other.residual == pytest.approx(one.residual, abs=1e-12)
     assert other.traces == pytest.approx(one.traces, abs=1e-12)
+
+
+def test_what_is_foreign_in_one_test_together_equals_that_in_it_alone(searches) -> None:
+    search, claim = jointly(searches[:1], (1.0,), ())
+    alone = hypothesis("gent")
+    x = searches[0].material_starts(alone)[0]
+    one, other = searches[0].at(alone, x), search.at(claim, x)
+    assert one is not None
+    assert other is not None
+    apart, together = foreign(the_only(searches[0]), one), foreign(in_test(search, 0), other)
+    assert [f.kind for f in together] == [f.kind for f in apart]
+    for a, b in zip(apart, together, strict=True):
+        assert (b.gain, b.chance, b.size) == pytest.approx((a.gain, a.chance, a.size), rel=1e-6, abs=1e-6)
+        assert b.share == pytest.approx(a.share, rel=1e-6)
+
+
+def test_what_is_foreign_in_one_test_frees_the_film_of_the_other(searches) -> None:
+    """Both share an energy: more is gained in both than in the one with the step, whose film may bend as it likes."""
+    step = replace(searches[1].measurement, force=searches[1].force - 0.1 * (np.arange(searches[1].force.size) > 60))
+    parts = [searches[1], replace(searches[1], measurement=step)]
+    search, claim = jointly(parts, (1.0, 1.0), ())
+    base = search.fit(claim, search.material_starts(claim))
+    assert base is not None
+    found = next(f for f in foreign(in_test(search, 1), base) if f.kind == SUDDEN)
+    assert not np.any(found.trace[search.rows[0]])
+    assert search.squares(base, found.trace) < 1.5 * search.force.size < 0.2 * search.squares(base)
+    alone = search.restricted(base, 1)
+    assert alone is not None
+    assert found.gain > max(f.gain for f in foreign(the_only(parts[1]), alone) if f.kind == SUDDEN) + 100
+    unnamed = next(f for f in foreign(in_test(search, 0), base) if f.kind == UNNAMED)
+    assert not np.any(unnamed.trace[search.rows[1]])
 
 
 def test_tests_of_their_own_effects_are_independent_but_for_the_energy(searches) -> None:
