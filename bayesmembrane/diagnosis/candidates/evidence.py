@@ -111,6 +111,19 @@ class Linear:
         """(m,) B^T d."""
         return self._columns.T @ self.data
 
+    @property
+    def far_off(self) -> list[Array]:
+        """(h,) each: theta at the prior's centre, but for the first form, the energy's, or all, `FORM.far_off`.
+
+        From the centre the slope of ln p by an energy's error is next to nothing, for half of its prior lies below what
+        can be seen.
+        """
+        sizes = self.priors.shape[0]
+        return [
+            np.clip(self.priors[:, 0] + FORM.far_off * off * self.priors[:, 1], *self.ends)
+            for off in (np.arange(sizes) == 1, np.arange(sizes) > 0)[: max(sizes - 1, 0)]
+        ]
+
     @cached_property
     def priors(self) -> Array:
         """(h, 2) mean and sd of theta."""
@@ -256,8 +269,10 @@ class Weighed:
 
 
 def weighed(model: Linear, start: Array | None = None) -> Weighed:
-    """ln Z by Laplace's approximation over theta, from the better of the prior's centre and ``start``."""
-    starts = [model.priors[:, 0]]
+    """ln Z by Laplace's approximation over theta, about the best of what is found from the prior's centre, from
+    `Linear.far_off` and from ``start``.
+    """
+    starts = [model.priors[:, 0], *model.far_off]
     if start is not None and start.size == len(model.priors):
         starts.append(np.clip(start, *model.ends))
     theta, top = _climbed(model, starts)
@@ -268,13 +283,25 @@ def weighed(model: Linear, start: Array | None = None) -> Weighed:
 
 
 def _climbed(model: Linear, starts: Sequence[Array]) -> tuple[Array, Density]:
-    """The most probable theta between its ends, from the best of ``starts``, by Newton's steps that bounds cut off.
+    """The most probable theta between its ends, from the best of ``starts``, and from others that are as good already.
+
+    ln p has more than one top where noise may take what an energy does that is far off.
+    """
+    first, *rest = sorted(((t, model.log_density(t)) for t in starts), key=lambda pair: -pair[1].value)
+    best = _climbed_from(model, *first)
+    for start in rest:
+        if start[1].value > best[1].value - FORM.rival:
+            best = max(best, _climbed_from(model, *start), key=lambda pair: pair[1].value)
+    return best
+
+
+def _climbed_from(model: Linear, theta: Array, now: Density) -> tuple[Array, Density]:
+    """A top of ln p, by Newton's steps that bounds cut off.
 
     A direction in which ln p bends up is taken as one in which it bends down as much; a step that gains nothing is
     halved (J. Nocedal, S. J. Wright, Numerical Optimization (2006), 3.4 and 16.7).
     """
     low, high = model.ends
-    theta, now = max(((t, model.log_density(t)) for t in starts), key=lambda pair: pair[1].value)
     for _ in range(FORM.iterations):
         free = ~(((theta <= low) & (now.slope < 0)) | ((theta >= high) & (now.slope > 0)))
         curvature, axes = _bent(model, now)

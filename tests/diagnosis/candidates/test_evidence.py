@@ -75,6 +75,26 @@ def test_the_most_probable_sizes_are_those_of_another_search(seed) -> None:
     assert linear.log_density(weighed(linear).theta).value == pytest.approx(other, abs=1e-4)
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("left", [3.0, 10.0, 30.0])
+@pytest.mark.parametrize("scale", [100.0, 700.0, 3000.0])
+def test_an_energy_that_is_far_off_is_found(seed, left, scale) -> None:
+    """ln p has several tops: where the energy has no error noise takes what is left, and the slope says nothing."""
+    rng, along = np.random.default_rng(seed), np.polynomial.legendre.legvander(np.linspace(-1, 1, 70), 6)
+    own, state = 1e3 * along[:, :3], scale * along * np.exp(-0.7 * np.arange(7))
+    data = own @ rng.standard_normal(3) + left * (along[:, 3] + 0.5 * rng.standard_normal() * along[:, 5])
+    law = Block(scale / 10 * along[:, 1:4], (-5.8, 2.0), np.log(0.4))
+    linear = Linear(data + rng.standard_normal(70), (Block(own), Block(state, (-8.1, 2.5), 0.0), law), 0.25)
+    sizes = [np.array([s, a, e]) for s in (0.0, 0.5) for a in (-8.0, -5.0, -3.0, -1.0) for e in (-6.0, -3.0)]
+    found = [
+        minimize(
+            lambda t: -linear.log_density(t).value, t, method="L-BFGS-B", bounds=list(zip(*linear.ends, strict=True))
+        )
+        for t in sizes
+    ]
+    assert linear.log_density(weighed(linear).theta).value > -min(f.fun for f in found) - 0.05
+
+
 def test_coefficients_are_those_of_a_ridge_regression() -> None:
     linear, theta = model(3), np.array([0.2, -0.5, -1.0])
     columns = np.column_stack([b.columns for b in linear.blocks])
