@@ -62,6 +62,7 @@ def test_a_fault_of_one_test_is_found_in_that_test(tmp_path) -> None:
         assert " after" not in left
 
 
+@pytest.mark.study
 def test_a_step_of_the_load_cell_in_one_test_bends_the_film_of_no_other(tmp_path) -> None:
     """Weighed in its own test alone it had left the other one with a film of nobody's, and a drift had been sure."""
     one, two = two_tests(tmp_path, "null", "neo_hookean", 1.0, 61022)
