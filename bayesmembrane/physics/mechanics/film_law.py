@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesmembrane.ground.compiling import compiled
+from bayesmembrane.ground.compiling import compiled, for_kernel
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.neo_hookean import NeoHookean
 from bayesmembrane.physics.mechanics.api import Request, Solve, request, solve
@@ -99,8 +99,8 @@ class FilmLaw:
         F(-delta) = -F(delta).
         """
         force, slope = np.empty(deflection.shape), np.empty(deflection.shape)
-        given = np.zeros((1, 1)) if excess is None else np.ascontiguousarray(excess)
-        d, gap = np.ascontiguousarray(deflection), self.gap
+        given = np.zeros((1, 1)) if excess is None else for_kernel(excess)
+        d, gap = for_kernel(deflection), self.gap
         _evaluate(self.pieces, self.step, self.last, self.prestretch, gap.length, gap.tautness, d, given, force, slope)
         return force, slope
 

@@ -288,7 +288,7 @@ class FormLikelihood(NoiseLikelihood):
     def _whitened(self, values: Array, x: Array, own: Array) -> Array:
         """(N, c) values on the axes freed of ``own`` (N,) noise and tau^2, with coordinates x (k,)."""
         power = (np.exp(x[0]) * self.scale) ** 2
-        white: Array = innovations(values, float(power), own, self._staying(x[None, :])[0])
+        white: Array = innovations(values, float(power), for_kernel(own), self._staying(x[None, :])[0])
         return white
 
     def _each(self, x: Array, factors: FormFactors | None = None) -> Iterator[Array]:

@@ -31,6 +31,17 @@ from tests.reference.slow_solver import force_curve
 
 
 @every_material
+def test_parameters_in_any_layout_are_compiled_for_once(material):
+    """A second code for parameters that are not in one piece cost a user eight seconds a material, once."""
+    film = asked(material, silicone(material), FIFTEEN[:3])
+    apart = np.asfortranarray(np.repeat(film.parameters, 2, axis=0))
+    ahead = shooting.solve(film)
+    again = shooting.solve(replace(film, parameters=apart[:1]))
+    assert np.array_equal(again.force, ahead.force)
+    assert len(shooting.compiled(material).shoot.signatures) == 1
+
+
+@every_material
 def test_shooting_equals_solve_ivp_and_root(material):
     few = FIFTEEN[[0, 4, 9, 14]]
     slow = force_curve(material.from_vector(silicone(material)), few, INNER, OUTER, rtol=1e-9)

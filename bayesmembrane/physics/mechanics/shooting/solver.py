@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.ground.compiling import for_kernel
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics.compiled import bind
@@ -55,7 +56,7 @@ def _film(request: Request, film: int, lock: float, rtol: float) -> Array:
     free = targets < lock
     out[:, k.SEEN] = np.where(free, Status.ITERATION_LIMIT, Status.LOCKED)
     if np.any(free):
-        p, count = request.parameters[film], int(np.sum(free))
+        p, count = for_kernel(request.parameters[film]), int(np.sum(free))
         lines, found = np.empty((count + 1, k.SEEN)), np.empty((count, 3))
         start = float(np.clip(START, targets[0], targets[count - 1]))
         compiled(request.material).shoot(
