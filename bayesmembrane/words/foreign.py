@@ -65,7 +65,8 @@ def foreign_sentence(f: Foreign, rig: Fixture, thickness: float) -> str:
         limit = f"{f.size:.4g} N" if unit.endswith("N") else f"{factor * f.size:.4g} {unit}"
         where = f"from reading {f.place + 1} on{softly}"
         return f"The load cell is at its limit of {limit} {where}: leave these readings out."
-    taken = f"takes {100 * f.share:.0f} % of the squares away"
+    of = "" if f.test is None else " of all tests"
+    taken = f"takes {100 * f.share:.0f} % of the squares{of} away"
     if f.kind not in CAUSES:
         what = f"Something smooth along the test, of about {100 * f.size:.2g} % of the force"
         return f"{what}, {taken}; no effect in the library has this course."

@@ -28,8 +28,9 @@ from bayesmembrane.ground.symmetric import eigh
 
 LATTICE = np.abs(2 * np.modf(np.arange(1, 402)[:, None] * np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0]))[0] - 1)
 """(M, 6) points that fill the unit cube evenly (R. D. Richtmyer's, folded)."""
-REMEMBERED = 3
-"""Sizes theta at which a linear model remembers what it found: the fit's, the usual ones, and the last trial."""
+REMEMBERED = 6
+"""Sizes theta at which a linear model remembers what it found: the fit's, the usual ones, those of an energy and of
+laws that are far off, and the last trials."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,8 +270,8 @@ class Weighed:
 
 
 def weighed(model: Linear, start: Array | None = None) -> Weighed:
-    """ln Z by Laplace's approximation over theta, about the best of what is found from the prior's centre, from
-    `Linear.far_off` and from ``start``.
+    """ln Z by Laplace's approximation over theta, about the highest top that is found from the prior's centre, from
+    `Linear.far_off` and from ``start``, as far as these are near it already.
     """
     starts = [model.priors[:, 0], *model.far_off]
     if start is not None and start.size == len(model.priors):

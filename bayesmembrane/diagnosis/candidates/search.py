@@ -56,6 +56,10 @@ class Search(Weighing):
         """The processes of the form error."""
         return self.known_factors or form_factors(self.measurement)
 
+    def with_noise(self, noise: OwnNoise) -> Search:
+        """The same under another noise."""
+        return replace(self, noise=noise, known_factors=self.factors)
+
     def quick(self, asked: Request) -> Curves:
         """The solver without its last resort: films that only shooting resolves cost a hundred times as much."""
         return api.unaided(asked, self.solve)

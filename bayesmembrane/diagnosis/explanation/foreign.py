@@ -35,8 +35,8 @@ class Foreign:
     on_clock : the same on the clock of the test (`Motion.clock`), s
     period : of a wave, s or m
     against : "time" or "deflection": what a wave repeats with
-    share : part of the squares that the model leaves, which it takes away
-    trace : (N,) N, what it changes
+    share : part of the squares that the model leaves, of all tests, which it takes away
+    trace : (N,) N, what it changes, of the readings of all tests: nothing in the others
     soft : of a limit, over what part of it the reading yields; 0 where it is met at once
     limit : that limit
     test, label : of several tests, the number and the label of the one that it is in

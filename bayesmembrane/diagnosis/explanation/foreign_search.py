@@ -35,14 +35,14 @@ class InTest:
     weighing : of all
     search : of this test alone
     rows : where its readings stand among those of all
-    under : (whole, noise of this test): the same ``weighing`` with another noise here
+    under : the same ``weighing`` and ``search`` with another noise of this test
     alone : what a candidate claims of this test alone; None if no film gets there
     """
 
     weighing: Weighing
     search: Search
     rows: slice
-    under: Callable[[OwnNoise], Weighing]
+    under: Callable[[OwnNoise], tuple[Weighing, Search]]
     alone: Callable[[Candidate], Candidate | None]
 
     @cached_property
@@ -71,12 +71,18 @@ class InTest:
 
     def with_noise(self, noise: OwnNoise) -> InTest:
         """The same where the readings of this test have another ``noise``."""
-        return replace(self, weighing=self.under(noise), search=replace(self.search, noise=noise))
+        weighing, search = self.under(noise)
+        return replace(self, weighing=weighing, search=search)
 
 
 def the_only(search: Search) -> InTest:
     """The test of a model that is weighed by one."""
-    return InTest(search, search, slice(None), lambda noise: replace(search, noise=noise), lambda base: base)
+
+    def under(noise: OwnNoise) -> tuple[Weighing, Search]:
+        other = search.with_noise(noise)
+        return other, other
+
+    return InTest(search, search, slice(None), under, lambda base: base)
 
 
 def beside(test: InTest, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
@@ -176,10 +182,10 @@ def _gains(model: Linear, theta: Array, white: Array, family: Family) -> tuple[A
 
 
 def _share(test: InTest, base: Candidate, trace: Array) -> float:
-    """Part of the squares of the test, beside the model's own slopes, that a trace takes away."""
-    columns = np.column_stack([test.slopes(base), trace[test.rows], base.residual[test.rows]])
-    white = test.search.noise.white(columns)
-    q, _ = np.linalg.qr(white[:, :-2])
+    """Part of the squares of all tests, beside the model's own slopes, that a trace takes away."""
+    white = test.weighing.noise.white(np.column_stack([base.slopes, trace, base.residual]))
+    own = white[:, :-2]
+    q, _ = np.linalg.qr(own[:, np.any(own != 0, axis=0)])
     t, r = (white[:, i] - q @ (q.T @ white[:, i]) for i in (-2, -1))
     return float((t @ r) ** 2 / max(float(t @ t) * float(r @ r), 1e-300))
 

@@ -212,11 +212,11 @@ class JointSearch(Weighing):
         mixed = [own[k] for k in range(max(map(len, each))) for own in each if k < len(own)]
         return [np.concatenate([x, nothing]) for x in mixed[: max(map(len, each))]]
 
-    def with_noise(self, test: int, noise: OwnNoise) -> JointSearch:
-        """The same with another noise of one test."""
-        each = [noise if i == test else p.noise for i, p in enumerate(self.parts)]
-        parts = tuple(replace(p, noise=n) for p, n in zip(self.parts, each, strict=True))
-        return replace(self, parts=parts, noise=joint_noise(each))
+    def with_noise(self, test: int, noise: OwnNoise) -> tuple[JointSearch, Search]:
+        """The same with another noise of one test, and what is then its part."""
+        own = self.parts[test].with_noise(noise)
+        parts = tuple(own if i == test else p for i, p in enumerate(self.parts))
+        return replace(self, parts=parts, noise=joint_noise([p.noise for p in parts])), own
 
     def restricted(self, candidate: Candidate, test: int) -> Candidate | None:
         """What a hypothesis claims of one test, where it is, weighed there alone."""

@@ -20,7 +20,8 @@ class Hysteresis(Carried):
     """F = F0 + level z [(1 - steady) |F0| |delta / D|^grows + steady min(max |F0|, 10 |F0|)], a pull no less than 0.
 
     On each leg z = z_r + s a [1 - exp(-u / (t a))], with s = +1 loading, -1 unloading, u the way since the reversal,
-    z_r the z there and a = 1 - s z_r what is left to turn: it begins as steeply after any reversal. Of the way a part
+    z_r the z there and a = 1 - s z_r what is left to turn. It begins as steeply after any reversal; Dahl's, over one
+    length whatever is left, begins twice as steeply after a whole turn. Of the way a part
     ``by_force`` is counted in force, the rest in deflection, each over its full range (`way_of`): sliders within the
     film know the one or the other. The length is t = travel (1 - similar + similar A), with A the way of the leg before
     the reversal (1 for the first loading): the same in all cycles, or small in small cycles. z = 0 at the start, and

@@ -69,8 +69,23 @@ def test_what_is_foreign_in_one_test_frees_the_film_of_the_other(searches) -> No
     alone = search.restricted(base, 1)
     assert alone is not None
     assert found.gain > max(f.gain for f in foreign(the_only(parts[1]), alone) if f.kind == SUDDEN) + 100
+    assert 1 - found.share == pytest.approx(search.squares(base, found.trace) / search.squares(base), abs=1e-6)
     unnamed = next(f for f in foreign(in_test(search, 0), base) if f.kind == UNNAMED)
     assert not np.any(unnamed.trace[search.rows[1]])
+
+
+def test_another_noise_of_one_test_is_no_other_one(searches) -> None:
+    search, claim = jointly(searches, (1.0, 1.0), ("mullins",))
+    x = search.material_starts(claim)[0]
+    louder = replace(searches[1].noise, sd=2 * searches[1].noise.sd)
+    other, own = search.with_noise(1, louder)
+    assert own is other.parts[1]
+    assert own.noise is louder
+    assert other.parts[0] is search.parts[0]
+    white, before = (s.noise.white(np.ones(s.force.size)) for s in (other, search))
+    assert np.array_equal(white[search.rows[0]], before[search.rows[0]])
+    assert white[search.rows[1]] == pytest.approx(before[search.rows[1]] / 2)
+    assert np.array_equal(*(s.batch(claim, x[None, :])[0] for s in (other, search)))
 
 
 def test_tests_of_their_own_effects_are_independent_but_for_the_energy(searches) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.explanation.foreign import KINDS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.composition import EFFECT_STEP, MOUNTING_STEP
 from bayesmembrane.physics.effects.base import STAGES, Effect, Geometry, stage_number
@@ -130,6 +131,11 @@ def test_the_future_does_not_matter(effect: Effect, curve: Measurement) -> None:
 def test_points_left_out_are_remembered(effect: Effect, curve: Measurement) -> None:
     later = curve.select(curve.cycle == 2)
     assert force(later, effect.name) == pytest.approx(force(curve, effect.name)[curve.cycle == 2], rel=2e-6, abs=1e-9)
+
+
+@every
+def test_what_leaves_the_same_is_of_a_known_kind(effect: Effect) -> None:
+    assert set(effect.like_foreign) <= set(KINDS)
 
 
 @every
