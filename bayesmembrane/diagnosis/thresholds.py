@@ -183,8 +183,8 @@ class FormThresholds:
     """ln p: a start that is no farther below a top that was found from another one is climbed from, too."""
     far_off: float = 2.0
     """Standard deviations of the prior above its centre: where an energy that is far off is looked for. With no such
-    start one of twelve weighings of four films with three effects each ended lower, by up to 70: without an energy
-    error where a set takes but a part of the misfit."""
+    start one of eleven weighings of four films, of which each has two or three things wrong, ended lower, by up to 98:
+    without an error of the energy, where a set takes but a part of the misfit."""
     least_curvature: float = 0.25
     """Of that of the prior: a flatter place is one where Laplace's approximation does not hold."""
     far_bound: float = 6.0

@@ -161,12 +161,12 @@ def _error(test: DiagnosedTest, known: bool) -> str:
 
 
 def _foreign(found: JointDiagnosis) -> str:
-    if found.foreign is None:
+    f = found.foreign
+    if f is None:
         return ""
-    f, label = found.foreign
-    m = next(t.measurement for t in found.tests if t.label == label)
+    m = next(t.measurement for t in found.tests if t.label == f.label)
     p = found.probabilities.something_found
-    how = f"In {label}" if p > 0.5 else f"Perhaps in {label} ({percent(p)})"
+    how = f"In {f.label}" if p > 0.5 else f"Perhaps in {f.label} ({percent(p)})"
     return f"{how}: {foreign_sentence(f, m.rig, m.specimen.thickness)}"
 
 

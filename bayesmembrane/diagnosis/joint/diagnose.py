@@ -89,7 +89,7 @@ class JointDiagnosis(Showable):
     null : the energy that was given, or the most probable one
     ranking : every hypothesis that was fitted, the most probable first
     members : those that the verdict rests on
-    foreign : the most probable thing that is foreign, and the label of the test where it is; None for nothing
+    foreign : the most probable thing that is foreign, in the test of its label; None for nothing
     tests : one by one
     confounded : (effect, effect, degrees) that these tests cannot separate
     before, after : misfit of all readings
@@ -106,7 +106,7 @@ class JointDiagnosis(Showable):
     given: tuple[str, ...]
     ranking: tuple[JointMember, ...]
     members: tuple[JointMember, ...]
-    foreign: tuple[Foreign, str] | None
+    foreign: Foreign | None
     tests: tuple[DiagnosedTest, ...]
     confounded: tuple[tuple[str, str, float], ...]
     before: Misfit
@@ -172,7 +172,6 @@ def _concluded(
     best = found.members[0].candidate if known else null
     given = set(null.names)
     effects = [n for j in found.members for n in sorted(set(j.candidate.names) - given)] if known else []
-    told = None if found.foreign is None else (found.foreign, found.foreign.label)
     return JointDiagnosis(
         verdict=verdict,
         effects=tuple(dict.fromkeys(effects)),
@@ -185,7 +184,7 @@ def _concluded(
         given=tuple(sorted(given)),
         ranking=tuple(_member(case, search, j, given) for j in found.ranking),
         members=tuple(_member(case, search, j, given) for j in found.members),
-        foreign=told,
+        foreign=found.foreign,
         tests=tuple(_test(case, search, (null, best), i, k) for i, k in enumerate(kept)),
         confounded=confounded(case.signatures),
         before=_misfit(search, null),

@@ -71,7 +71,8 @@ def test_a_step_of_the_load_cell_in_one_test_bends_the_film_of_no_other(tmp_path
     assert found.verdict == "unknown"
     assert found.probabilities.effects["none"] > 0.9
     assert found.probabilities.foreign["sudden_change@faulty"] > 0.9
-    assert "In faulty" in sentence(found) or "in faulty" in sentence(found)
+    assert found.foreign.label == "faulty"
+    assert " In faulty: A sudden drop" in sentence(found)
 
 
 def test_a_tear_is_held_against_a_fall_in_its_own_test(tmp_path) -> None:
