@@ -28,9 +28,9 @@ from bayesmembrane.ground.symmetric import eigh
 
 LATTICE = np.abs(2 * np.modf(np.arange(1, 402)[:, None] * np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0]))[0] - 1)
 """(M, 6) points that fill the unit cube evenly (R. D. Richtmyer's, folded)."""
-REMEMBERED = 6
-"""Sizes theta at which a linear model remembers what it found: the fit's, the usual ones, those of an energy and of
-laws that are far off, and the last trials."""
+REMEMBERED = 5
+"""Sizes theta at which a linear model remembers what it found: the fit's, the usual ones, those of an energy that is
+far off, and the last trials."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,17 +113,15 @@ class Linear:
         return self._columns.T @ self.data
 
     @property
-    def far_off(self) -> list[Array]:
-        """(h,) each: theta at the prior's centre, but for the first form, the energy's, or all, `FORM.far_off`.
+    def far_off(self) -> Array:
+        """(h,) theta at the prior's centre, but for the first form, the energy's, which is far off (`FORM.far_off`).
 
         From the centre the slope of ln p by an energy's error is next to nothing, for half of its prior lies below what
         can be seen.
         """
-        sizes = self.priors.shape[0]
-        return [
-            np.clip(self.priors[:, 0] + FORM.far_off * off * self.priors[:, 1], *self.ends)
-            for off in (np.arange(sizes) == 1, np.arange(sizes) > 0)[: max(sizes - 1, 0)]
-        ]
+        out = np.array(self.priors[:, 0])
+        out[1:2] += FORM.far_off * self.priors[1:2, 1]
+        return np.clip(out, *self.ends)
 
     @cached_property
     def priors(self) -> Array:
@@ -273,7 +271,7 @@ def weighed(model: Linear, start: Array | None = None) -> Weighed:
     """ln Z by Laplace's approximation over theta, about the highest top that is found from the prior's centre, from
     `Linear.far_off` and from ``start``, as far as these are near it already.
     """
-    starts = [model.priors[:, 0], *model.far_off]
+    starts = [model.priors[:, 0], model.far_off]
     if start is not None and start.size == len(model.priors):
         starts.append(np.clip(start, *model.ends))
     theta, top = _climbed(model, starts)

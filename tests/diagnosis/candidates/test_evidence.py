@@ -83,7 +83,7 @@ def test_an_energy_that_is_far_off_is_found(seed, left, scale) -> None:
     rng, along = np.random.default_rng(seed), np.polynomial.legendre.legvander(np.linspace(-1, 1, 70), 6)
     own, state = 1e3 * along[:, :3], scale * along * np.exp(-0.7 * np.arange(7))
     data = own @ rng.standard_normal(3) + left * (along[:, 3] + 0.5 * rng.standard_normal() * along[:, 5])
-    law = Block(scale / 10 * along[:, 1:4], (-5.8, 2.0), np.log(0.4))
+    law = Block(scale / 10 * along[:, 1:3], (-5.8, 2.0), np.log(0.4))
     linear = Linear(data + rng.standard_normal(70), (Block(own), Block(state, (-8.1, 2.5), 0.0), law), 0.25)
     sizes = [np.array([s, a, e]) for s in (0.0, 0.5) for a in (-8.0, -5.0, -3.0, -1.0) for e in (-6.0, -3.0)]
     found = [
