@@ -217,7 +217,7 @@ def renewed(search: Search, smooth: Array, best: Candidate) -> Search:
     basis = np.column_stack([smooth, best.slopes])
     if orthonormal(basis).shape[1] >= len(search.measurement):
         return search  # few points: what the best model leaves is nothing at all, and says nothing of noise
-    return replace(search, noise=own_noise(search.measurement, basis))
+    return search.with_noise(own_noise(search.measurement, basis))
 
 
 def _energies(search: Search, question: Question, tell: Tell) -> dict[str, Candidate]:

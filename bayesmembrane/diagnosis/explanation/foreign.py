@@ -71,7 +71,7 @@ class Foreign:
         """True if the force falls at some moment, and stays lower."""
         return (self.kind == SUDDEN and self.size < 0) or (self.kind == LOST and self.size > 0)
 
-    def where(self, effect: Effect) -> bool:
+    def shares_test_with(self, effect: Effect) -> bool:
         """True if ``effect`` is at work in the test that this is in."""
         return self.test is None or effect.within(self.test) is not None
 
@@ -81,5 +81,5 @@ class Foreign:
 
 
 def kinds_of(found: Sequence[Foreign]) -> int:
-    """How many kinds were looked for."""
+    """How many kinds were looked for, in each of several tests for itself."""
     return len({f.key for f in found})

@@ -27,7 +27,7 @@ from bayesmembrane.physics.form_error import LARGEST, LAW
 
 
 @dataclass(frozen=True, eq=False)
-class InTest:
+class OneTest:
     """Where something foreign is looked for: in one test of those that a model is weighed by, or in the only one.
 
     All of them weigh it, for what is foreign in one bends the film of the others, too.
@@ -49,11 +49,6 @@ class InTest:
     def smooth(self) -> Array:
         return smooth_reference(self.search.measurement)
 
-    @property
-    def enough(self) -> bool:
-        """True if there are readings enough for anything to be looked for."""
-        return len(self.search.measurement) >= FOREIGN.least_points
-
     def fitted(self, base: Candidate) -> Array:
         """(N,) N, the forces of this test by ``base``."""
         return np.asarray(self.search.measurement.force - base.residual[self.rows])
@@ -69,23 +64,23 @@ class InTest:
         out[self.rows] = columns
         return out
 
-    def with_noise(self, noise: OwnNoise) -> InTest:
+    def with_noise(self, noise: OwnNoise) -> OneTest:
         """The same where the readings of this test have another ``noise``."""
         weighing, search = self.under(noise)
         return replace(self, weighing=weighing, search=search)
 
 
-def the_only(search: Search) -> InTest:
+def the_only(search: Search) -> OneTest:
     """The test of a model that is weighed by one."""
 
     def under(noise: OwnNoise) -> tuple[Weighing, Search]:
         other = search.with_noise(noise)
         return other, other
 
-    return InTest(search, search, slice(None), under, lambda base: base)
+    return OneTest(search, search, slice(None), under, lambda base: base)
 
 
-def beside(test: InTest, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
+def beside(test: OneTest, bases: Sequence[Candidate], others: Sequence[Candidate]) -> list[Foreign]:
     """What is foreign beside the ``bases``, what is `bending` or a limit beside the ``others`` too; the most probable
     first.
 
@@ -93,31 +88,32 @@ def beside(test: InTest, bases: Sequence[Candidate], others: Sequence[Candidate]
     without one says little: of a step of the load cell's zero 7 in ln of the Bayes factor were told beside that, and 36
     beside three others. What comes and goes, waves and plays leave traces that no energy has.
     """
-    if not test.enough:
+    m = test.search.measurement
+    if len(m) < FOREIGN.least_points:
         return []
-    m, found = test.search.measurement, [f for base in bases for f in foreign(test, base)]
+    found = [f for base in bases for f in foreign(test, base)]
     for base in others:
         found += _found(test, base, bending(m, test.fitted(base)))
     return sorted(found, key=lambda f: -(f.gain + f.base.log_evidence))
 
 
-def foreign(test: InTest, base: Candidate) -> list[Foreign]:
+def foreign(test: OneTest, base: Candidate) -> list[Foreign]:
     """Every kind that can be looked for beside ``base``."""
     found = _found(test, base, families(test.search.measurement, test.fitted(base)))
     return [*found, _unnamed(test, base)]
 
 
-def _found(test: InTest, base: Candidate, of: Sequence[Family]) -> list[Foreign]:
+def _found(test: OneTest, base: Candidate, of: Sequence[Family]) -> list[Foreign]:
     finders: list[Finder] = [partial(_of_family, base, f) for f in of]
     finders.append(partial(_clipped, base))
     return [f for f in (_with_its_own_noise(test, find) for find in finders) if f is not None]
 
 
-Finder = Callable[[InTest, Foreign | None], Foreign | None]
+Finder = Callable[[OneTest, Foreign | None], Foreign | None]
 """Looks for one thing under the noise of a test; given what was found of it under another noise."""
 
 
-def _with_its_own_noise(test: InTest, find: Finder) -> Foreign | None:
+def _with_its_own_noise(test: OneTest, find: Finder) -> Foreign | None:
     """What is found under the noise as it is, or under the one that is left beside what was found, if that is likelier.
 
     What is foreign looks like noise, and like noise with a memory: it hides in the one that is inferred without it.
@@ -142,7 +138,7 @@ def _plain_evidence(weighing: Weighing, base: Candidate) -> float:
     return weighed(weighing.linear(base), base.theta).log_evidence - weighing.noise.log_root
 
 
-def _of_family(base: Candidate, family: Family, test: InTest, _before: Foreign | None) -> Foreign:
+def _of_family(base: Candidate, family: Family, test: OneTest, _before: Foreign | None) -> Foreign:
     """The most probable member of a family beside ``base``, and the evidence of them all."""
     model, white = test.weighing.linear(base), test.weighing.noise.white
     # Beside noise and form error as they are expected: what is foreign has driven the fitted ones up.
@@ -181,7 +177,7 @@ def _gains(model: Linear, theta: Array, white: Array, family: Family) -> tuple[A
     return gains, np.log(2) + log_ndtr(above) if family.upward else np.zeros(gains.shape)
 
 
-def _share(test: InTest, base: Candidate, trace: Array) -> float:
+def _share(test: OneTest, base: Candidate, trace: Array) -> float:
     """Part of the squares of all tests, beside the model's own slopes, that a trace takes away."""
     white = test.weighing.noise.white(np.column_stack([base.slopes, trace, base.residual]))
     own = white[:, :-2]
@@ -193,7 +189,7 @@ def _share(test: InTest, base: Candidate, trace: Array) -> float:
 # ---- kinds of their own ----------------------------------------------------------------------------------------------
 
 
-def _unnamed(test: InTest, base: Candidate) -> Foreign:
+def _unnamed(test: OneTest, base: Candidate) -> Foreign:
     """A smooth relative error of the whole curve along the test: memory of a kind that is not in the library.
 
     No larger than the error of a law may be: what is as large as the force itself would be any curve.
@@ -210,7 +206,7 @@ def _unnamed(test: InTest, base: Candidate) -> Foreign:
     return Foreign(UNNAMED, base, gain, size=float(np.exp(z.theta[-1])), relative=True, share=share, trace=trace)
 
 
-def _clipped(base: Candidate, test: InTest, before: Foreign | None) -> Foreign | None:
+def _clipped(base: Candidate, test: OneTest, before: Foreign | None) -> Foreign | None:
     """A load cell at its limit; weighed in its test alone, where readings there are set aside."""
     alone = test.alone(base)
     found = None if alone is None else limit_of(test.search, alone, None if before is None else before.limit)

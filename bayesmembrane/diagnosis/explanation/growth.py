@@ -154,7 +154,7 @@ def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
     for f in (f for f in falls if len(_own(out, f.base)) < _most(out)):
         for effect in out.case.visible:
             shapes = effect.come_at(f.on_clock)
-            if shapes and effect.name not in f.base.names and f.where(effect):
+            if shapes and effect.name not in f.base.names and f.shares_test_with(effect):
                 starts = starts_with([f.base.x], effect, out.search.expected_sizes(effect), shapes)
                 sought.append(Sought(with_effects(f.base.hypothesis, [effect]), starts, f.base))
     sought += [s for f in falls if (s := _begun_again(f)) is not None]
@@ -184,7 +184,7 @@ def _begun_again(f: Foreign) -> Sought | None:
     """
     names, x = list(f.base.hypothesis.names), f.base.x.copy()
     for e in f.base.hypothesis.effects:
-        if e.second is not None and e.begins == e.second[1] and f.where(e):
+        if e.second is not None and e.begins == e.second[1] and f.shares_test_with(e):
             part, _, place = (names.index(f"{e.name}.{own}") for own in e.second)
             if x[part] < GROWTH.no_event:
                 x[part], x[place] = GROWTH.second_part, f.on_clock

@@ -20,6 +20,7 @@ from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
 from bayesmembrane.diagnosis.explanation.unfitted import Key, unfitted
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.physics.effects.base import Effect
 
 Named = TypeVar("Named")
 
@@ -288,9 +289,16 @@ def _tears(f: Foreign, every: Sequence[Candidate], search: Weighing) -> list[Can
         if f.falls
         and c.hypothesis.material is f.base.hypothesis.material
         and len(c.names) == len(f.base.names) + 1
-        and all(e.name in f.base.names or (f.kind in e.like_foreign and f.where(e)) for e in c.hypothesis.effects)
+        and all(
+            e.name in f.base.names or (f.kind in e.like_foreign and f.shares_test_with(e)) for e in c.hypothesis.effects
+        )
         and -_fits_better(c, f, search) < TWINS.behind
     ]
+
+
+def _beyond(base: Candidate, c: Candidate) -> list[Effect]:
+    """Effects of ``c`` that ``base`` does not have."""
+    return [e for e in c.hypothesis.effects if e.name not in base.names]
 
 
 def _fits_better(c: Candidate, f: Foreign, search: Weighing) -> float:

@@ -18,7 +18,7 @@ from bayesmembrane.diagnosis.detection.lack_of_fit import lack_of_fit
 from bayesmembrane.diagnosis.detection.scores import Signature, score_test
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase, OpenCase, Question, Tell, renewed, seen_elsewhere
 from bayesmembrane.diagnosis.explanation.foreign import Foreign
-from bayesmembrane.diagnosis.explanation.foreign_search import InTest, beside
+from bayesmembrane.diagnosis.explanation.foreign_search import OneTest, beside
 from bayesmembrane.diagnosis.explanation.twins import Near, Pairs, one_speed, twins, twins_in_time, twins_one_way
 from bayesmembrane.diagnosis.joint.effects import EffectInTests, effects_in_tests
 from bayesmembrane.diagnosis.joint.search import JointSearch, joint_noise
@@ -88,14 +88,14 @@ class JointCase(DiagnosisCase):
         assert isinstance(search, JointSearch)
         found: list[Foreign] = []
         for i, label in enumerate(self.labels):
-            found += [replace(f, test=i, label=label) for f in beside(in_test(search, i), bases, others)]
+            found += [replace(f, test=i, label=label) for f in beside(one_test(search, i), bases, others)]
         return sorted(found, key=lambda f: -(f.gain + f.base.log_evidence))
 
 
-def in_test(search: JointSearch, number: int) -> InTest:
+def one_test(search: JointSearch, number: int) -> OneTest:
     """Where something foreign in one of the tests is looked for."""
     part, rows = search.parts[number], search.rows[number]
-    return InTest(search, part, rows, partial(search.with_noise, number), partial(search.restricted, test=number))
+    return OneTest(search, part, rows, partial(search.with_noise, number), partial(search.restricted, test=number))
 
 
 def opened_jointly(alone: Sequence[OpenCase], labels: Sequence[str], question: Question, tell: Tell) -> JointCase:

@@ -6,7 +6,7 @@ import pytest
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, UNNAMED
 from bayesmembrane.diagnosis.explanation.foreign_search import foreign, the_only
-from bayesmembrane.diagnosis.joint.case import in_test
+from bayesmembrane.diagnosis.joint.case import one_test
 from bayesmembrane.diagnosis.joint.effects import effects_in_tests
 from bayesmembrane.diagnosis.joint.search import JointSearch, joint_noise
 from bayesmembrane.diagnosis.reference.inferred import own_noise
@@ -49,7 +49,7 @@ def test_what_is_foreign_in_one_test_together_equals_that_in_it_alone(searches) 
     one, other = searches[0].at(alone, x), search.at(claim, x)
     assert one is not None
     assert other is not None
-    apart, together = foreign(the_only(searches[0]), one), foreign(in_test(search, 0), other)
+    apart, together = foreign(the_only(searches[0]), one), foreign(one_test(search, 0), other)
     assert [f.kind for f in together] == [f.kind for f in apart]
     for a, b in zip(apart, together, strict=True):
         assert (b.gain, b.chance, b.size) == pytest.approx((a.gain, a.chance, a.size), rel=1e-6, abs=1e-6)
@@ -63,14 +63,14 @@ def test_what_is_foreign_in_one_test_frees_the_film_of_the_other(searches) -> No
     search, claim = jointly(parts, (1.0, 1.0), ())
     base = search.fit(claim, search.material_starts(claim))
     assert base is not None
-    found = next(f for f in foreign(in_test(search, 1), base) if f.kind == SUDDEN)
+    found = next(f for f in foreign(one_test(search, 1), base) if f.kind == SUDDEN)
     assert not np.any(found.trace[search.rows[0]])
     assert search.squares(base, found.trace) < 1.5 * search.force.size < 0.2 * search.squares(base)
     alone = search.restricted(base, 1)
     assert alone is not None
     assert found.gain > max(f.gain for f in foreign(the_only(parts[1]), alone) if f.kind == SUDDEN) + 100
     assert 1 - found.share == pytest.approx(search.squares(base, found.trace) / search.squares(base), abs=1e-6)
-    unnamed = next(f for f in foreign(in_test(search, 0), base) if f.kind == UNNAMED)
+    unnamed = next(f for f in foreign(one_test(search, 0), base) if f.kind == UNNAMED)
     assert not np.any(unnamed.trace[search.rows[1]])
 
 
