@@ -1,4 +1,4 @@
-"""A run as arviz InferenceData: the groups and dimensions of its arrays, and the measurement among them.
+"""A run laid out as arviz InferenceData is: the groups and dimensions of its arrays, and the measurement among them.
 
 posterior, prior, log_likelihood, posterior_predictive, observed_data, constant_data (the means of the ensembles over
 the whole walk among it), sample_stats; a chain is an ensemble.
@@ -7,7 +7,7 @@ the whole walk among it), sample_stats; a chain is an ensemble.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -16,16 +16,40 @@ import numpy as np
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.ground.registry import component
 
 MOTION = ("deflection", "time", "across", "said_leg", "said_cycle")
 OPTIONAL = ("time", "force_sd", "covariance", "across", "blank_run")
+OF_A_CHAIN = ("chain", "draw")
+ONE_FOR_ALL = ("observed_data", "constant_data")
+"""Groups whose arrays are not draws."""
 
 
-def inference_data(measurement: Measurement, walk: Mapping[str, Array] | None = None, **groups: Any) -> Any:
-    """arviz InferenceData with ``groups``, the measured curve, all that `measurement_of` needs, and a ``walk``.
+class Groups(Mapping[str, Any]):
+    """xarray datasets by the names of their groups, which are attributes, too: to import arviz takes a second."""
 
+    def __init__(self, held: Mapping[str, Any]) -> None:
+        self._held = dict(held)
+
+    def __getitem__(self, name: str) -> Any:
+        return self._held[name]
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or name not in self._held:
+            raise AttributeError(f"there is no group {name!r}")
+        return self._held[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._held)
+
+    def __len__(self) -> int:
+        return len(self._held)
+
+
+def laid_out(measurement: Measurement, walk: Mapping[str, Array] | None = None, **groups: Any) -> Groups:
+    """``groups`` (None: left out), the measured curve, all that `measurement_of` needs, and a ``walk``.
+
+    groups : arrays by name, (E, draws, ...) each
     walk : ``ensemble_mean`` (E, T, k) means over the walkers at the steps ``ensemble_step`` (T,)
     """
     constant = {"deflection": measurement.deflection, **(walk or {})}
@@ -40,12 +64,9 @@ def inference_data(measurement: Measurement, walk: Mapping[str, Array] | None = 
     dims = {n: ["point"] for n in ("force", "curve", "deflection", "time", "force_sd", "across", "places")}
     dims |= {f"motion_{n}": ["station"] for n in MOTION}
     dims |= {"ensemble_mean": ["ensemble", "step", "coordinate"], "ensemble_step": ["step"]}
-    data = arviz.from_dict(
-        **groups,
-        observed_data={"force": measurement.force},
-        constant_data=constant,
-        dims={**dims, "covariance": ["point", "point_2"], "blank_run": ["blank_point", "blank_column"]},
-    )
+    dims |= {"covariance": ["point", "point_2"], "blank_run": ["blank_point", "blank_column"]}
+    groups |= {"observed_data": {"force": measurement.force}, "constant_data": constant}
+    data = Groups({name: _dataset(name, arrays, dims) for name, arrays in groups.items() if arrays is not None})
     p = measurement.provenance
     about = {
         "rig": {"kind": measurement.rig.name, "lengths": measurement.rig.lengths},
@@ -57,8 +78,19 @@ def inference_data(measurement: Measurement, walk: Mapping[str, Array] | None = 
     return data
 
 
-def measurement_of(data: Any) -> Measurement:
-    """The measurement that `inference_data` stored."""
+def _dataset(group: str, arrays: Mapping[str, Array], dims: Mapping[str, list[str]]) -> Any:
+    """One group, its dimensions numbered from nought."""
+    import xarray  # on demand: a fit needs none of it
+
+    before = () if group in ONE_FOR_ALL else OF_A_CHAIN
+    held = {n: ((*before, *dims.get(n, ())), np.atleast_1d(np.asarray(v))) for n, v in arrays.items()}
+    sizes = {d: size for along, v in held.values() for d, size in zip(along, v.shape, strict=True)}
+    coords = {d: np.arange(size) for d, size in sizes.items()}
+    return xarray.Dataset(held, coords, {"creation_library": "bayesmembrane"})
+
+
+def measurement_of(data: Groups) -> Measurement:
+    """The measurement that `laid_out` stored."""
     about = json.loads(data.constant_data.attrs["measurement"])
     rig = component("rigs", about["rig"]["kind"])(**about["rig"]["lengths"])
     held = data.constant_data.data_vars

@@ -1,4 +1,4 @@
-"""What came out of a walk: the draws and all that is derived from them, as InferenceData and as plain values."""
+"""What came out of a walk: the draws and all that is derived from them, laid out in groups and as plain values."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from bayesmembrane.calibration.checks import alike
 from bayesmembrane.calibration.crosscheck import crosscheck
 from bayesmembrane.calibration.goodness import dominates, goodness
-from bayesmembrane.calibration.layout import inference_data
+from bayesmembrane.calibration.layout import Groups, laid_out
 from bayesmembrane.calibration.posterior import FAILURES, Evaluation, Posterior
 from bayesmembrane.calibration.prior import Mass
 from bayesmembrane.calibration.quality import NOTEWORTHY
@@ -20,8 +20,8 @@ from bayesmembrane.calibration.sampling.leaps import offers
 from bayesmembrane.calibration.sampling.proposals.collapsed import collapsed
 from bayesmembrane.calibration.sampling.walk import Sampled
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.draws import shortest_interval
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
 
 MOST_DRAWS, LONG, DRAWS_IF_LONG, FORCES_IF_LONG, LEAST_DRAWS = 4000, 100, 1000, 4_000_000, 400
@@ -29,8 +29,8 @@ PRIOR_DRAWS = 500
 WALK_STEPS = 500
 
 
-def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) -> tuple[Any, dict[str, Any]]:
-    """(InferenceData, status) of a walk that was to be worth ``wanted`` draws; all of it follows from the chains.
+def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) -> tuple[Groups, dict[str, Any]]:
+    """(groups, status) of a walk that was to be worth ``wanted`` draws; all of it follows from the chains.
 
     What is replicated is another test of the same film on the same rig: new noise, and the same form error, as far as
     the data tell it. ``curve`` is the force without that noise, form error included.
@@ -51,7 +51,7 @@ def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) ->
     def folded(values: Array) -> Array:
         return values.reshape(*shape, *values.shape[1:]).astype(np.float32)
 
-    data = inference_data(
+    data = laid_out(
         measurement,
         _walked(sampled.chains),
         posterior=_named(hypothesis, measurement, flat, shape),
@@ -114,7 +114,7 @@ def _short(hypothesis: Hypothesis, name: str) -> str:
     return name.removeprefix(f"{hypothesis.material.name}.")
 
 
-def _answer(hypothesis: Hypothesis, data: Any, sampled: Sampled, wanted: float) -> dict[str, Any]:
+def _answer(hypothesis: Hypothesis, data: Groups, sampled: Sampled, wanted: float) -> dict[str, Any]:
     values = {_short(hypothesis, name): data.posterior[name].values.ravel() for name in hypothesis.natural_names}
     return walk_answer(sampled, hypothesis.names, wanted) | {
         "posterior": {name: marginal(v) for name, v in values.items()},
@@ -124,8 +124,11 @@ def _answer(hypothesis: Hypothesis, data: Any, sampled: Sampled, wanted: float) 
 
 def marginal(values: Array) -> dict[str, Any]:
     """Mean, standard deviation and 94 % interval of draws (S,) of one parameter."""
-    low, high = arviz.hdi(values, hdi_prob=0.94)  # type: ignore[no-untyped-call]
-    return {"mean": float(np.mean(values)), "sd": float(np.std(values)), "hdi_94": [float(low), float(high)]}
+    return {
+        "mean": float(np.mean(values)),
+        "sd": float(np.std(values)),
+        "hdi_94": list(shortest_interval(values, 0.94)),
+    }
 
 
 def walk_answer(sampled: Sampled, names: Sequence[str], wanted: float) -> dict[str, Any]:
@@ -180,7 +183,7 @@ def _failures(hypothesis: Hypothesis, chains: Chains) -> dict[str, Any]:
     }
 
 
-def _judgement(posterior: Posterior, data: Any, best: Array, square: float | None) -> dict[str, Any]:
+def _judgement(posterior: Posterior, data: Groups, best: Array, square: float | None) -> dict[str, Any]:
     """Goodness of the best draw's curve, by the measurement's own noise, and what the inferred noise says."""
     found = goodness(posterior.measurement, best, posterior.hypothesis.curve_size, square)
     sd = data.posterior["noise.sd"].values.ravel() if "noise.sd" in data.posterior else np.empty(0)

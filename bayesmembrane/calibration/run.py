@@ -2,7 +2,7 @@
 
 run.toml         what was asked: data, hypothesis, settings, seed, versions, fingerprint
 segments/        the whole walk, written while it is made: what is needed to go on as if it had never stopped
-posterior.nc     draws and what belongs to them, as arviz InferenceData (`calibration.layout`)
+posterior.nc     draws and what belongs to them, laid out as arviz InferenceData (`calibration.layout`)
 status.json      what came out in numbers, written last
 predictions.nc   what the draws predict, made for every finished run
 
@@ -21,7 +21,7 @@ import numpy as np
 
 from bayesmembrane.calibration import prediction_store
 from bayesmembrane.calibration.few import weighing
-from bayesmembrane.calibration.layout import measurement_of
+from bayesmembrane.calibration.layout import Groups, measurement_of
 from bayesmembrane.calibration.outcome import MOST_DRAWS, outcome
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.prediction_store import read_predictions, write_predictions
@@ -57,6 +57,7 @@ from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.interrupts import Stop, never
 from bayesmembrane.ground.jobs import give_back
 from bayesmembrane.ground.parameters import Array
+from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.ground.showable import Showable
 from bayesmembrane.physics.cache import CachedSolver, Tally
 from bayesmembrane.physics.forward import Solve
@@ -76,14 +77,19 @@ class Run(Showable):
     path : where it is stored, None if it is not
     settings : what stands in run.toml
     status : what stands in status.json
-    data : arviz InferenceData; draws carry coordinates and natural parameters under their full names
+    groups : draws and what belongs to them; they carry coordinates and natural parameters under their full names
     """
 
     name: str
     path: Path | None
     settings: dict[str, Any]
     status: dict[str, Any]
-    data: Any
+    groups: Groups
+
+    @cached_property
+    def data(self) -> Any:
+        """The groups as arviz InferenceData."""
+        return arviz.InferenceData(**self.groups)
 
     @cached_property
     def hypothesis(self) -> Hypothesis:
@@ -93,7 +99,7 @@ class Run(Showable):
     @cached_property
     def measurement(self) -> Measurement:
         """What it was sampled against."""
-        return measurement_of(self.data)
+        return measurement_of(self.groups)
 
     @property
     def interrupted(self) -> bool:
@@ -115,7 +121,7 @@ class Run(Showable):
 
     def draws(self) -> Array:
         """Coordinates of all draws, all ensembles together, shape (B, k)."""
-        return np.stack([self.data.posterior[n].values.ravel() for n in self.hypothesis.names], axis=1)
+        return np.stack([self.groups.posterior[n].values.ravel() for n in self.hypothesis.names], axis=1)
 
     def walk(self, every: int | None = None) -> Iterator[Array]:
         """The walk after burn-in, (E, n, walkers, k) at a time: every ``every``-th step, None for the largest tau.
@@ -131,13 +137,13 @@ class Run(Showable):
 
     def curves(self) -> Array:
         """Force curves of all draws without noise, shape (B, N), N."""
-        values = self.data.posterior_predictive["curve"].values
+        values = self.groups.posterior_predictive["curve"].values
         return np.asarray(values.reshape(-1, values.shape[-1]), dtype=float)
 
     @cached_property
     def quality(self) -> Quality:
         """How far the draws can be trusted."""
-        posterior = self.data.posterior
+        posterior = self.groups.posterior
         return quality_of(self.status, posterior["noise.sd"].values.ravel() if "noise.sd" in posterior else np.empty(0))
 
     @property

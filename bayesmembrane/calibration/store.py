@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from bayesmembrane.calibration.fingerprint import SAMPLING, code_of
+from bayesmembrane.calibration.layout import Groups
 from bayesmembrane.calibration.sampling.segments import FOLDER, LOCK, Segments
 from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement
@@ -21,8 +22,7 @@ from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.files import make_folder, remove_parts, unwritable, write_whole
 from bayesmembrane.ground.fingerprint import digest
 from bayesmembrane.ground.locks import alone
-from bayesmembrane.ground.netcdf import packed
-from bayesmembrane.ground.quiet import arviz
+from bayesmembrane.ground.netcdf import packed, unpacked
 from bayesmembrane.ground.sealed import (
     checked,
     damaged,
@@ -218,20 +218,19 @@ def _walks(folder: Path) -> Any:
         return None
 
 
-def write_run(folder: Path, data: Any, status: dict[str, Any]) -> None:
+def write_run(folder: Path, data: Groups, status: dict[str, Any]) -> None:
     """Write what came out, status last; raises `StorageError` if that fails.
 
     Every file is then as it was before, or complete; a status beside draws that it does not belong to is told by
     `read_run`, and is written again when the run goes on.
     """
-    groups = {name: data[name] for name in data.groups()}
-    content, found = sealed(packed(groups))
+    content, found = sealed(packed(data))
     write_whole(folder / POSTERIOR, lambda part: part.write_bytes(content), "the run")
     write_json(folder / STATUS, {"posterior_sha256": found, **status}, "the run")
 
 
-def read_run(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Any]:
-    """(run.toml, status.json, InferenceData) of a folder; raises `StorageError` if one is missing or damaged."""
+def read_run(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Groups]:
+    """(run.toml, status.json, groups) of a folder; raises `StorageError` if one is missing or damaged."""
     for name in (ASKED, STATUS, POSTERIOR):
         if not (folder / name).is_file():
             raise StorageError(f"there is no complete run: {name} is missing", str(folder), "sample again")
@@ -243,7 +242,7 @@ def read_run(folder: Path) -> tuple[dict[str, Any], dict[str, Any], Any]:
     if belongs is not None and belongs != found:
         raise damaged(folder / POSTERIOR, "the run", f"it does not belong to {STATUS}")
     try:
-        stored = arviz.from_netcdf(str(folder / POSTERIOR), engine="h5netcdf")  # type: ignore[no-untyped-call]
+        stored = Groups(unpacked(folder / POSTERIOR))
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
         raise damaged(folder / POSTERIOR, "the run", type(error).__name__) from None
     return asked, status, stored

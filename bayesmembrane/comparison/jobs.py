@@ -131,7 +131,7 @@ def _row(job: Job, posterior: Posterior, mass: Mass, run: Run, tell: Tell) -> Ro
     climbed = climb("nested", "nested sampling", seed)
     if by_chance(climbed, bridged):
         climbed = averaged(climbed, climb("again", "nested sampling, again", seed + AGAIN))
-    loo = part("loo", "leave one out", lambda: leave_one_out(posterior, run.data, seed, step, run.integral))
+    loo = part("loo", "leave one out", lambda: leave_one_out(posterior, run.groups, seed, step, run.integral))
     widths = part("widths", "prior widths", lambda: prior_widths(posterior, draws, worth, seed))
     rest = None
     if job.whole is not None:
@@ -233,7 +233,7 @@ def _predict(job: Job, run: Run, tell: Tell) -> None:
 
 def _bridged(posterior: Posterior, run: Run, seed: int) -> EvidenceEstimate:
     """Bridge sampling on the draws of a run, ensemble by ensemble."""
-    log_posterior = run.data.sample_stats["lp"].values.ravel().astype(float)
+    log_posterior = run.groups.sample_stats["lp"].values.ravel().astype(float)
     return bridge(
         PosteriorTarget(posterior),
         run.draws(),

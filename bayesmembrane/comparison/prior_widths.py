@@ -13,9 +13,9 @@ from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.prior import JointPrior
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.draws import pareto_shape
 from bayesmembrane.ground.parameters import Array, Prior, Uniform
 from bayesmembrane.ground.plain import plain
-from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.forward import Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -144,7 +144,7 @@ def _tail_index(log_ratio: Array, worth: float) -> float:
     if np.ptp(largest) < 1e-6:
         return 0.0
     with np.errstate(all="ignore"):  # its own fit overflows harmlessly
-        return float(arviz.psislw(log_ratio.copy(), reff=worth)[1])  # type: ignore[no-untyped-call]
+        return pareto_shape(log_ratio, worth)
 
 
 def _index_sd(k: float, effective: float) -> float:

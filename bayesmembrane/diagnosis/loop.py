@@ -234,7 +234,7 @@ def moved(before: Run, after: Run) -> dict[str, dict[str, float]]:
 
 def _stage(run: Run, solve: Solve, seed: int) -> Stage:
     posterior = Posterior(run.hypothesis, run.measurement, solve)
-    loo = leave_one_out(posterior, run.data, seed, integral=run.integral)
+    loo = leave_one_out(posterior, run.groups, seed, integral=run.integral)
     return Stage(run, *(_by_weights(run) or _bridged(run, posterior, seed)), loo.elpd, loo.se, coverage(run))
 
 
@@ -257,7 +257,7 @@ def _bridged(run: Run, posterior: Posterior, seed: int) -> tuple[float, float]:
 
 def coverage(run: Run) -> float:
     """Part of the measured points inside the central 90 % of the posterior predictive."""
-    draws = run.data.posterior_predictive["force"].values
+    draws = run.groups.posterior_predictive["force"].values
     draws = draws.reshape(-1, draws.shape[-1])
     low, high = np.quantile(draws, [(1 - LOOP.band) / 2, (1 + LOOP.band) / 2], axis=0)
     y = run.measurement.force

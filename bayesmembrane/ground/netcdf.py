@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
 from typing import Any
 
 _COMPRESSIBLE = "biufc"
@@ -24,6 +25,14 @@ def packed(groups: Mapping[str, Any]) -> bytes:
     tree: Any = xarray.DataTree.from_dict(dict(groups))
     with _without_cluster():
         return bytes(tree.to_netcdf(None, engine="h5netcdf", encoding=encoding))
+
+
+def unpacked(path: Path) -> dict[str, Any]:
+    """The xarray datasets of a file's groups, by name; what is large is read when it is asked for."""
+    import xarray
+
+    found: Any = xarray.open_groups(path, engine="h5netcdf")
+    return {name.strip("/"): held for name, held in found.items() if name.strip("/")}
 
 
 def _stored(values: Any) -> dict[str, Any]:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from bayesmembrane.data.thinning import MOST
 from bayesmembrane.ground.parameters import Array
@@ -50,6 +49,8 @@ class Nodes:
 
     @cached_property
     def spline(self) -> Array:
+        from scipy.interpolate import make_interp_spline  # on demand: curves are hardly ever long
+
         d, length = self.forward.deflection, _length(self.forward)
         u, at = (np.arcsinh(v / length) for v in (self.few.deflection, np.maximum(d, self.few.deflection[0])))
         return np.where(d[:, None] > 0, make_interp_spline(u, np.eye(u.size), k=DEGREE)(at), 0.0)

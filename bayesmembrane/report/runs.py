@@ -11,14 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.calibration.layout import Groups
 from bayesmembrane.calibration.posterior import FAILURES
 from bayesmembrane.calibration.predictions import Predictions
 from bayesmembrane.calibration.quality import Quality
 from bayesmembrane.calibration.run import Run, load_run, stored_predictions
 from bayesmembrane.data.fixture import Fixture
+from bayesmembrane.ground.draws import pareto_smoothed
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.noise.white import White
 from bayesmembrane.report.blocks import Column
@@ -313,8 +314,8 @@ def _shown(run: Run, found: Predictions) -> Shown:
         data_hash=m.data_hash,
         digest=found,
         x=run.draws(),
-        natural=_stacked(run.data.posterior, h.natural_names),
-        prior=_stacked(run.data.prior, h.names) if "prior" in run.data.groups() else np.empty((0, len(h.names))),
+        natural=_stacked(run.groups.posterior, h.natural_names),
+        prior=_stacked(run.groups.prior, h.names) if "prior" in run.groups else np.empty((0, len(h.names))),
         sampling=_sampling(run),
         goodness=run.status["goodness"],
         dominated=bool(run.status["extra_noise_dominates"]),
@@ -323,7 +324,7 @@ def _shown(run: Run, found: Predictions) -> Shown:
         cache=run.status.get("cache", {}),
         crosscheck=run.status["crosscheck"],
         facts=_facts(run),
-        replicas=_replicas(run.data),
+        replicas=_replicas(run.groups),
         quality=run.quality,
     )
 
@@ -345,7 +346,7 @@ def _sampling(run: Run) -> HowSampled:
         r_hat=_number(status["r_hat"], np.inf),
         tau=tau,
         acceptance=status["acceptance"],
-        ensembles=int(run.data.posterior.sizes["chain"]),
+        ensembles=int(run.groups.posterior.sizes["chain"]),
         walkers=status["walkers"],
         steps=status["steps"],
         burn=status["burn"],
@@ -366,7 +367,7 @@ def _number(value: float | None, missing: float) -> float:
 
 def _means(run: Run) -> tuple[Array, Array]:
     """Means over the walkers (E, T, k) at steps (T,): of the whole walk if it was stored, else of the stored draws."""
-    constant = run.data.constant_data
+    constant = run.groups.constant_data
     if "ensemble_mean" in constant:
         return np.asarray(constant["ensemble_mean"].values, float), np.asarray(constant["ensemble_step"].values, float)
     x = _walked(run)
@@ -378,7 +379,7 @@ def _means(run: Run) -> tuple[Array, Array]:
 
 def _walked(run: Run) -> Array:
     """All stored draws (E, D, k), step after step, of each step all walkers."""
-    return np.stack([np.asarray(run.data.posterior[n].values, float) for n in run.hypothesis.names], axis=-1)
+    return np.stack([np.asarray(run.groups.posterior[n].values, float) for n in run.hypothesis.names], axis=-1)
 
 
 def _draws(run: Run) -> tuple[Array, Array]:
@@ -389,17 +390,17 @@ def _draws(run: Run) -> tuple[Array, Array]:
     return x[:, keep], at[keep]
 
 
-def _replicas(data: Any) -> Replicas | None:
-    if not {"posterior_predictive", "log_likelihood"} <= set(data.groups()):
+def _replicas(data: Groups) -> Replicas | None:
+    if not {"posterior_predictive", "log_likelihood"} <= set(data):
         return None
     readings, likelihood = (
         np.asarray(g["force"].values, dtype=float).reshape(-1, data.observed_data["force"].size)
         for g in (data.posterior_predictive, data.log_likelihood)
     )
     thin = max(1, len(readings) // MOST_REPLICAS)
-    weights, shape = arviz.psislw(-likelihood[::thin].T)  # type: ignore[no-untyped-call]
+    weights, shape = pareto_smoothed(-likelihood[::thin].T)
     force = np.asarray(data.observed_data["force"].values, dtype=float)
-    return Replicas(force, readings[::thin].T, np.asarray(weights), np.asarray(shape))
+    return Replicas(force, readings[::thin].T, weights, shape)
 
 
 def _facts(run: Run) -> dict[str, Any]:

@@ -85,7 +85,7 @@ def _posterior(run: Run) -> dict[str, tuple[tuple[float, float], str]]:
     """By full name, ((mean, sd), unit) of the natural parameters."""
     h = run.hypothesis
     pairs = zip(h.natural_names, h.natural_units, strict=True)
-    return {n: (_moments(run.data.posterior[n].values), u) for n, u in pairs}
+    return {n: (_moments(run.groups.posterior[n].values), u) for n, u in pairs}
 
 
 def modulus_fitted(c: Candidate, m: Measurement) -> float:
@@ -103,14 +103,14 @@ def settled(c: Candidate, run: Run | None) -> Candidate:
         return c
     x, names = c.x.copy(), c.hypothesis.names
     for i in range(c.hypothesis.material_size, c.hypothesis.curve_size):
-        x[i] = _moments(run.data.posterior[names[i]].values)[0]
+        x[i] = _moments(run.groups.posterior[names[i]].values)[0]
     return replace(c, x=x)
 
 
 def modulus_of(run: Run) -> tuple[float, float]:
     """Mean and standard deviation of G in MPa: the initial slope of the energy over the thickness."""
     material = run.hypothesis.material
-    fields = np.stack([run.data.posterior[f"{material.name}.{n}"].values.ravel() for n in material.field_names()])
+    fields = np.stack([run.groups.posterior[f"{material.name}.{n}"].values.ravel() for n in material.field_names()])
     return _moments(1e-6 * np.asarray(material.shear_modulus(fields)) / run.measurement.specimen.thickness)
 
 

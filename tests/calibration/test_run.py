@@ -107,7 +107,7 @@ def test_an_answer_that_rests_on_a_run_finds_it_again(stored: Run, tmp_path: Pat
 
 
 def test_inference_data_is_complete(stored: Run) -> None:
-    data = stored.data
+    data = stored.data  # as arviz has it
     groups = {"posterior", "prior", "log_likelihood", "posterior_predictive", "observed_data", "sample_stats"}
     assert groups <= set(data.groups())
     names = {*stored.hypothesis.names, *stored.hypothesis.natural_names}

@@ -68,7 +68,7 @@ def test_every_point_left_out_agrees_with_the_grid(noise):
     x, weight, force = grid(noise)
     terms = posterior(noise).pointwise(x, force)
     exact = -logsumexp(weight[:, None] - terms, axis=0)
-    found = pc.leave_one_out(posterior(noise), run(noise).data, seed=1)
+    found = pc.leave_one_out(posterior(noise), run(noise).groups, seed=1)
     # The outlier, fifteen orders of e away, is known within a tenth of its logarithm, all others within 0.1.
     assert np.all(np.abs(found.pointwise - exact) < 0.1 + 0.1 * np.maximum(-exact, 0.0))
     assert abs(found.elpd - np.sum(exact)) < 1.5
@@ -97,7 +97,7 @@ def test_leaving_out_a_point_is_fitting_the_others():
 
 def test_films_of_absurd_force_lead_nobody(monkeypatch):
     """Where all of ln p is what one point adds to it, and that is beyond all digits, the difference is chance."""
-    evaluate, data, draws, i = Posterior.evaluate, run().data, run().draws(), 4
+    evaluate, data, draws, i = Posterior.evaluate, run().groups, run().draws(), 4
 
     def absurd(p, x):
         found = evaluate(p, x)
@@ -116,7 +116,7 @@ def test_films_of_absurd_force_lead_nobody(monkeypatch):
 
 def test_terms_without_digits_lead_nobody(monkeypatch):
     """A form error a million times the noise leaves none: such a term said that the others like a draw by e^(10^12)."""
-    pointwise, data, draws, i = Posterior.pointwise, run().data, run().draws(), 4
+    pointwise, data, draws, i = Posterior.pointwise, run().groups, run().draws(), 4
 
     def lost(p, x, force):
         terms = pointwise(p, x, force)
@@ -130,7 +130,7 @@ def test_terms_without_digits_lead_nobody(monkeypatch):
 
 
 def test_draws_that_are_all_the_same_end_the_search(monkeypatch):
-    data, draws = run().data, run().draws()
+    data, draws = run().groups, run().draws()
     monkeypatch.setattr(Pool, "_drawn_towards", lambda pool, i: pool.x[:1])
     terms = data.log_likelihood["force"].values.reshape(len(draws), -1).astype(float)
     pool = Pool(posterior(), draws, data.sample_stats["lp"].values.ravel(), terms, np.random.default_rng(0))
@@ -143,7 +143,7 @@ def test_exact_refits_agree_with_the_grid(monkeypatch):
     monkeypatch.setattr(pc, "PARETO_K", -np.inf)
     x, weight, force = grid()
     exact = -logsumexp(weight[:, None] - posterior().pointwise(x, force), axis=0)
-    found = pc.leave_one_out(posterior(), run().data, seed=2)
+    found = pc.leave_one_out(posterior(), run().groups, seed=2)
     assert found.refitted == tuple(range(12))
     # The outlier, fifteen orders of e away, is known within a tenth of its logarithm, all others within 0.1.
     assert np.all(np.abs(found.pointwise - exact) < 0.1 + 0.1 * np.maximum(-exact, 0.0))
@@ -159,7 +159,7 @@ def test_the_others_integrated_by_themselves_agree_with_the_grid(noise, monkeypa
     monkeypatch.setattr(pc, "MOST_INTEGRALS", 12)
     monkeypatch.setattr(Pool, "without", lambda *_: (0.0, np.inf, 0.0))
     for integral in (None, run(noise).integral):
-        found = pc.leave_one_out(posterior(noise), run(noise).data, seed=3, integral=integral)
+        found = pc.leave_one_out(posterior(noise), run(noise).groups, seed=3, integral=integral)
         assert found.monte_carlo_sd < 0.4
         # A reading that says nothing is one with a noise of thirty times the largest force: 0.001 in its logarithm.
         assert np.all(np.abs(found.pointwise - exact) < 5 * found.monte_carlo_sd / np.sqrt(12) + 0.03)
@@ -174,7 +174,7 @@ def test_an_outlier_of_many_readings_costs_no_other_its_term():
     m = Measurement(deflection, force, Annulus(0.01, 0.035), Specimen("film", 5e-5))
     p, found = Posterior(hypothesis("neo_hookean"), m), sample(m, hypothesis("neo_hookean"), RunSettings(seed=SEED))
     assert found.status["importance"]["log_integral"] > 200 - 90 * np.log(np.max(force))
-    loo = pc.leave_one_out(p, found.data, seed=1, integral=found.integral)
+    loo = pc.leave_one_out(p, found.groups, seed=1, integral=found.integral)
     assert loo.refitted == (60,)
     # Films of one modulus are one curve in proportion to it: both integrals over a grid of modulus and noise.
     unit = p.forward(np.array([[0.0, 0.0]])).force[0]
@@ -193,7 +193,7 @@ def test_where_no_proposal_is_good_the_error_is_told(monkeypatch):
     assert refit.log_integral_without(posterior(), 4, run().draws(), np.random.default_rng(0))[1] == np.inf
     monkeypatch.setattr(Pool, "without", lambda *_: (-3.0, 2.0, 1.0))
     monkeypatch.setattr(pc, "PARETO_K", -np.inf)
-    found = pc.leave_one_out(posterior(), run().data, seed=3)
+    found = pc.leave_one_out(posterior(), run().groups, seed=3)
     assert found.pointwise == pytest.approx(-3.0)
     assert found.monte_carlo_sd == pytest.approx(2.0 * np.sqrt(12))
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bayesmembrane.calibration.layout import inference_data, measurement_of
+from bayesmembrane.calibration.layout import laid_out, measurement_of
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.motion import NOMINAL_SPEED, Motion, holds
 from bayesmembrane.physics.rigs.annulus import Annulus
@@ -56,7 +56,7 @@ def test_what_comes_later_is_not_remembered() -> None:
 
 def test_a_stored_selection_comes_back() -> None:
     part = CURVE.select(CURVE.cycle == 2)
-    back = measurement_of(inference_data(part))
+    back = measurement_of(laid_out(part))
     assert back.data_hash == part.data_hash
     assert np.array_equal(back.path.deflection, part.path.deflection)
     assert np.array_equal(back.on_path, part.on_path)

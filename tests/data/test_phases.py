@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesmembrane.calibration.layout import inference_data, measurement_of
+from bayesmembrane.calibration.layout import laid_out, measurement_of
 from bayesmembrane.data.exports.hints import Hints
 from bayesmembrane.data.importers.base import import_export
 from bayesmembrane.data.measurement import Measurement, Specimen
@@ -68,7 +68,7 @@ def test_what_columns_say_stands_over_what_is_read_off(tmp_path: Path) -> None:
     assert not any("ignored" in note for note in m.provenance.notes)
     part = m.select(np.arange(2, 5))
     assert (part.leg.tolist(), part.cycle.tolist()) == ([1, 1, -1], [1, 2, 2])
-    back = measurement_of(inference_data(part))
+    back = measurement_of(laid_out(part))
     assert (back.data_hash, back.leg.tolist()) == (part.data_hash, part.leg.tolist())
     read_off = read_measurement(tmp_path / "c.csv", tmp_path / "c.toml")
     assert read_off.data_hash == m.data_hash

@@ -2,13 +2,11 @@
 
 import math
 
-import numpy as np
 import pytest
 
 from bayesmembrane.report.blocks import Column, Table, facts_table
 from bayesmembrane.report.runs import Shown
 from bayesmembrane.report.sections.calibrations import fits_table as fits
-from bayesmembrane.report.sections.run.tables import hdi
 
 
 @pytest.mark.parametrize(
@@ -41,14 +39,6 @@ def test_records_have_no_nan() -> None:
 def test_facts_are_flattened() -> None:
     table = facts_table("f", "c", {"a_b": {"c": [1, 2.5], "d": None}, "e": True})
     assert table.rows == (("a b: c", "1, 2.5"), ("a b: d", "-"), ("e", "yes"))
-
-
-def test_the_shortest_interval_holds_its_share() -> None:
-    values = np.random.default_rng(0).exponential(size=20000)
-    low, high = hdi(values)
-    assert low < 0.01
-    assert np.mean((values >= low) & (values <= high)) == pytest.approx(0.94, abs=1e-3)
-    assert hdi(np.ones(3)) == (1.0, 1.0)
 
 
 def test_the_verdict_uses_the_stated_noise(yeoh: Shown, neo_hookean: Shown) -> None:

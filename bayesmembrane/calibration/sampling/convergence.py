@@ -11,8 +11,8 @@ import numpy as np
 
 from bayesmembrane.calibration.sampling.chains import Chains
 from bayesmembrane.calibration.sampling.growing import picked, stretches
+from bayesmembrane.ground.draws import rank_r_hat, worth_of_mean
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.quiet import arviz
 
 LEAST_TAUS = 50
 BURN_TAUS = 10
@@ -76,10 +76,10 @@ def convergence(chains: Chains) -> Convergence:
 
 
 def r_hat(flat: Array) -> float:
-    """Rank-normalised R-hat of (E, draws) in order of time: arviz splits each ensemble into halves itself."""
+    """Rank-normalised R-hat of (E, draws) in order of time: it splits each ensemble into halves itself."""
     if flat.shape[1] < 4 or np.ptp(flat) == 0:
         return np.inf
-    return float(arviz.rhat(flat, method="rank"))  # type: ignore[no-untyped-call]
+    return rank_r_hat(flat)
 
 
 def autocorrelation_times(x: Array) -> Array:
@@ -115,5 +115,4 @@ def effective_draws(weights: Array) -> float:
 
 def effective_steps(series: Array) -> float:
     """How many independent values the mean of a series (S,) in order of time is worth; at least one."""
-    worth = float(arviz.ess(series[None, :], method="mean"))  # type: ignore[no-untyped-call]
-    return max(worth, 1.0)
+    return max(worth_of_mean(series[None, :]), 1.0)

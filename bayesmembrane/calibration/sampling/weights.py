@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesmembrane.calibration.sampling.convergence import effective_draws
+from bayesmembrane.ground.draws import pareto_shape
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.quiet import arviz
 
 GOOD_K = 0.7
 """Up to this Pareto shape of the largest weights their means can be relied on at sizes that one can afford
@@ -56,8 +56,8 @@ def worth(log_weights: Array) -> Worth:
     if len(positive) < FEWEST:
         return NOTHING
     w = np.exp(lw - np.max(lw))
-    with np.errstate(all="ignore"):  # arviz sums exponentials of which all but one vanish
-        k_hat = float(arviz.psislw(positive)[1])  # type: ignore[no-untyped-call]
+    with np.errstate(all="ignore"):  # its exponentials may all vanish but one
+        k_hat = pareto_shape(positive)
     efficiency = effective_draws(w) / len(w)
     return Worth(
         k_hat=k_hat,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -11,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from bayesmembrane.calibration.layout import Groups
 from bayesmembrane.calibration.posterior import Posterior
 from bayesmembrane.calibration.sampling.convergence import effective_draws
 from bayesmembrane.comparison.leave_out.pool import ENOUGH, Pool
 from bayesmembrane.comparison.leave_out.refit import log_integral, log_integral_without
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.draws import left_out, worth_of_mean
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.plain import plain
-from bayesmembrane.ground.quiet import arviz
 from bayesmembrane.physics.form_error import ENERGY, LAW, LOCAL, traces
 from bayesmembrane.physics.forward import AT_ONCE, Forward, Solve
 from bayesmembrane.physics.mechanics import api
@@ -60,14 +60,14 @@ class LeaveOneOut:
 
 def leave_one_out(
     posterior: Posterior,
-    data: Any,
+    data: Groups,
     seed: int = 0,
     tell: Tell | None = None,
     integral: tuple[float, float] | None = None,
 ) -> LeaveOneOut:
     """ln p(y_i | y_-i) = ln of the mean of p(y_i | y_-i, x) over p(x | y_-i), for every point i.
 
-    ``data`` is the InferenceData of a run of ``posterior``: its pointwise terms are ln p(y_i | y_-i, x) under the whole
+    ``data`` has the groups of a run of ``posterior``: its pointwise terms are ln p(y_i | y_-i, x) under the whole
     covariance, so that p(x | y) / p(y_i | y_-i, x) is what the other points say of x, whatever the correlation. Pareto
     smoothed importance sampling uses that; where its k exceeds 0.7, draws of densities that are led to the posterior of
     the other points are added (`Pool`), and where these do not do, that posterior is integrated by itself (`refit`).
@@ -76,11 +76,7 @@ def leave_one_out(
     A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413; P.-C. Bürkner, J. Gabry, A. Vehtari, Comput. Stat. 36
     (2021) 1243.
     """
-    with warnings.catch_warnings():
-        # arviz warns of large k; those points get draws of their own.
-        warnings.simplefilter("ignore")
-        found = arviz.loo(data, pointwise=True, var_name="force", scale="log")  # type: ignore[no-untyped-call]
-    terms, k = found.loo_i.values.astype(float).copy(), found.pareto_k.values.astype(float)
+    terms, k = left_out(data.log_likelihood["force"].values.astype(float), _worth(data.posterior))
     draws = np.stack([data.posterior[n].values.ravel() for n in posterior.hypothesis.names], axis=1)
     log_likelihood = data.log_likelihood["force"].values.reshape(len(draws), -1).astype(float)
     error = np.array([_smoothed_error(log_likelihood[:, i]) for i in range(len(terms))])
@@ -104,6 +100,12 @@ def leave_one_out(
         pareto_k=k,
         refitted=tuple(np.flatnonzero(bad).tolist()),
     )
+
+
+def _worth(posterior: Any) -> float:
+    """Effective draws of the mean for each draw, on average of all that was drawn; one where there is one ensemble."""
+    chains = [np.asarray(v.values, dtype=float) for v in posterior.data_vars.values()]
+    return 1.0 if len(chains[0]) == 1 else float(np.mean([worth_of_mean(c) / c.size for c in chains]))
 
 
 class _Others:

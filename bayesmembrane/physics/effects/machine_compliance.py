@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import isotonic_regression
 from scipy.special import expit
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array, HalfNormal, Lomax, Normal
 from bayesmembrane.physics.effects.base import Compliance, EffectParameter
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
 
 NEWTON = 1.0  # N: the force at which the compliance is what its name says, whatever the exponent
 SMALLEST = 1e-9  # N: below it a power less than one has no slope
@@ -54,6 +55,8 @@ class FrameCurve:
     @cached_property
     def _law(self) -> tuple[PchipInterpolator, PchipInterpolator, float]:
         """g, its derivative, and its slope beyond the last knot."""
+        from scipy.interpolate import PchipInterpolator  # on demand: few frames are known by a curve
+
         x, y = np.array([0.0, *self.part]), np.array([0.0, *self.lost])
         g = PchipInterpolator(x, y)
         return g, g.derivative(), float((y[-1] - y[-2]) / (x[-1] - x[-2]))
@@ -168,6 +171,8 @@ def _curve_of(run: bytes) -> FrameCurve:
     The error of the compliance is that of half a loop, as where the frame has play or yields another way back, however
     many readings show it; that of a mean by the scatter about the curve; and `REPEATED` of it.
     """
+    from scipy.optimize import isotonic_regression  # on demand, as above
+
     travel, force = np.frombuffer(run).reshape(-1, 2).T
     most = float(np.max(force))
     rows = _between_knots(force / most)

@@ -8,15 +8,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics.profile import profile
 from bayesmembrane.physics.mechanics.solution import Curves, Status
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
 
 POINTS = 201
 FARTHER = 1e3
@@ -85,6 +88,8 @@ class ContourLaw:
         found = profile(self.material.from_vector(parameters), self.lift, points=POINTS, **radii)
         if found.status is not Status.OK:
             return found.status, None
+        from scipy.interpolate import PchipInterpolator  # on demand: all rigs are looked at by every command
+
         seen = _seen(found.f)
         return Status.OK, PchipInterpolator(found.f[seen], found.height[seen])
 

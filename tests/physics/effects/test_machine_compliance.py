@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bayesmembrane.calibration.fit import fit
-from bayesmembrane.calibration.layout import inference_data, measurement_of
+from bayesmembrane.calibration.layout import laid_out, measurement_of
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.diagnosis.diagnose import diagnose
@@ -148,7 +148,7 @@ def test_a_known_frame_is_claimed_once_and_has_no_value_at_which_it_is_not_there
 
 def test_a_stored_run_knows_the_frame() -> None:
     m = measured_with(run(np.random.default_rng(5), 1e-6))
-    back = measurement_of(inference_data(m))
+    back = measurement_of(laid_out(m))
     assert back.data_hash == m.data_hash
     claim = hypothesis("gent").with_frame(m)
     assert from_settings(claim.settings()).on(back) == claim

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayesmembrane.calibration.beside_paper import Compared
-from bayesmembrane.ground.parameters import Array
-from bayesmembrane.ground.quiet import arviz
+from bayesmembrane.ground.draws import shortest_interval
 from bayesmembrane.report.blocks import Column, Table
 from bayesmembrane.report.runs import Shown
 from bayesmembrane.words.language import spoken_parameter
@@ -33,7 +32,7 @@ def parameters_table(s: Shown, compared: Compared | None = None) -> Table:
         factor, read = s.read_as(name, unit)
         own, values = name.partition(".")[2], factor * s.natural[:, i]
         material = name.startswith(f"{s.material}.")
-        low, high = hdi(values)
+        low, high = shortest_interval(values, 0.94)
         rows.append(
             (
                 spoken_parameter(name),
@@ -73,9 +72,3 @@ def coordinates_table(s: Shown) -> Table:
         for i, p in enumerate(s.hypothesis.parameters)
     )
     return Table(f"coordinates {s.key}", "Coordinates that were sampled, with their priors.", columns, rows)
-
-
-def hdi(values: Array, share: float = 0.94) -> tuple[float, float]:
-    """The shortest interval that holds ``share`` of the draws."""
-    low, high = arviz.hdi(values, hdi_prob=share)  # type: ignore[no-untyped-call]
-    return float(low), float(high)
