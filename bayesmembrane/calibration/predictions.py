@@ -7,6 +7,7 @@ nothing.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -160,7 +161,9 @@ def predict_draws(
     chosen = _representative(here.force)
     shape_at = _shape_deflections(end, max(end, min(last, measurement.full_range)))
     film = hypothesis.material.from_vector(films[chosen])
-    states = _profiles(film, shape_at, measurement)
+    some = films[np.linspace(0, len(films) - 1, min(SHAPE_DRAWS, len(films))).astype(int)]
+    others = [hypothesis.material.from_vector(p) for p in some]
+    states, *shapes = _profiles([film, *others], shape_at, measurement)
     own_sd = measurement.force_sd
     unused = _points(rest)
     rest_force = np.empty((len(x), 0))
@@ -174,8 +177,6 @@ def predict_draws(
     at_break = carried.on(measurement, broken)[0] if broken.size else np.empty((len(x), 0))
     thickness = np.array([b.thickness for b in breaks])
     scaled = at_break * (thickness / measurement.specimen.thickness)
-    some = films[np.linspace(0, len(films) - 1, min(SHAPE_DRAWS, len(films))).astype(int)]
-    shapes = [_profiles(hypothesis.material.from_vector(p), shape_at, measurement) for p in some]
     lam1, lam2, eigenvalue = _map(film, states)
     return Predictions(
         at=measurement.deflection,
@@ -317,9 +318,9 @@ def _total_sd(hypothesis: Hypothesis, measurement: Measurement, x: Array, given:
     return np.sqrt(given**2 + inferred[:, None] ** 2)
 
 
-def _profiles(film: Material, at: Array, measurement: Measurement) -> Array:
-    """(4, D, M): radius, height, l1 and l2 at each deflection; nan where the film has no state."""
-    return rig_of(measurement).states(film, at, POINTS)
+def _profiles(films: Sequence[Material], at: Array, measurement: Measurement) -> Array:
+    """(B, 4, D, M): radius, height, l1 and l2 of each film at each deflection; nan where it has no state."""
+    return rig_of(measurement).states_of(films, at, POINTS)
 
 
 def _map(film: Material, states: Array) -> tuple[Array, Array, Array]:

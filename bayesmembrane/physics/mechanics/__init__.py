@@ -1,6 +1,6 @@
 """Forces of a clamped annular membrane, by two independent principles."""
 
-from bayesmembrane.physics.mechanics.api import SOLVERS, Request, Spared, force_curve, profile, request, solve
+from bayesmembrane.physics.mechanics.api import SOLVERS, Request, Spared, force_curve, profile, profiles, request, solve
 from bayesmembrane.physics.mechanics.solution import Curves, Note, Profile, Status
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "Status",
     "force_curve",
     "profile",
+    "profiles",
     "request",
     "solve",
 ]

@@ -14,7 +14,7 @@ from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import material as material_named
 from bayesmembrane.physics.mechanics import fallback
 from bayesmembrane.physics.mechanics.near_flat import lifted, settled
-from bayesmembrane.physics.mechanics.profile import profile
+from bayesmembrane.physics.mechanics.profile import profile, profiles
 from bayesmembrane.physics.mechanics.request import Request, Spared, request
 from bayesmembrane.physics.mechanics.ritz import solver as ritz
 from bayesmembrane.physics.mechanics.ritz.simd import LANES
@@ -28,7 +28,8 @@ SOLVERS: MappingProxyType[str, Solve] = MappingProxyType(
 )
 TOGETHER = 2**14
 """Forces that are solved for at once: what a solver needs beside them is many times as large as they are."""
-__all__ = ["SOLVERS", "Request", "Solve", "Spared", "force_curve", "profile", "request", "ritz", "solve", "unaided"]
+__all__ = ["SOLVERS", "Request", "Solve", "Spared", "force_curve"]
+__all__ += ["profile", "profiles", "request", "ritz", "solve", "unaided"]
 
 
 def solve(request: Request) -> Curves:

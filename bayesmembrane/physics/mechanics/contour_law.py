@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.base import Material
-from bayesmembrane.physics.mechanics.profile import profile
-from bayesmembrane.physics.mechanics.solution import Curves, Status
+from bayesmembrane.physics.mechanics.profile import profiles
+from bayesmembrane.physics.mechanics.solution import Curves, Profile, Status
 
 if TYPE_CHECKING:
     from scipy.interpolate import PchipInterpolator
@@ -81,17 +81,8 @@ class ContourLaw:
 
     @cached_property
     def _shapes(self) -> list[tuple[Status, PchipInterpolator | None]]:
-        return [self._shape(p) for p in self.parameters]
-
-    def _shape(self, parameters: Array) -> tuple[Status, PchipInterpolator | None]:
-        radii = {"inner_radius": self.inner_radius, "outer_radius": self.outer_radius}
-        found = profile(self.material.from_vector(parameters), self.lift, points=POINTS, **radii)
-        if found.status is not Status.OK:
-            return found.status, None
-        from scipy.interpolate import PchipInterpolator  # on demand: all rigs are looked at by every command
-
-        seen = _seen(found.f)
-        return Status.OK, PchipInterpolator(found.f[seen], found.height[seen])
+        radii = self.inner_radius, self.outer_radius
+        return [_shape(p) for p in profiles(self.material, self.parameters, self.lift, *radii, points=POINTS)]
 
     def _heights(self, radius: Array) -> tuple[Array, Array]:
         height, slope = np.full(radius.shape, np.nan), np.full(radius.shape, np.nan)
@@ -100,6 +91,16 @@ class ContourLaw:
                 at = np.clip(radius[b], shape.x[0], shape.x[-1])
                 height[b], slope[b] = shape(at), shape(at, 1)
         return height, slope
+
+
+def _shape(found: Profile) -> tuple[Status, PchipInterpolator | None]:
+    """h(r) of one film, where it has a state."""
+    if found.status is not Status.OK:
+        return found.status, None
+    from scipy.interpolate import PchipInterpolator  # on demand: all rigs are looked at by every command
+
+    seen = _seen(found.f)
+    return Status.OK, PchipInterpolator(found.f[seen], found.height[seen])
 
 
 def _seen(radius: Array) -> NDArray[np.intp]:

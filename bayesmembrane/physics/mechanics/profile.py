@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics.near_flat import lifted, settled
@@ -27,32 +28,41 @@ def profile(
     it is stretched to its square. All arrays are nan, and ``status`` says why, where the film has no solution.
     Raises `SettingsError` for radii or pre-stretches that make no sense.
     """
-    asked = request(type(material), material.vector, abs(deflection), inner_radius, outer_radius, prestretch=prestretch)
-    solved = lifted(asked)
-    curves = settled(ritz.solve(solved), asked)
-    status = Status(int(curves.status[0, 0]))
-    t = np.linspace(0.0, np.log(asked.ratio), points)
-    radius = inner_radius * np.exp(t)
-    if status is not Status.OK:
-        gap = np.full(points, np.nan)
-        return Profile(radius, gap, gap, gap, gap, gap, gap, gap, np.nan, np.nan, status)
-    l2, u, w, rise = ritz.shape(solved, t)
-    side, lift = np.sign(deflection), float(solved.deflection[0, 0])
-    part = abs(deflection) / lift if lift > 0 else 1.0
-    l2, u = prestretch + part**2 * (l2 - prestretch), prestretch + part**2 * (u - prestretch)
-    l1, rise = np.hypot(u, part * w), part * rise
-    p1, p2 = material.tension(l1, l2)
-    rho = inner_radius / prestretch
-    return Profile(
-        radius=radius,
-        f=rho * np.exp(t) * l2,
-        height=side * (abs(deflection) - rho * rise),
-        l1=l1,
-        l2=l2,
-        angle=side * np.arctan2(part * w, u),
-        tension_1=p1,
-        tension_2=p2,
-        force=float(curves.force[0, 0] * side),
-        energy=float(curves.energy[0, 0]),
-        status=status,
+    one = profiles(
+        type(material), material.vector, deflection, inner_radius, outer_radius, prestretch=prestretch, points=points
     )
+    return one[0]
+
+
+def profiles(
+    material: type[Material],
+    parameters: ArrayLike,
+    deflection: ArrayLike,
+    inner_radius: float,
+    outer_radius: float,
+    *,
+    prestretch: float = 1.0,
+    points: int = 201,
+) -> list[Profile]:
+    """`profile` of B films (B, n), each at one deflection (B,) m, or all at the same: they are solved side by side."""
+    films = np.atleast_2d(np.asarray(parameters, dtype=float))
+    at = np.broadcast_to(np.asarray(deflection, dtype=float), (len(films),))
+    asked = request(material, films, np.abs(at)[:, None], inner_radius, outer_radius, prestretch=prestretch)
+    solved = lifted(asked)
+    t = np.linspace(0.0, np.log(asked.ratio), points)
+    found, (l2, u, w, rise) = ritz.shapes(solved, t)
+    curves = settled(found, asked)
+    side, lift = np.sign(at)[:, None], solved.deflection
+    part = np.divide(np.abs(at)[:, None], lift, out=np.ones(lift.shape), where=lift > 0)
+    l2, u = prestretch + part**2 * (l2 - prestretch), prestretch + part**2 * (u - prestretch)
+    w, rise, rho = part * w, part * rise, inner_radius / prestretch
+    l1 = np.hypot(u, w)
+    f, height, angle = rho * np.exp(t) * l2, side * (np.abs(at)[:, None] - rho * rise), side * np.arctan2(w, u)
+    out = []
+    for b, film in enumerate(films):
+        with np.errstate(all="ignore"):
+            tension = material.from_vector(film).tension(l1[b], l2[b])
+        force, energy = float(curves.force[b, 0] * side[b, 0]), float(curves.energy[b, 0])
+        arrays = (inner_radius * np.exp(t), f[b], height[b], l1[b], l2[b], angle[b], *tension)
+        out.append(Profile(*arrays, force, energy, Status(int(curves.status[b, 0]))))
+    return out

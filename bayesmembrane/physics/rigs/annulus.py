@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -74,9 +75,14 @@ class Annulus(Ring):
         return films.solve(replace(asked, read=read))
 
     def states(self, film: Material, deflection: Array, points: int) -> Array:
-        radii = {"inner_radius": self.inner_radius, "outer_radius": self.outer_radius}
-        found = [api.profile(film, float(d), points=points, **radii) for d in deflection]
-        return np.stack([np.stack([p.f, p.height, p.l1, p.l2]) for p in found], axis=1)
+        return np.asarray(self.states_of([film], deflection, points)[0])
+
+    def states_of(self, films: Sequence[Material], deflection: Array, points: int) -> Array:
+        parameters = np.repeat([film.vector for film in films], deflection.size, axis=0)
+        at, radii = np.tile(deflection, len(films)), (self.inner_radius, self.outer_radius)
+        found = api.profiles(type(films[0]), parameters, at, *radii, points=points)
+        flat = np.stack([np.stack([p.f, p.height, p.l1, p.l2]) for p in found])
+        return np.moveaxis(flat.reshape(len(films), deflection.size, 4, points), 2, 1)
 
     def mean_stretch(self, deflection: float) -> float:
         rise = deflection / (self.outer_radius - self.inner_radius)

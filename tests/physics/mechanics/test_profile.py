@@ -9,7 +9,7 @@ from scipy.integrate import simpson
 from bayesmembrane.physics.materials.gent import Gent
 from bayesmembrane.physics.materials.mooney_rivlin import MooneyRivlin
 from bayesmembrane.physics.materials.neo_hookean import NeoHookean
-from bayesmembrane.physics.mechanics import Status, profile, request, solve
+from bayesmembrane.physics.mechanics import Status, profile, profiles, request, solve
 from tests.physics.mechanics.films import INNER, MM, OUTER, RADII, every_material, silicone
 
 
@@ -46,6 +46,19 @@ def test_tensions_and_stretches_are_those_of_the_material():
     np.testing.assert_allclose(shape.tension_1, p1)
     np.testing.assert_allclose(shape.tension_2, p2)
     np.testing.assert_allclose(shape.f, shape.radius * shape.l2)
+
+
+def test_films_side_by_side_are_what_each_is_alone():
+    """Of films that take few elements and many, that lock, and that nothing is known of; up, down and flat."""
+    parameters = np.array([[5.0, 2.0], [7.5, 60.0], [5.0, 0.5], [-5.0, 2.0], [5.0, 30.0]])
+    deflection = np.array([91.5, -20.0, 91.5, 10.0, 0.0]) * MM
+    side_by_side = profiles(Gent, parameters, deflection, INNER, OUTER)
+    for film, d, found in zip(parameters, deflection, side_by_side, strict=True):
+        alone = profile(Gent(*film), d, **RADII)
+        assert found.status is alone.status
+        for name in ("f", "height", "l1", "l2", "angle", "tension_1", "tension_2", "force", "energy"):
+            np.testing.assert_allclose(getattr(found, name), getattr(alone, name), rtol=1e-9, atol=1e-12)
+    assert {p.status for p in side_by_side} > {Status.OK, Status.LOCKED}
 
 
 def test_pushing_down_mirrors_the_shape():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,24 +23,22 @@ SMALLEST = 1e-4
 RULED_OUT = 1e-6
 
 
-def shape(request: Request, t: Array) -> tuple[Array, Array, Array, Array]:
-    """(l2, u, w, h) of the first film at its first deflection, at t = ln(R/R1) (M,).
+def shapes(request: Request, t: Array) -> tuple[Curves, Array]:
+    """(what `solve` gives, (4, B, M)): l2, u, w and h of B films, each at its only deflection, at t = ln(R/R1) (M,).
 
     u = l1 cos(theta), w = l1 sin(theta), and the rise h from the disc outwards in units of R1/l0. nan if unresolved.
     """
-    one = replace(request, parameters=request.parameters[:1], prestretch=request.prestretch[:1])
-    d = np.where(request.deflection[:1, :1] == 0, SMALLEST, request.scaled[:1, :1])
-    search = _Search(one, d, np.ones((1, 1), np.bool_))
-    for level in range(1, len(LEVELS)):
-        if not search.improve(level):
-            break
-    if search.status[0, 0] != Status.OK:
-        gap = np.full(t.shape, np.nan)
-        return gap, gap, gap, gap
-    found, span, l0 = search.last, np.log(request.ratio), request.prestretch[0]
-    (a, b), (a_slope, b_slope) = evaluate(found.unknowns[0], found.ends[0], found.bubbles, t)
-    l2 = l0 + a
-    return l2, l2 + a_slope, np.exp(-t) * (d[0, 0] / span + b_slope), d[0, 0] * t / span + b
+    search, back = _searched(request)
+    span, out = np.log(request.ratio), np.full((4, len(search.d), t.size), np.nan)
+    left = search.status[:, 0] == Status.OK
+    for rows, found in reversed(search.solved):  # what was solved last of a film is its state
+        for k in np.flatnonzero(left[rows]).tolist():
+            b = int(rows[k])
+            d, l0 = search.d[b, 0], request.prestretch[b]
+            (a, rise), (a_slope, slope) = evaluate(found.unknowns[k], found.ends[k], found.bubbles, t)
+            out[:, b] = l0 + a, l0 + a + a_slope, np.exp(-t) * (d / span + slope), d * t / span + rise
+            left[b] = False
+    return _curves(request, search, back), out
 
 
 def solve(request: Request) -> Curves:
@@ -68,6 +65,11 @@ def solve(request: Request) -> Curves:
 
 def _solved(request: Request) -> Curves:
     """As `solve`, whatever the edges show."""
+    return _curves(request, *_searched(request))
+
+
+def _searched(request: Request) -> tuple[_Search, NDArray[np.intp] | None]:
+    """All that is found of the states of all films, and where they were before they were sorted by deflection."""
     d, order, back = _ascending(np.where(request.deflection == 0, SMALLEST, request.scaled))
     bound = extensibility(request)
     locked = np.zeros(d.shape, np.bool_)
@@ -83,7 +85,7 @@ def _solved(request: Request) -> Curves:
                 break
         _pass_on(search.status)
         search.status[locked] = Status.LOCKED
-    return _curves(request, search, back)
+    return search, back
 
 
 def _shown(result: Array, status: NDArray[np.int8], near: NDArray[np.bool_], spare: Spared) -> NDArray[np.bool_]:
@@ -103,7 +105,7 @@ class _Search:
     result, status : (B, rows, N) and (B, N) `Status` codes
     shown : (B, N) True where a state shows that the film is spared, whatever its status: its margins can be read
     film, column, shapes : (K,), (K,) and `Shapes` of the states that are to be refined
-    last : what was solved last
+    solved : films (K,) and `Shapes` of their states, as they were solved; of films at one deflection the last is theirs
     walks : where the lost paths stand, and the shapes of all films to begin them from
     """
 
@@ -120,7 +122,7 @@ class _Search:
         self.status[near & self.loose] = Status.OK
         self.film, self.column = np.nonzero((self.status == Status.UNRESOLVED) & self.wanted)
         ends = Shapes.flat(request.ratio, len(d), 0).ends
-        self.last = Shapes.from_trace(trace[..., -1], ends, 0)
+        self.solved = [(np.arange(len(d)), Shapes.from_trace(trace[..., -1], ends, 0))]
         self.shapes = Shapes.from_trace(trace[self.film, :, self.column], ends[self.film], 0)
         self.walks = Walks(request, d, trace)
 
@@ -153,8 +155,9 @@ class _Search:
         self.result[film, :, column], self.status[film, column] = found, verdict
         still = verdict == Status.UNRESOLVED
         self.film, self.column = film[still], column[still]
-        self.last = Shapes.from_trace(trace, start.ends, level)
-        self.shapes = self.last.of(still)
+        refined = Shapes.from_trace(trace, start.ends, level)
+        self.solved.append((film, refined))
+        self.shapes = refined.of(still)
 
     def _verdict(self, found: Array, film: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[np.int8]:
         """Statuses (K,) of results (K, rows): a rough state is good enough where nobody reads its force."""
@@ -168,7 +171,8 @@ class _Search:
         met = self.walks.on(lost, level)
         verdict = self._verdict(met.found, met.film, met.column)
         self.result[met.film, :, met.column], self.status[met.film, met.column] = met.found, verdict
-        rough, self.last = verdict == Status.UNRESOLVED, met.shapes
+        rough = verdict == Status.UNRESOLVED
+        self.solved.append((met.film, met.shapes))
         if np.any(rough):
             more = met.shapes.of(rough)
             self.shapes = Shapes.joined([self.shapes, more]) if self.film.size else more
