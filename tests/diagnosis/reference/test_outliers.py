@@ -140,9 +140,19 @@ def test_a_step_a_ripple_and_a_limit_stay(seed: int, size: float) -> None:
         assert without_outliers(moved(m, change))[1] is None, name
 
 
+@pytest.mark.parametrize("seed", [3, 4])
+def test_four_in_a_hundred_are_found(seed: int) -> None:
+    rng, change = np.random.default_rng(seed), np.zeros(300)
+    hit = np.sort(5 + 10 * rng.choice(29, 12, replace=False) + rng.integers(0, 4, 12))
+    change[hit] = rng.choice([-1, 1], 12) * rng.uniform(0.25, 0.5, 12)
+    _, aside = without_outliers(moved(cycles(seed), change))
+    assert aside is not None
+    assert set(aside.numbers) == set(hit + 1)
+
+
 def test_too_many_are_no_outliers() -> None:
     change = np.zeros(300)
-    change[15::30] = 0.3
+    change[15::15] = 0.3
     m = moved(cycles(1), change)
     assert without_outliers(m) == (m, None)
 
