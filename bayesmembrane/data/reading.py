@@ -29,6 +29,8 @@ LARGEST_LIFT = 20.0  # largest deflection relative to the size of the rig
 LEAST_SD = 1e-12  # N
 MOST_OF_TRAVEL = 0.8  # of the test's: what yields as much is no frame, but a wrong unit, or the film itself
 BLANK_REACHES = 0.8  # of the largest force of the test: below that it is told, for the frame is extrapolated
+NAMES_FILES = ("covariance", "blank_run")
+"""Of the section of the measurement: names of files, from where the specimen file lies."""
 _USUAL = {FORCE: "N", STRESS: "MPa", LENGTH: "mm"}
 PHASES = MappingProxyType({"cycle": RATIO, "direction": RATIO})
 """Columns by which whoever measured says cycles (1, 2, ...) and legs (1 loading, -1 unloading)."""

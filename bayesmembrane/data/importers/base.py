@@ -19,7 +19,7 @@ from bayesmembrane.data.exports.film import UNKNOWN, Film
 from bayesmembrane.data.exports.hints import Guess, Hints
 from bayesmembrane.data.exports.sheets import Sheet, guessed_encoding, is_workbook, text_sheet, workbook_sheets
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.reading import read_measurement
+from bayesmembrane.data.reading import NAMES_FILES, read_measurement
 from bayesmembrane.data.settings import TomlSection, load_specimen
 from bayesmembrane.data.tables import read_bytes
 from bayesmembrane.data.writing import csv_text, write_new
@@ -318,7 +318,12 @@ def _specimen_text(imported: Imported, hints: Hints, importer: str, template: To
     """(TOML, whether it is complete): film and rig as far as they are known, and how the export was understood."""
     content: dict[str, Any] = {"measurement": {"origin": imported.origin}}
     if template is not None and isinstance(measured := template.table.get("measurement"), dict):
-        content["measurement"] |= measured
+        # Named from where the specimen file lies, which is not where what is written will lie.
+        beside = Path(template.file).resolve().parent
+        files = {k: str(beside / measured[k]) for k in NAMES_FILES if isinstance(measured.get(k), str)}
+        content["measurement"] |= measured | files
+    if template is not None and "origin" in template.table:  # what was reconstructed is no measurement afterwards
+        content["origin"] = template.table["origin"]
     understood = {g.what.replace(" ", "_"): str(g).split(": ", 1)[1] for g in imported.guesses}
     listed = {"contradictions": imported.contradictions, "notes": imported.notes}
     if understood or imported.contradictions:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bayesmembrane.data.importers.base import Written, import_export
+from bayesmembrane.data.importers.base import Written, import_export, read_export
 from bayesmembrane.data.reading import read_measurement
 from bayesmembrane.ground.errors import BayesmembraneError, DataError, SettingsError, StorageError
 
@@ -94,6 +94,32 @@ def test_the_template_is_complete_without_its_hashes(tmp_path: Path) -> None:
 )
 def test_what_cannot_be_read_is_refused_with_its_place(tmp_path: Path, content: str | bytes, said: str) -> None:
     assert said in refusal(tmp_path, content)
+
+
+def test_what_a_specimen_file_says_and_names_is_kept_wherever_it_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known, made = tmp_path / "known", tmp_path / "made"
+    for folder in (known, made):
+        folder.mkdir()
+    curve = "deflection_mm,force_mN\n5,30\n10,200\n20,950\n"
+    (known / "export.csv").write_text(curve)
+    (known / "frame.csv").write_text("deflection_mm,force_mN\n0,0\n0.01,100\n0.05,500\n0.1,1000\n")
+    (known / "covariance.csv").write_text("1e-6,0,0\n0,1e-6,0\n0,0,1e-6\n")
+    named = "[measurement]\nblank_run = 'frame.csv'\ncovariance = 'covariance.csv'\n"
+    named += "[origin]\nstatement = 'RECONSTRUCTED, not measured'\n"
+    (known / "film.toml").write_text(SPECIMEN + named)
+    monkeypatch.chdir(known)
+    whole = read_measurement(Path("export.csv"), Path("film.toml"))
+    written = import_export(Path("export.csv"), made / "curve.csv", specimen=Path("film.toml"))
+    monkeypatch.chdir(made)
+    for found in (
+        read_measurement(written.curve, written.specimen),
+        read_export(known / "export.csv", None, known / "film.toml"),
+    ):
+        np.testing.assert_array_equal(found.blank_run, whole.blank_run)
+        np.testing.assert_array_equal(found.covariance, whole.covariance)
+        assert found.provenance.origin.endswith(whole.provenance.origin)
 
 
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
