@@ -100,11 +100,12 @@ def _of_film(asked: CampaignFile, film: _Film, seed: int) -> Iterator[Task]:
         except SettingsError as error:
             yield Task(READ, film.name, film.curve, film.specimen, end=limit, fault=str(error)).keyed()
             continue
-        yield from _of_range(asked, Task("", film.name, film.curve, film.specimen, data, limit), seed)
+        bare = Task("", film.name, film.curve, film.specimen, data, limit)
+        yield from _of_range(asked, _claims(asked, film.whole), bare, seed)
 
 
-def _of_range(asked: CampaignFile, bare: Task, seed: int) -> Iterator[Task]:
-    wanted, claims = asked.analyses.wanted, _claims(asked)
+def _of_range(asked: CampaignFile, claims: Sequence[dict[str, Any]], bare: Task, seed: int) -> Iterator[Task]:
+    wanted = asked.analyses.wanted
     walk = asked.sampling.stated()
     pages, own = {"page": asked.analyses.pages}, seed_of(seed, bare.data)
 
@@ -127,10 +128,15 @@ def _of_range(asked: CampaignFile, bare: Task, seed: int) -> Iterator[Task]:
         yield from (task("loop", [q], {"sampling": {"ess": walk["ess"]}, **declared}) for q in questions)
 
 
-def _claims(asked: CampaignFile) -> list[dict[str, Any]]:
-    """Settings of every hypothesis."""
+def _claims(asked: CampaignFile, measurement: Measurement) -> list[dict[str, Any]]:
+    """Settings of every hypothesis, each once: the frame of a blank run is in all of them, named or not."""
     h = asked.hypotheses
-    return [hypothesis(*names).settings() for names in product(h.materials, h.effects, h.noise, h.convexity)]
+    every = [hypothesis(*names) for names in product(h.materials, h.effects, h.noise, h.convexity)]
+    found: dict[str, dict[str, Any]] = {}
+    for claim in every:
+        whole = claim.with_frame(measurement).settings()
+        found.setdefault(repr({**whole, "effects": sorted(whole["effects"])}), claim.settings())
+    return list(found.values())
 
 
 def _questions(asked: CampaignFile) -> list[dict[str, Any]]:

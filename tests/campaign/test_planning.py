@@ -44,6 +44,23 @@ def test_adding_a_hypothesis_or_a_film_changes_no_other_run(tmp_path: Path) -> N
     assert len(more) > len(few)
 
 
+def test_the_frame_of_a_blank_run_is_in_every_hypothesis_named_or_not(tmp_path: Path) -> None:
+    (tmp_path / "ring.csv").write_text("deflection_mm,force_N\n5,0.1\n10,0.5\n20,2\n30,4\n")
+    (tmp_path / "frame.csv").write_text("deflection_mm,force_N\n0,0\n0.05,1\n0.1,2\n0.2,4\n")
+    (tmp_path / "ring.toml").write_text(
+        "[specimen]\nthickness_um = 50\n[rig]\nkind = 'annulus'\ninner_radius_mm = 10\nouter_radius_mm = 35\n"
+        "[measurement]\nblank_run = 'frame.csv'\n"
+    )
+    effects = ["", "machine_compliance", "force_offset", "machine_compliance+force_offset"]
+    hypotheses = f'materials = ["neo_hookean"]\neffects = {effects}'
+    asked = {"hypotheses": hypotheses, "analyses": ALL, "measurements": 'curves = ["ring.csv"]'}
+    tasks = made(write_campaign(tmp_path, **asked)).tasks
+    assert not [t.fault for t in tasks if t.fault]
+    assert [t.claims[0]["effects"] for t in tasks if t.analysis == "sample"] == [[], ["force_offset"]]
+    (compared,) = (t for t in tasks if t.analysis == "compare")
+    assert [c["effects"] for c in compared.claims] == [[], ["force_offset"]]
+
+
 def test_seeds_follow_from_the_seed_of_the_campaign_and_the_data(tmp_path: Path) -> None:
     file = write_campaign(tmp_path)
     first, again = made(file), made(file)
