@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.materials.base import Material
 from bayesmembrane.physics.mechanics.profile import profiles
+from bayesmembrane.physics.mechanics.request import request
 from bayesmembrane.physics.mechanics.solution import Curves, Profile, Status
 
 if TYPE_CHECKING:
@@ -82,7 +83,8 @@ class ContourLaw:
     @cached_property
     def _shapes(self) -> list[tuple[Status, PchipInterpolator | None]]:
         radii = self.inner_radius, self.outer_radius
-        return [_shape(p) for p in profiles(self.material, self.parameters, self.lift, *radii, points=POINTS)]
+        asked = request(self.material, self.parameters, [self.lift], *radii)
+        return [_shape(p) for p in profiles(asked, POINTS)]
 
     def _heights(self, radius: Array) -> tuple[Array, Array]:
         height, slope = np.full(radius.shape, np.nan), np.full(radius.shape, np.nan)

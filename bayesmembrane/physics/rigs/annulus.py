@@ -80,7 +80,7 @@ class Annulus(Ring):
     def states_of(self, films: Sequence[Material], deflection: Array, points: int) -> Array:
         parameters = np.repeat([film.vector for film in films], deflection.size, axis=0)
         at, radii = np.tile(deflection, len(films)), (self.inner_radius, self.outer_radius)
-        found = api.profiles(type(films[0]), parameters, at, *radii, points=points)
+        found = api.profiles(request(type(films[0]), parameters, at[:, None], *radii), points)
         flat = np.stack([np.stack([p.f, p.height, p.l1, p.l2]) for p in found])
         return np.moveaxis(flat.reshape(len(films), deflection.size, 4, points), 2, 1)
 

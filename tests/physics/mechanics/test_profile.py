@@ -52,7 +52,7 @@ def test_films_side_by_side_are_what_each_is_alone():
     """Of films that take few elements and many, that lock, and that nothing is known of; up, down and flat."""
     parameters = np.array([[5.0, 2.0], [7.5, 60.0], [5.0, 0.5], [-5.0, 2.0], [5.0, 30.0]])
     deflection = np.array([91.5, -20.0, 91.5, 10.0, 0.0]) * MM
-    side_by_side = profiles(Gent, parameters, deflection, INNER, OUTER)
+    side_by_side = profiles(request(Gent, parameters, deflection[:, None], INNER, OUTER))
     for film, d, found in zip(parameters, deflection, side_by_side, strict=True):
         alone = profile(Gent(*film), d, **RADII)
         assert found.status is alone.status
