@@ -189,7 +189,7 @@ def test_hash_depends_on_what_a_likelihood_depends_on(files: Files) -> None:
         ("deflection_mm,force_N\n3,1\n2,2\n1,3\n", "line 3: the deflection falls from the first line on; sort"),
         ("time_s,deflection_mm,force_N\n0,1,1\n0,3,2\n", "line 3: the time does not increase (0 s after 0 s)"),
         ("deflection_mm,force_N\n-3,1\n-2,2\n1,3\n", "the deflection is negative at most points"),
-        ("deflection_mm,force_N\n1,-1\n2,-2\n3,-3\n", "the force is negative at most points"),
+        ("deflection_mm,force_N\n1,-1\n2,-2\n3,-3\n", "the force is negative where the disc is lifted most"),
         (
             "deflection_m,force_N\n1,1\n2,2\n3,3\n",
             "line 4: a deflection of 3000 mm on a rig of 35 mm looks like a wrong",
@@ -202,6 +202,14 @@ def test_fault_of_the_curve_is_one_sentence(files: Files, curve: str | bytes, sa
     assert said in message
     assert "\n" not in message
     assert message.startswith("curve.csv")
+
+
+@pytest.mark.parametrize("force", [(-9.0, -8.0, -6.0, -5.0, -4.0), (0.0, -0.2, 0.7, -0.4, -0.3)])
+def test_an_offset_and_friction_may_leave_most_forces_negative(files: Files, force: tuple[float, ...]) -> None:
+    """Of a load cell with an offset, and of a guide that rubs on the way back: the film pulls in the right sense."""
+    at = (1, 2, 3, 4, 5) if force[-1] > force[0] else (1, 2, 5, 2, 1)
+    rows = "".join(f"{t},{d},{f}\n" for t, d, f in zip(range(5), at, force, strict=True))
+    assert np.array_equal(files.read("time_s,deflection_mm,force_N\n" + rows).force, force)
 
 
 def test_reversals_of_several_steps_are_a_protocol_without_times(files: Files) -> None:
