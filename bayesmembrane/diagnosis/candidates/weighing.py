@@ -10,6 +10,7 @@ from itertools import repeat
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import Block, Linear, log_inside, tempered, weighed
@@ -224,20 +225,34 @@ class Weighing(ABC):
     def adapted(self, candidate: Candidate) -> Array:
         """(N,) N: the residual once the coordinates have taken what they can of it, to first order, without form error.
 
-        By least squares: what a user would call the best fit of this model.
+        By least squares within the bounds: what a user would call the best fit of this model.
         """
-        return self._adapted(candidate.slopes, candidate.residual)
+        return self._adapted(candidate, candidate.slopes)
 
     def squares(self, candidate: Candidate, trace: Array | None = None) -> float:
         """Squares of its best fit, in variances of the noise; with a ``trace`` (N,) N of something else beside it."""
         slopes = candidate.slopes if trace is None else np.column_stack([candidate.slopes, trace])
-        white = self.noise.white(self._adapted(slopes, candidate.residual))
+        white = self.noise.white(self._adapted(candidate, slopes))
         return float(white @ white)
 
-    def _adapted(self, slopes: Array, residual: Array) -> Array:
-        white = self.noise.white(np.column_stack([slopes, residual]))
+    def _adapted(self, candidate: Candidate, slopes: Array) -> Array:
+        """With slopes (N, k or more), the first k of them of the coordinates; what is beside these has no bounds."""
+        white = self.noise.white(np.column_stack([slopes, candidate.residual]))
         taken = np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=SEARCH.rank)[0]
-        return np.asarray(residual - slopes @ taken)
+        low, high = self._room(candidate, slopes.shape[1])
+        if np.any((taken < low) | (taken > high)):
+            taken = lsq_linear(white[:, :-1], white[:, -1], (low, high), method="bvls").x
+        return np.asarray(candidate.residual - slopes @ taken)
+
+    @staticmethod
+    def _room(candidate: Candidate, count: int) -> tuple[Array, Array]:
+        """(count,), (count,): how far each coordinate may still go; those beyond the candidate's own anywhere."""
+        bounds = [p.bounds for p in candidate.hypothesis.parameters[: candidate.x.size]]
+        room = np.array(bounds).T - candidate.x
+        far = np.full(count - candidate.x.size, np.inf)
+        # A coordinate at its bound has round-off left, and the solver wants some width.
+        low, high = np.minimum(room[0], -TINY), np.maximum(room[1], TINY)
+        return np.concatenate([low, -far]), np.concatenate([high, far])
 
     def excess(self, candidate: Candidate) -> float:
         """Squares of its best fit beyond those of noise, in variances of the noise; 0 or more."""
