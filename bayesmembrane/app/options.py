@@ -166,6 +166,9 @@ class TestsOptions(OptionGroup):
         if self.specimen is None:
             raise typer.BadParameter("the curve needs a specimen file", param_hint="'--specimen'")
         if self.curve.suffix.lower() == ".toml":
+            if self.specimen.suffix.lower() != ".toml":
+                fault = "the curve is a TOML file and the specimen is none"
+                raise SettingsError(fault, f"{self.curve}, --specimen {self.specimen}", "name the curve first")
             raise SettingsError("a project lists the specimens itself", "--specimen", "leave it out")
         return CurveOptions(self.curve, self.specimen, self.then, self.rest_s).read()
 

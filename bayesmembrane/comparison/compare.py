@@ -37,6 +37,8 @@ def claimed(materials: str, effects: str, noise: str, convexity: str) -> tuple[H
     for name in (m.strip() for m in materials.split(",") if m.strip()):
         material, *own = (part.strip() for part in name.split("+"))
         common = [e.strip() for e in effects.split(",") if e.strip()]
+        if twice := sorted({e for e in own if own.count(e) > 1}):
+            raise SettingsError(f'the effect "{twice[0]}" is named twice', name, "name every effect once")
         effects_of = dict.fromkeys([*own, *common])
         for model in NOISES if noise == AUTO else (noise,):
             found.append(hypothesis(material, effects_of, model, convexity))
@@ -50,8 +52,7 @@ def ranges_of(whole: Measurement, ends: Sequence[float]) -> dict[str, Range]:
     `SettingsError` for an end that leaves fewer than two points.
     """
     found, whole = {}, of_few(whole, MOST)
-    for end in ends or [float(np.max(whole.deflection))]:
-        part = whole.up_to(end)
+    for part in whole.ranges_up_to(ends or [float(np.max(whole.deflection))]):
         rest = whole if len(part) < len(whole) else None
         reached = float(np.max(part.deflection))
         place = whole.rig.place(reached) if whole.rig.homogeneous else f"{1e3 * reached:.4g} mm"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -190,12 +191,24 @@ class Measurement:
         """
         keep = self.deflection <= max_deflection * (1 + 1e-9)
         if np.count_nonzero(keep) < 2:
-            least, most = float(np.min(self.deflection)), float(np.max(self.deflection))
+            second, most = np.sort(self.deflection)[min(1, len(self) - 1)], np.max(self.deflection)
             raise SettingsError(
                 f"the range up to {self.rig.place(max_deflection)} leaves fewer than two points",
-                remedy=f"choose an end between {self.rig.place(least)} and {self.rig.place(most)}",
+                remedy=f"choose an end from {self.rig.place(float(second))} to {self.rig.place(float(most))}",
             )
         return self if np.all(keep) else self.select(keep)
+
+    def ranges_up_to(self, ends: Sequence[float]) -> list[Measurement]:
+        """`up_to` each of several ends (m); raises `SettingsError` for two that leave the same points, too."""
+        parts = [self.up_to(end) for end in ends]
+        for i, part in enumerate(parts):
+            for k in range(i):
+                if len(parts[k]) == len(part):
+                    both = " and ".join(self.rig.place(end) for end in (ends[k], ends[i]))
+                    last = self.rig.place(float(np.max(self.deflection)))
+                    fault = f"the ranges up to {both} hold the same readings"
+                    raise SettingsError(fault, remedy=f"give ends with readings between them; the curve ends at {last}")
+        return parts
 
     def select(self, keep: NDArray[Any]) -> Measurement:
         """The points at ``keep``, (N,) booleans or indices in order; `full_range` and the path to the last stay."""

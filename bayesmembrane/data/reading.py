@@ -29,6 +29,8 @@ LARGEST_LIFT = 20.0  # largest deflection relative to the size of the rig
 LEAST_SD = 1e-12  # N
 MOST_OF_TRAVEL = 0.8  # of the test's: what yields as much is no frame, but a wrong unit, or the film itself
 BLANK_REACHES = 0.8  # of the largest force of the test: below that it is told, for the frame is extrapolated
+FINEST_SD = 1e-7
+"""Of the largest force: a noise below it would be less than the error of a solved film."""
 NAMES_FILES = ("covariance", "blank_run")
 """Of the section of the measurement: names of files, from where the specimen file lies."""
 _USUAL = {FORCE: "N", STRESS: "MPa", LENGTH: "mm"}
@@ -51,6 +53,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
     specimen = _specimen(root.section("specimen"), rig, curve_csv.stem)
     options = root.section("measurement", required=False)
     columns, notes = curve_columns(table, rig.columns, rig.noise, PHASES if rig.has_path else {})
+    _check_width(root, rig, columns)
     rig = rig.as_read(columns)
     found = _at(table.file, rig.from_columns, columns, specimen.thickness)
     deflection, force, across = found["deflection"], found["force"], found.get("across")
@@ -74,7 +77,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
         "; ".join(o for o in origin if o),
         (*notes, *blank_notes, *rig.remarks(found), *(contradicted(motion) if motion else ())),
     )
-    if sd is not None and np.min(sd) < LEAST_SD:
+    if sd is not None and (np.min(sd) < LEAST_SD or np.max(sd) < FINEST_SD * np.max(np.abs(force))):
         fault = f"a standard deviation of {np.min(sd):g} N looks like a wrong unit"
         raise DataError(fault, options.where, "check the unit of the noise")
     measured = Measurement(
@@ -109,6 +112,16 @@ def _rig(section: TomlSection) -> Fixture:
     if not RIG_SIZES[0] <= rig.size() <= RIG_SIZES[1]:
         raise DataError(f"a rig of {rig.size():g} m looks like a wrong unit", section.where, "check the units")
     return rig
+
+
+def _check_width(root: TomlSection, rig: Fixture, columns: Mapping[str, Array]) -> None:
+    """Raise `DataError` if the noise of a stress is stated in newtons, and nothing says of what width."""
+    given, options = root.section("rig").table, root.section("measurement", required=False)
+    newtons = [name for name, quantity in rig.noise.items() if quantity == FORCE]
+    stated = [n for n in newtons if n in columns or any(split_header(k)[0] == n for k in options.table)]
+    if "nominal_stress" in rig.columns and stated and not any(split_header(k)[0] == "width" for k in given):
+        fault = f"{stated[0]} is in newtons, the readings are stresses, and no width says how the two go together"
+        raise DataError(fault, root.where, "add width_mm to [rig], or state nominal_stress_sd_MPa instead")
 
 
 def _check_kind(rig: Fixture, table: TextTable, where: str) -> None:

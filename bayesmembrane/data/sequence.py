@@ -22,7 +22,13 @@ RETURN_SPEED = 1e-3
 
 
 def read_one_after_another(curves: Sequence[str | Path], specimen: str | Path, rest: float = 0.0) -> Measurement:
-    """The tests in the files ``curves`` of the film in ``specimen``; raises what reading them and joining them does."""
+    """The tests in the files ``curves`` of the film in ``specimen``; raises what reading them and joining them does.
+
+    And `DataError` for a file that is named twice: its readings would count twice.
+    """
+    files = [Path(curve).resolve() for curve in curves]
+    if twice := next((f for f in files if files.count(f) > 1), None):
+        raise DataError("the file is named twice, and its readings would count twice", str(twice), "name it once")
     return one_after_another([read_measurement(curve, specimen) for curve in curves], rest)
 
 

@@ -145,7 +145,8 @@ class TomlSection:
                 factor(key[len(name) + 1 :], quantity, f"{self.where}, {key}")
 
     def _like(self, key: str) -> str:
-        nearest = difflib.get_close_matches(key, self.table, n=1, cutoff=0.6)
+        unread = [k for k in self.table if k not in self._seen]
+        nearest = difflib.get_close_matches(key, unread, n=1, cutoff=0.6)
         return f'rename "{nearest[0]}" if that is it' if nearest else ""
 
     def _number(self, key: str) -> float:

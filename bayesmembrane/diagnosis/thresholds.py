@@ -440,6 +440,8 @@ class SaturationThresholds:
     """Of a search, at most."""
     halvings: int = 5
     """Of a step that gains nothing, at most."""
+    farthest_width: float = 8.0
+    """Standard deviations of ln(1 / p), at most: a step so long is none, as where a noise of nothing is stated."""
     largest_step: float = 0.2
     """In ln of the limit."""
     tolerance: float = 0.05

@@ -10,6 +10,7 @@ import tomli_w
 from numpy.typing import NDArray
 
 from bayesmembrane.data.published import PublishedTable
+from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.files import write_text
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.reconstruction.result import Reconstruction
@@ -20,6 +21,7 @@ STATEMENT = (
     "RECONSTRUCTED, not raw data: these forces were never printed; they are inferred from the 30 losses and 15 "
     "parameter sets that the paper prints, and from the forward model, by `bayesmembrane reconstruct`"
 )
+_SIGN = STATEMENT.partition(":")[0]
 METHOD = (
     "a loss is the Euclidean distance between measured and simulated forces, so the losses locate the measured curve; "
     "number and first position of the evenly spaced deflections are inferred too. One curve for both ranges, of one of "
@@ -33,10 +35,10 @@ LICENCE = "the inferred numbers: MIT, as the package; the printed ones are facts
 
 
 def write_reconstruction(found: Reconstruction, table: PublishedTable, folder: Path) -> tuple[Path, ...]:
-    """Write one measurement per range and one of all ranges, sorted by deflection; existing files are replaced.
+    """Write one measurement per range and one of all ranges, by deflection; those of an earlier one are replaced.
 
     Each is ``elastosil_50um_<range>.csv`` (deflection_mm, force_N, force_sd_N) with a TOML and a covariance in N^2.
-    Raises `StorageError` if the folder cannot be written.
+    Raises `StorageError` if the folder cannot be written, or a file of that name lies there that is no reconstruction.
     """
     starts = np.cumsum([0, *(r.deflection.size for r in found.ranges)])
     parts: dict[str, NDArray[np.intp]] = {
@@ -45,6 +47,8 @@ def write_reconstruction(found: Reconstruction, table: PublishedTable, folder: P
     }
     parts[WHOLE] = np.argsort(found.deflection, kind="stable")
     texts = [_texts(found, table, folder, name, order) for name, order in parts.items()]
+    for part in texts:
+        refuse_others(part)
     return tuple(write_text(path, text, "the file") for part in texts for path, text in part.items())
 
 
@@ -62,6 +66,16 @@ def _texts(
         covariance: head + _rows(matrix, "{:.9e}"),
         curve.with_suffix(".toml"): tomli_w.dumps(_description(found, table, covariance.name)),
     }
+
+
+def refuse_others(files: dict[Path, str]) -> None:
+    """Raise `StorageError` if one of these files of a measurement exists, and no TOML there says that it is ours."""
+    (toml,) = (path for path in files if path.suffix == ".toml")
+    if toml.is_file() and _SIGN in toml.read_text(encoding="utf-8", errors="replace"):
+        return
+    for path in files:
+        if path.exists():
+            raise StorageError("the file exists already, and is no reconstruction", str(path), "choose another folder")
 
 
 def _rows(values: Array, form: str) -> str:

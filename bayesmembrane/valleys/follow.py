@@ -63,7 +63,7 @@ def valleys(
 
     See `valleys_of`.
     """
-    parts = [measurement.up_to(end) for end in ranges] or [measurement]
+    parts = measurement.ranges_up_to(ranges) or [measurement]
     return valleys_of(parts, hypothesis, rise=rise, seed=seed, solve=solve)
 
 

@@ -421,6 +421,8 @@ def _held(d: Diagnosis) -> str:
 def _use_as_it_is(d: Diagnosis) -> str:
     start = f"Use {spoken(d.null.hypothesis)} over this range"
     sizes = smallest_sizes(d)[:2]
+    if d.detection.adequate and not sizes and d.power:
+        return "Measure again with less noise, or more readings: this test could not have shown any effect."
     if not d.detection.adequate or not sizes:
         return f"{start}."
     seen_from = listed(f"{title} of {size}" for title, size in sizes)

@@ -25,8 +25,14 @@ from bayesmembrane.words.hypothesis import effect_title, material_title, spoken
 from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.next_test import spoken_test
 from bayesmembrane.words.shape import shape_in_words
-from bayesmembrane.words.sizes import flagged_size, units_of
+from bayesmembrane.words.sizes import IMPLAUSIBLE, flagged_size, units_of
 from bayesmembrane.words.units import Units, read_as, size_in_words
+
+BLIND = (
+    "It could not have shown any effect of a size that occurs: beside its noise, or with so few readings, nothing "
+    "would be seen."
+)
+"""Of a measurement that is adequate whatever is there."""
 
 
 def document(found: Diagnosis) -> dict[str, Any]:
@@ -541,14 +547,20 @@ def _bounds(candidate: Candidate) -> str:
 def _power(found: Diagnosis) -> str:
     """The smallest sizes that would have shown, for the effects that are easiest to see relative to what is usual."""
     words = [f"{title} of {size}" for title, size in smallest_sizes(found)[: WORDS.visible_effects]]
-    return f"It would have shown {', '.join(words)} or more." if words else ""
+    if words:
+        return f"It would have shown {', '.join(words)} or more."
+    return BLIND if found.power else ""
 
 
 def smallest_sizes(found: Diagnosis) -> list[tuple[str, str]]:
-    """(title of an effect, the smallest size that would have shown), the easiest to see beside what is usual first."""
+    """(title of an effect, the smallest size that would have shown), the easiest to see beside what is usual first.
+
+    Sizes that do not occur would not have shown.
+    """
     known, units = components("effects"), _units(found)
     effects = {n: known[n]() for n, size in found.power.items() if np.isfinite(size)}
-    order = sorted(effects, key=lambda n: (found.power[n] / expected_size(effects[n], found.measurement), n))
+    times = {n: found.power[n] / expected_size(e, found.measurement) for n, e in effects.items()}
+    order = sorted((n for n in effects if times[n] < IMPLAUSIBLE), key=lambda n: (times[n], n))
     sizes = {n: size_in_words(found.power[n], effects[n].size.unit, units) for n in order}
     bare = {n: f" ({spoken_parameter(f'{n}.{e.size.name}')})" for n, e in effects.items() if e.size.unit == "-"}
     return [(known[n].title, f"{sizes[n]}{bare.get(n, '')}") for n in order]

@@ -44,8 +44,16 @@ def test_truncation_keeps_the_noise_block_and_the_full_range() -> None:
     assert short.full_range == m.full_range == 0.0915
     assert short.up_to(0.02).full_range == 0.0915
     assert m.up_to(0.0915) is m
-    with pytest.raises(SettingsError, match=r"up to 11 mm leaves fewer .*; choose an end between 10 mm and 91\.5 mm"):
+    with pytest.raises(SettingsError, match=r"up to 11 mm leaves fewer .*; choose an end from 20 mm to 91\.5 mm"):
         m.up_to(0.011)
+
+
+def test_ranges_that_hold_the_same_readings_are_refused() -> None:
+    m = annulus_curve([10, 20, 35.1, 91.5])
+    assert [len(part) for part in m.ranges_up_to([0.0351, 0.0915])] == [3, 4]
+    for ends in ([0.0915, 0.2], [0.04, 0.05]):
+        with pytest.raises(SettingsError, match=r"hold the same readings; .* the curve ends at 91"):
+            m.ranges_up_to(ends)
 
 
 @pytest.mark.parametrize(

@@ -270,6 +270,8 @@ def test_missing_files_and_folders(files: Files) -> None:
             "standard deviation of the force must be positive",
         ),
         ("[specimen]", "[measurement]\nforce_sd_N = 1e-30\n[specimen]", "looks like a wrong unit"),
+        ("[specimen]", "[measurement]\nforce_sd_N = 5e-8\n[specimen]", "looks like a wrong unit"),
+        ("outer_radius_mm = 35.0\n", "", "the key outer_radius_mm is missing; add it with its value"),
         ("[specimen]", "[measurement]\nforce_sd = 1\n[specimen]", "the key force_sd names no unit"),
         ("[specimen]", 'measurement = "x"\n[specimen]', '"measurement" must be a section'),
         ("[specimen]", '[measurement]\ncovariance = "no.csv"\n[specimen]', "no.csv: there is no such file"),
@@ -280,6 +282,19 @@ def test_fault_of_the_specimen_file(files: Files, old: str, new: str, said: str)
     message = files.fault(specimen=SPECIMEN.replace(old, new, 1))
     assert said in message
     assert "\n" not in message
+
+
+def test_a_noise_in_newtons_of_a_stress_needs_the_width(files: Files) -> None:
+    curve = "stretch,nominal_stress_MPa\n1.1,0.1\n1.5,0.3\n2,0.5\n"
+    strip = "[specimen]\nthickness_um = 500\n[rig]\nkind = 'uniaxial'\n"
+    noise = "[measurement]\nforce_sd_N = 0.01\n"
+    assert "no width says how the two go together" in files.fault(curve, strip + noise)
+    whole = files.read(curve, f"{strip}width_mm = 4\n{noise}")
+    assert whole.force_sd == pytest.approx(0.01)
+    assert "no width says" in files.fault(
+        "stretch,nominal_stress_MPa,force_sd_N\n1.1,0.1,0.01\n1.5,0.3,0.01\n2,0.5,0.01\n", strip
+    )
+    files.read(curve, f"{strip}[measurement]\nnominal_stress_sd_MPa = 0.002\n")
 
 
 @pytest.mark.parametrize("specimen", ["", " \r\n", "# film 1\n"])

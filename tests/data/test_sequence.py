@@ -120,6 +120,8 @@ def test_files_are_read_one_after_another_at_the_command_line(tmp_path: Path) ->
     assert len(read) == 18
     assert read.time is not None
     assert read.time[9] - read.time[8] == pytest.approx(8.0 + 60.0)  # 16 mm at 2 mm/s, and the rest
+    with pytest.raises(DataError, match="named twice, and its readings would count twice"):
+        bm.read(tmp_path / "a.csv", tmp_path / "film.toml", then=[tmp_path / "." / "a.csv"])
 
 
 def test_tests_of_one_rig_share_its_blank_run() -> None:

@@ -126,6 +126,16 @@ def test_a_wrongly_declared_family_is_not_blamed_on_the_instrument(tmp_path) -> 
     assert found.hypothesis.effects == ()
 
 
+def test_a_test_that_shows_nothing_says_so() -> None:
+    """A stated noise as large as the forces: whatever is there, a model describes the curve."""
+    m = read_measurement(shipped("elastosil_50um_op1.csv"), shipped("elastosil_50um_op1.toml"))
+    blind = replace(m, covariance=None, force_sd=np.full(len(m), 10 * float(np.max(m.force))))
+    found = diagnose(blind, hypothesis("gent"))
+    assert found.verdict == "adequate"
+    assert "It could not have shown any effect of a size that occurs" in sentence(found)
+    assert "would have shown" not in sentence(found).replace("could not have shown", "")
+
+
 def test_too_few_points_are_refused() -> None:
     few = measured(np.linspace(0.01, 0.1, 8), np.linspace(0.005, 0.04, 8))
     with pytest.raises(SettingsError, match="points"):

@@ -73,9 +73,14 @@ class Settings:
     def __post_init__(self) -> None:
         if self.sampler not in SAMPLERS:
             raise SettingsError(f'there is no sampler "{self.sampler}"', remedy=f"choose {' or '.join(SAMPLERS)}")
-        if not 0 < self.ess < np.inf or self.ensembles < 2 or self.chunk < 10 or self.most_steps < self.chunk:
+        if not 0 < self.ess < np.inf:
             raise SettingsError(
-                "sampling needs a positive, finite ESS, two ensembles, and a limit of at least one chunk of steps"
+                f"an effective sample size of {self.ess:g} cannot be reached", "ess", "give some hundreds"
+            )
+        if self.ensembles < 2 or self.chunk < 10 or self.most_steps < self.chunk:
+            raise SettingsError(
+                "sampling needs two ensembles, chunks of ten steps, and a limit of at least one chunk",
+                f"ensembles {self.ensembles}, chunk {self.chunk}, most_steps {self.most_steps}",
             )
 
 

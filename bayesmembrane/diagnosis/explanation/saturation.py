@@ -186,7 +186,8 @@ class _Point:
         x = axes.to_x(np.clip(u, np.where(axes.one_sided, np.maximum(low, 0.0), low), high))
         film = self.search.unweighed(self.film.hypothesis, x)
         by_limit = float(np.clip(c[-2] * self.prior[0], -SATURATION.largest_step, SATURATION.largest_step))
-        ln_width = SATURATION.ln_width[0] + float(c[-1]) * SATURATION.ln_width[1]
+        by_width = float(np.clip(c[-1], -SATURATION.farthest_width, SATURATION.farthest_width))
+        ln_width = SATURATION.ln_width[0] + by_width * SATURATION.ln_width[1]
         law = Saturation(self.law.limit * float(np.exp(by_limit)), float(np.exp(-ln_width)))
         return None if film is None else _Point(self.search, film, law)
 

@@ -7,18 +7,23 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import cauchy, multivariate_t, norm
 
+from bayesmembrane.calibration.fit import fit
 from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.reading import read_measurement
+from bayesmembrane.data.shipped import shipped
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, available, hidden, unsought, with_effects
 from bayesmembrane.diagnosis.candidates.evidence import log_inside
 from bayesmembrane.diagnosis.candidates.sampled import sampled
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.candidates.standard import standard
 from bayesmembrane.diagnosis.candidates.weighing import starts_with
+from bayesmembrane.diagnosis.explanation.case import Question, opened
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.form_error import form_columns, traces
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.mechanics.api import solve
 from bayesmembrane.physics.rigs.annulus import Annulus
 from tests.diagnosis.curves import pulled_and_held, triangle, white_noise
 from tests.generator.film import Film
@@ -211,3 +216,15 @@ def test_of_several_fits_each_is_searched_on_as_alone() -> None:
     assert both[1].x == pytest.approx(search.polished(thought).x)
     assert both[0].x == pytest.approx(both[2].x)
     assert search.all_polished([]) == []
+
+
+def test_what_a_model_leaves_at_best_is_no_less_than_it_can_leave() -> None:
+    """Gent beside a curve that softens: its limit is far, and going on from there would leave half of what it can."""
+    m = read_measurement(shipped("elastosil_50um_op1.csv"), shipped("elastosil_50um_op1.toml"))
+    case = opened(m, Question(hypothesis("gent")), 0, solve, lambda _: None)
+    gent = case.plain["gent"]
+    told = case.search.adapted(gent)
+    best = fit(m, hypothesis("gent"), loss="weighted")
+    assert np.sqrt(np.mean(told**2)) == pytest.approx(best.rmse_N, rel=0.02)
+    low, high = np.array([p.bounds for p in gent.hypothesis.parameters[: gent.x.size]]).T
+    assert np.all((gent.x >= low) & (gent.x <= high))
