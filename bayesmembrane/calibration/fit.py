@@ -94,6 +94,13 @@ class Fit(Showable):
         mode = own if own.restricts else REACHED
         return bool(mode.holds(self.margins[mode.name]))
 
+    @property
+    def shear_modulus(self) -> float:
+        """Pa, the initial one: G d over the thickness; nan where that is not known."""
+        material = self.hypothesis.material
+        fields = [self.parameters[f"{material.name}.{n}"].value for n in material.field_names()]
+        return float(np.ravel(material.shear_modulus(np.array(fields)[:, None]))[0]) / self.thickness
+
     def summary(self) -> dict[str, Any]:
         """Plain values for the JSON answer of ``fit``; parameters under their short names."""
         material = f"{self.hypothesis.material.name}."
@@ -102,6 +109,7 @@ class Fit(Showable):
             "material": self.hypothesis.material.name,
             "loss": self.loss,
             "parameters": short,
+            "shear_modulus_Pa": self.shear_modulus if np.isfinite(self.thickness) else None,
             "rmse_N": self.rmse_N,
             "loss_N": self.loss_N,
             "max_N": self.max_N,

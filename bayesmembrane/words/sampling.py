@@ -7,13 +7,16 @@ from typing import Any
 from bayesmembrane.calibration.quality import RULED_OUT, Quality
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.calibration.sampling.convergence import LEAST_TAUS
+from bayesmembrane.words.elastomer import stiffness_sentence
+from bayesmembrane.words.moved import modulus_of
 from bayesmembrane.words.units import SCALES, Units, read_as, size_in_words
 
 
 def document(run: Run) -> dict[str, Any]:
     """The JSON answer of ``sample``: what was stored, and what a reader must know before trusting it."""
     shown = run.measurement.rig.shown(run.measurement.specimen.thickness)
-    return {**run.summary(), "read_as": read_as(shown), "sentences": list(sentences(run.quality, shown))}
+    said = [*sentences(run.quality, shown), stiffness_sentence(1e6 * modulus_of(run)[0])]
+    return {**run.summary(), "read_as": read_as(shown), "sentences": [s for s in said if s]}
 
 
 def sentences(quality: Quality, shown: Units = SCALES) -> tuple[str, ...]:

@@ -67,6 +67,7 @@ def show_jointly(found: JointFit) -> None:
 
 def show(found: Fit, title: str) -> None:
     """Parameters, residuals and what limits them, on the terminal."""
+    from bayesmembrane.words.elastomer import stiffness_sentence
     from bayesmembrane.words.seen import seen_by_fit
 
     rows = [
@@ -77,6 +78,8 @@ def show(found: Fit, title: str) -> None:
     rms, largest = how.loss(found.rmse_N), how.loss(found.max_N)
     say(f"Loss {how.loss(found.loss_N, 5)}, rms residual {rms}, largest {largest}.")
     say(f"The energy is {'' if found.convex else 'not '}convex where the film goes. Status: {found.status}.")
+    if doubt := stiffness_sentence(found.shear_modulus):
+        say(doubt)
     if found.at_bound:
         say(f"No optimum inside the bounds for {', '.join(found.at_bound)}: the loss falls, or is flat, up to it.")
     if found.constrained is not None and found.constrained is not found:
