@@ -19,7 +19,8 @@ from bayesmembrane.ground.errors import DataError, SettingsError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.units import FORCE
 
-_WORDS = re.compile(r"SetName|Time_S\b.*(?:Force_m?N|Displacement_[um]m)|[XY]Force_m?N", re.IGNORECASE)
+_WORDS = re.compile(r"SetName|Time_S\b.*(?:Force_m?N|Displacement_[um]m)|[XY]Force_m?N")
+"""As they are spelt there: ``time_s,deflection_mm,force_N`` is this program's own."""
 _TWO = re.compile(r"XForce_\w+.*YForce_\w+|YForce_\w+.*XForce_\w+", re.IGNORECASE)
 
 

@@ -51,6 +51,10 @@ def test_every_spelling_gives_the_same_curve(
     assert written.curve.read_text() == "deflection_mm,force_N\n5.5,0.03025\n10,0.2005\n20,0.95\n"
 
 
+def test_the_layout_is_called_its_own_and_no_machine_s(tmp_path: Path) -> None:
+    assert imported(tmp_path, "time_s,deflection_mm,force_N\n0,1,0.1\n1,2,0.3\n2,3,0.6\n").importer == "csv_toml"
+
+
 def test_times_noise_and_other_columns(tmp_path: Path) -> None:
     content = "time_min;deflection_µm;force_N;force_sd_mN;remark\n0;1000;0,1;4;a\n0,5;2000;0,2;4;b\n"
     written = imported(tmp_path, content.encode("cp1252"))
