@@ -42,8 +42,8 @@ SAMPLED: dict[str, tuple[str, float, int, str]] = {
 REFUSED: dict[str, tuple[str, int, str]] = {
     "no folder": ("fit --out /dev/null/x", 1, "/dev/null/x"),
     "seed": ("fit --seed -1", 2, "--seed"),
-    "endless": ("sample --ess inf", 1, "a positive, finite ESS"),
-    "no number": ("sample --ess nan", 1, "a positive, finite ESS"),
+    "endless": ("sample --ess inf", 1, "an effective sample size of"),
+    "no number": ("sample --ess nan", 1, "an effective sample size of"),
 }
 
 # Each of these goes the way of another one.
