@@ -22,12 +22,12 @@ from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.noise.white import White
-from bayesmembrane.report.blocks import Column
+from bayesmembrane.report.blocks import Column, Value
 from bayesmembrane.report.canvas import Measured
 from bayesmembrane.words.calibration import LOOSE, Case
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import spoken_parameter
-from bayesmembrane.words.seen import Seen, alike, seen_on
+from bayesmembrane.words.seen import Seen, in_one_unit, seen_on
 
 USUAL = White.name
 
@@ -246,15 +246,21 @@ def cases(shown: Sequence[Shown]) -> list[Case]:
 
 def end_column(shown: Sequence[Shown]) -> Column:
     """How far runs were fitted, in a table; the values are those of `ends`."""
-    how = alike(s.how for s in shown)
+    if _mixed(shown):
+        return Column("end", "fitted up to")
+    how = shown[0].how
     unit = how.travel if how.bare else how.travel_scale[1]
     return Column(f"end_{unit}", f"fitted up to ({unit})")
 
 
-def ends(shown: Sequence[Shown]) -> list[float]:
-    """The largest fitted deflection or stretch of each."""
-    how = alike(s.how for s in shown)
-    return [how.rest + how.travel_scale[0] * s.digest.end for s in shown]
+def ends(shown: Sequence[Shown]) -> list[Value]:
+    """The largest fitted deflection or stretch of each; in words with its unit where they are not read in one."""
+    mixed = _mixed(shown)
+    return [s.end if mixed else s.how.rest + s.how.travel_scale[0] * s.digest.end for s in shown]
+
+
+def _mixed(shown: Sequence[Shown]) -> bool:
+    return len(in_one_unit(shown, lambda s: s.how)) > 1
 
 
 def in_order(shown: Sequence[Shown]) -> list[Shown]:

@@ -15,7 +15,7 @@ from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import digits, interval, listed, millimetres, percent, spoken_parameter
-from bayesmembrane.words.seen import DISC, Seen, alike, seen_by_fit
+from bayesmembrane.words.seen import DISC, Seen, in_one_unit, seen_by_fit
 
 P_VALUE = 0.01
 """Below this the residuals are larger than the measurement's own noise allows."""
@@ -324,14 +324,18 @@ def held_out(name: str, residual: Array, how: Seen = DISC) -> str:
 
 def overview(cases: Sequence[Case]) -> str:
     """How many calibrations there are, of what, and over which ranges."""
-    ends = sorted({c.end for c in cases})
     materials = list(dict.fromkeys(c.name for c in cases))
     runs = f"{len(cases)} calibrations" if len(cases) > 1 else "One calibration"
-    how = alike(c.how for c in cases)
-    if how.bare:
-        return f"{runs}: {listed(materials)}, fitted up to {listed(how.place(e) for e in ends)}."
-    reach = f"{listed(f'{1e3 * e:.4g}' for e in ends)} mm of deflection"
-    return f"{runs}: {listed(materials)}, fitted up to {reach}."
+    told = [_reached(group) for group in in_one_unit(sorted(cases, key=lambda c: c.end), lambda c: c.how)]
+    return f"{runs}: {listed(materials)}, fitted up to {listed(told)}."
+
+
+def _reached(cases: Sequence[Case]) -> str:
+    """How far runs that are read in the same units were fitted: ``15 and 35 mm of deflection``."""
+    if cases[0].how.bare:
+        return listed(dict.fromkeys(c.how.place(c.end) for c in cases))
+    ends = dict.fromkeys(c.end for c in cases)
+    return f"{listed(f'{1e3 * e:.4g}' for e in ends)} mm of deflection"
 
 
 VERDICTS = {"adequate": "describes the curve", "strained": "close, not within noise", "misses": "misses something"}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement
@@ -16,6 +16,8 @@ from bayesmembrane.words.language import digits, newtons, three_digits
 if TYPE_CHECKING:
     from bayesmembrane.calibration.fit import Fit
     from bayesmembrane.valleys.result import Valley
+
+Kind = TypeVar("Kind")
 
 MEASURED = "measured"
 FORCE = "force"
@@ -52,6 +54,11 @@ class Seen:
     def bare(self) -> bool:
         """True if deflections are seen as numbers without a unit: stretch, compression, shear."""
         return self.travel_scale[1] == BARE
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """What is on the axes, and in which units: two strips have the same, however thick they are."""
+        return self.travel, self.travel_scale[1], self.load, self.load_scale[1], self.small[1]
 
     def along(self, deflection: Array) -> Array:
         """(N,) what is on the horizontal axis."""
@@ -112,11 +119,15 @@ DISC = Seen("deflection", (1e3, "mm"), 0.0, "force", (1.0, "N"), (1e3, "mN"))
 """A lifted disc, measured."""
 
 
-def alike(every: Iterable[Seen]) -> Seen:
-    """How several curves are seen in one table: as they all are, or as a lifted disc where rigs differ."""
-    first, *others = every
-    same = all((o.travel_scale, o.rest, o.small) == (first.travel_scale, first.rest, first.small) for o in others)
-    return first if same else DISC
+def in_one_unit(every: Iterable[Kind], how: Callable[[Kind], Seen]) -> list[list[Kind]]:
+    """Those that one table or picture can show, together: all that are read in the same units, by ``how`` each is seen.
+
+    The groups are in the order of their first, and each value is still to be shown by the factors of its own test.
+    """
+    groups: dict[tuple[str, ...], list[Kind]] = {}
+    for one in every:
+        groups.setdefault(how(one).units, []).append(one)
+    return list(groups.values())
 
 
 def seen_on(rig: Fixture, thickness: float, origin: str = "") -> Seen:

@@ -6,8 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.words import calibration as sentences
 from bayesmembrane.words.calibration import Case
+from bayesmembrane.words.seen import seen_on
 
 GOOD = Case(
     name="Yeoh",
@@ -50,6 +52,12 @@ def test_the_answer_for_two_ranges_has_at_most_five_sentences_and_the_rest_is_in
     assert told[0].startswith("Up to 35.1 mm")
     assert told[1].startswith("Up to 91.5 mm")
     assert not set(told) & set(sentences.details([GOOD, BAD, *long]))
+
+
+def test_ranges_of_films_and_strips_are_told_in_their_own_units() -> None:
+    strip = replace(GOOD, end=0.075, how=seen_on(Uniaxial(), 50e-6))
+    told = sentences.overview([strip, GOOD, replace(GOOD, end=0.0915)])
+    assert told.endswith("fitted up to 35.1 and 91.5 mm of deflection and a stretch of 2.5.")
 
 
 def test_extra_noise_that_dominates_means_that_the_model_misses_something() -> None:

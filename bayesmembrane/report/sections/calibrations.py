@@ -23,7 +23,7 @@ from bayesmembrane.words.beside_paper import LossPair, losses
 from bayesmembrane.words.calibration import answer, details, overview, verdict
 from bayesmembrane.words.hypothesis import material_title
 from bayesmembrane.words.language import listed, millimetres, spoken_parameter
-from bayesmembrane.words.seen import alike
+from bayesmembrane.words.seen import in_one_unit
 
 
 class CalibrationsSection(Section):
@@ -42,15 +42,15 @@ class CalibrationsSection(Section):
         beside = sorted(of_kind(results, Compared), key=lambda c: (c.material, c.end))
         out: list[Block] = []
         if shown:
-            out += [*points(details(cases(shown))), fits_table(shown)]
+            out += [*points(details(cases(shown))), *map(fits_table, in_one_unit(shown, lambda s: s.how))]
         if beside:
             told = losses(
                 [LossPair(material_title(c.material), f"the range {_up_to(c)}", c.ours, c.evaluated) for c in beside]
             )
             out += [*([Text(told)] if told else []), losses_table(beside)]
         for _, group in groupby(sorted(shown, key=lambda s: s.hypothesis.label()), lambda s: s.hypothesis.label()):
-            runs = sorted(group, key=lambda s: s.digest.end)
-            out += [_forest(runs)] if len(runs) > 1 else []
+            every = in_one_unit(sorted(group, key=lambda s: s.digest.end), lambda s: s.how)
+            out += [_forest(runs) for runs in every if len(runs) > 1]
         return out
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
@@ -86,9 +86,8 @@ def refuted(shown: Sequence[Shown], loops: Sequence[Loop]) -> list[str]:
 
 
 def fits_table(shown: Sequence[Shown]) -> Table:
-    """How well each run's curve fits, judged by the measurement's own noise."""
-    how = alike(s.how for s in shown)
-    (small, unit), (large, whole) = how.small, how.load_scale
+    """How well each run's curve fits, judged by the measurement's own noise; all are read in the same units."""
+    unit, whole = shown[0].how.small[1], shown[0].how.load_scale[1]
     columns = (
         Column("run", "material"),
         end_column(shown),
@@ -105,7 +104,7 @@ def fits_table(shown: Sequence[Shown]) -> Table:
     )
     rows = []
     for s, end in zip(shown, ends(shown), strict=True):
-        fit, case = s.goodness, s.case
+        fit, case, small, large = s.goodness, s.case, s.how.small[0], s.how.load_scale[0]
         rows.append(
             (
                 s.name,
@@ -176,11 +175,8 @@ def losses_table(compared: Sequence[Compared]) -> Table:
 
 def _forest(runs: Sequence[Shown]) -> Figure:
     h = runs[0].hypothesis
-    parameters = {
-        name: [Interval(s.end, s.look, np.quantile(s.natural[:, i], (0.05, 0.5, 0.95))) for s in runs]
-        for i, name in enumerate(h.natural_names)
-    }
-    units = dict(zip(h.natural_names, h.natural_units, strict=True))
+    parameters = {name: [_interval(s, i) for s in runs] for i, name in enumerate(h.natural_names)}
+    units = {n: runs[0].read_as(n, u)[1] for n, u in zip(h.natural_names, h.natural_units, strict=True)}
     reach = listed(s.end for s in runs)
     names = listed(f"{spoken_parameter(n)} ({units[n]})" for n in parameters)
     return Figure(
@@ -189,6 +185,12 @@ def _forest(runs: Sequence[Shown]) -> Figure:
         caption=f"{runs[0].name}: medians and 90 % intervals of {names}, fitted up to {reach}. Intervals that do not "
         "overlap say that one set of parameters cannot serve both ranges.",
     )
+
+
+def _interval(s: Shown, i: int) -> Interval:
+    """The 90 % interval of one natural parameter, as people read it."""
+    factor, _ = s.read_as(s.hypothesis.natural_names[i], s.hypothesis.natural_units[i])
+    return Interval(s.end, s.look, factor * np.quantile(s.natural[:, i], (0.05, 0.5, 0.95)))
 
 
 def forest_picture(

@@ -11,7 +11,7 @@ from bayesmembrane.report.blocks import Block, Column, Table, Value
 from bayesmembrane.report.runs import Shown, end_column, ends, in_order
 from bayesmembrane.report.sections.base import Section, of_kind
 from bayesmembrane.words.calibration import disagreement
-from bayesmembrane.words.seen import alike
+from bayesmembrane.words.seen import in_one_unit
 
 MODES = tuple(m.name for m in RESTRICTING)
 
@@ -25,7 +25,10 @@ class ChecksSection(Section):
 
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
         shown = in_order(of_kind(results, Shown))
-        return [crosscheck_table(shown), masses_table(shown), outcomes_table(shown)] if shown else ()
+        if not shown:
+            return ()
+        checks = [crosscheck_table(group) for group in in_one_unit(shown, lambda s: s.how)]
+        return [*checks, masses_table(shown), outcomes_table(shown)]
 
     def warnings(self, results: Sequence[Any]) -> Sequence[str]:
         told = []
@@ -64,8 +67,8 @@ def masses_table(shown: Sequence[Shown]) -> Table:
 
 
 def crosscheck_table(shown: Sequence[Shown]) -> Table:
-    """What the second solver found."""
-    how = alike(s.how for s in shown)
+    """What the second solver found, of runs that are read in the same units."""
+    how = shown[0].how
     unit = how.travel if how.bare else how.travel_scale[1]
     columns = (
         Column("run", "material"),

@@ -11,14 +11,14 @@ from matplotlib.axes import Axes
 
 from bayesmembrane.calibration.fit import Fit
 from bayesmembrane.ground.stored import read
-from bayesmembrane.report.blocks import Block, Column, Figure, Picture, Table, points
+from bayesmembrane.report.blocks import Block, Column, Figure, Picture, Table, Value, points
 from bayesmembrane.report.canvas import encoded, new_figure, style
 from bayesmembrane.report.sections.base import Glance, Section, Subject, of_kind
 from bayesmembrane.report.style import FAINT, colour, linestyle, marker
 from bayesmembrane.words.calibration import fit_sentence
 from bayesmembrane.words.hypothesis import spoken, spoken_apart
 from bayesmembrane.words.language import listed, spoken_parameter
-from bayesmembrane.words.seen import Seen, alike, seen_by_fit
+from bayesmembrane.words.seen import in_one_unit, seen_by_fit
 
 
 class FitsSection(Section):
@@ -37,15 +37,9 @@ class FitsSection(Section):
         fits = of_kind(results, Fit)
         if not fits:
             return ()
-        how = _seen(fits)
-        figure = Figure(
-            curves_picture(fits),
-            alt=f"Fitted {how.load} against {how.travel} by {listed(_names(fits))}",
-            caption=f"Fitted {how.load_label} against {how.travel_label} at the points of the test, one panel for each "
-            f"range; the legend tells the root mean square of {how.origin} minus fitted {how.load}.",
-        )
+        curves = [b for group in in_one_unit(fits, seen_by_fit) for b in (optima_table(group), _figure(group))]
         tables = [parameters_table(f, number if len(fits) > 1 else 0) for number, f in enumerate(fits, 1)]
-        return [*points([fit_sentence(f) for f in fits]), optima_table(fits), figure, *tables]
+        return [*points([fit_sentence(f) for f in fits]), *curves, *tables]
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
         return [fit_sentence(f) for f in of_kind(results, Fit)]
@@ -73,47 +67,56 @@ def _end(f: Fit) -> str:
     return seen_by_fit(f).place(float(np.max(f.deflection)))
 
 
-def _seen(fits: Sequence[Fit]) -> Seen:
-    """How the curves of all are seen in one table and one picture."""
-    return alike([seen_by_fit(f) for f in fits])
+def _figure(fits: Sequence[Fit]) -> Figure:
+    """The fitted curves of fits that are read in the same units."""
+    how = seen_by_fit(fits[0])
+    return Figure(
+        curves_picture(fits),
+        alt=f"Fitted {how.load} against {how.travel} by {listed(_names(fits))}",
+        caption=f"Fitted {how.load_label} against {how.travel_label} at the points of the test, one panel for each "
+        f"range; the legend tells the root mean square of {how.origin} minus fitted {how.load}.",
+    )
 
 
 def optima_table(fits: Sequence[Fit]) -> Table:
-    """One row for each fit."""
-    how = _seen(fits)
-    load, small = how.load_scale, how.small
+    """One row for each fit; all are read in the same units."""
+    how = seen_by_fit(fits[0])
+    load, small = how.load_scale[1], how.small[1]
     columns = (
         Column("model", "model"),
         Column("end_mm" if not how.bare else "end", f"fitted up to, {how.travel_label}"),
         Column("loss", "loss"),
-        Column(f"loss_{load[1]}", f"loss ({load[1]})"),
-        Column(f"rmse_{small[1]}", f"rms residual ({small[1]})", ".3g"),
-        Column(f"max_{small[1]}", f"largest residual ({small[1]})", ".3g"),
-        Column(f"convex_loss_{load[1]}", f"loss under the convexity prior ({load[1]})"),
+        Column(f"loss_{load}", f"loss ({load})"),
+        Column(f"rmse_{small}", f"rms residual ({small})", ".3g"),
+        Column(f"max_{small}", f"largest residual ({small})", ".3g"),
+        Column(f"convex_loss_{load}", f"loss under the convexity prior ({load})"),
         Column("convex", "convex"),
         Column("at_bound", "at a bound"),
         Column("status", "status"),
     )
-    rows = tuple(
-        (
-            spoken(f.hypothesis),
-            float(np.max(how.along(f.deflection))),
-            f.loss,
-            load[0] * f.loss_N,
-            small[0] * f.rmse_N,
-            small[0] * f.max_N,
-            load[0] * f.constrained.loss_N if f.constrained is not None else None,
-            f.convex,
-            ", ".join(spoken_parameter(n) for n in f.at_bound) or None,
-            f.status,
-        )
-        for f in fits
-    )
+    rows = tuple(map(_optimum, fits))
     caption = (
         f"Optima of each model: losses are Euclidean norms of {how.origin} minus computed {how.load_label}."
         " Convex: whether the energy meets the convexity prior where the film goes."
     )
     return Table("optima", caption, columns, rows).without_empty()
+
+
+def _optimum(f: Fit) -> tuple[Value, ...]:
+    how = seen_by_fit(f)
+    load, small = how.load_scale[0], how.small[0]
+    return (
+        spoken(f.hypothesis),
+        float(np.max(how.along(f.deflection))),
+        f.loss,
+        load * f.loss_N,
+        small * f.rmse_N,
+        small * f.max_N,
+        load * f.constrained.loss_N if f.constrained is not None else None,
+        f.convex,
+        ", ".join(spoken_parameter(n) for n in f.at_bound) or None,
+        f.status,
+    )
 
 
 def parameters_table(f: Fit, number: int) -> Table:
@@ -143,28 +146,31 @@ def parameters_table(f: Fit, number: int) -> Table:
 
 
 def curves_picture(fits: Sequence[Fit], kind: str = "svg") -> Picture:
-    """The fitted curves, one panel for each range: curves over different points do not belong into one."""
-    how = _seen(fits)
+    """The fitted curves, one panel for each range: curves over different points do not belong into one.
+
+    All are read in the same units.
+    """
+    how = seen_by_fit(fits[0])
     ends = list(dict.fromkeys(_end(f) for f in fits))
     with style():
         figure = new_figure(4.2 * len(ends))
         panels = figure.subplots(len(ends), 1, squeeze=False)[:, 0]
         for ax, end in zip(panels, ends, strict=True):
             own = [f for f in fits if _end(f) == end]
-            _curves(ax, own, how)
+            _curves(ax, own)
             if len(ends) > 1:
                 ax.set_title(f"Fitted up to {end}")
             ax.set_ylabel(how.load_label)
-            ax.set_xlim(left=min([how.rest, *(float(np.min(how.along(f.deflection))) for f in own)]))
+            ax.set_xlim(left=min([how.rest, *(float(np.min(seen_by_fit(f).along(f.deflection))) for f in own)]))
             ax.grid(color=FAINT, linewidth=0.6)
             ax.legend(loc="upper left")
         panels[-1].set_xlabel(how.travel_label)
         return encoded(figure, kind)
 
 
-def _curves(ax: Axes, fits: Sequence[Fit], how: Seen) -> None:
+def _curves(ax: Axes, fits: Sequence[Fit]) -> None:
     for name, f in zip(spoken_apart([f.hypothesis for f in fits]), fits, strict=True):
-        material = f.hypothesis.material.name
+        material, how = f.hypothesis.material.name, seen_by_fit(f)
         path = f.rig is None or f.rig.has_path
         ax.plot(
             how.along(f.deflection),

@@ -54,6 +54,19 @@ def test_a_strip_is_told_in_stretch_and_stress(tmp_path: Path) -> None:
     assert " mm" not in page
 
 
+def test_a_film_and_strips_on_one_page_keep_their_own_units(tmp_path: Path) -> None:
+    strip = replace(fitted(), rig=Uniaxial(length=0.05, width=0.01), thickness=1e-3, constrained=None)
+    thick = replace(strip, thickness=4e-3, rmse_N=4 * strip.rmse_N)
+    page = without_pictures(write_report([strip, fitted(), thick], tmp_path).read_text())
+    tables = json.loads((tmp_path / TWIN).read_text())["tables"]
+    assert [row["end"] for row in tables["optima"]] == pytest.approx([1.7, 1.7])
+    assert [row["rmse_MPa"] for row in tables["optima"]] == pytest.approx([3e-4, 3e-4])  # the same stress
+    (film,) = tables["optima 2"]
+    assert (film["end_mm"], film["rmse_mN"]) == pytest.approx((35.0, 3.0))
+    assert "Fitted stress (MPa) against stretch (-)" in page
+    assert "Fitted force (N) against deflection (mm)" in page
+
+
 def test_a_bound_and_a_prior_that_is_not_met_are_said() -> None:
     found = fitted()
     held = replace(found, loss_N=0.02)

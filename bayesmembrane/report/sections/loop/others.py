@@ -11,8 +11,9 @@ from bayesmembrane.diagnosis.other_tests import OtherTest
 from bayesmembrane.report.blocks import Block, Column, Figure, Heading, Picture, Table, points
 from bayesmembrane.report.canvas import encoded, new_figure, style
 from bayesmembrane.report.style import FAINT, INK, RANGE_COLOURS
+from bayesmembrane.words.language import listed
 from bayesmembrane.words.loop import other_sentence
-from bayesmembrane.words.seen import alike, seen
+from bayesmembrane.words.seen import in_one_unit, seen
 
 BEFORE, AFTER = RANGE_COLOURS[:2]
 ACROSS = 2
@@ -26,14 +27,13 @@ def others(found: Sequence[OtherTest], end: str) -> list[Block]:
         Heading("Tests that no fit saw"),
         *points([other_sentence(f) for f in found]),
         _figure(found),
-        others_table(found, f"loop predicted{end}"),
+        *(others_table(group, f"loop predicted{end}") for group in in_one_unit(found, lambda f: seen(f.measurement))),
     ]
 
 
 def others_table(found: Sequence[OtherTest], name: str) -> Table:
-    """Errors before and after, and what the band holds."""
-    how = alike(seen(f.measurement) for f in found)
-    factor, unit = how.small
+    """Errors before and after, and what the band holds, of tests that are read in the same units."""
+    unit = seen(found[0].measurement).small[1]
     columns = (
         Column("specimen", "test"),
         Column("points", "readings", "d"),
@@ -44,6 +44,7 @@ def others_table(found: Sequence[OtherTest], name: str) -> Table:
     rows = tuple(
         (f.measurement.specimen.name, len(f.measurement), factor * f.rmse_before, factor * f.rmse_after, f.covered)
         for f in found
+        for factor in [seen(f.measurement).small[0]]
     )
     caption = (
         "Root mean squares of the readings less what was predicted: by the model as given, and by all that the "
@@ -53,12 +54,12 @@ def others_table(found: Sequence[OtherTest], name: str) -> Table:
 
 
 def _figure(found: Sequence[OtherTest]) -> Figure:
-    how = seen(found[0].measurement)
-    axes = f"{how.load.capitalize()} ({how.load_scale[1]}) over {how.travel} ({how.travel_scale[1]})"
+    every = (seen(group[0].measurement) for group in in_one_unit(found, lambda f: seen(f.measurement)))
+    axes = listed(f"{how.load_label} over {how.travel_label}" for how in every)
     return Figure(
         others_picture(found),
         "Readings of other tests with the curve of the model as given and the band of all that is probable",
-        f"{axes} of tests that no fit saw.",
+        f"{axes[0].upper()}{axes[1:]} of tests that no fit saw.",
     )
 
 

@@ -19,7 +19,7 @@ from bayesmembrane.valleys.beside import Beside
 from bayesmembrane.valleys.result import Valleys
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.language import listed
-from bayesmembrane.words.seen import alike, seen_by_valley
+from bayesmembrane.words.seen import in_one_unit, seen_by_valley
 from bayesmembrane.words.valleys import document, loss_of, sentences, up_to
 
 
@@ -39,7 +39,7 @@ class ValleysSection(Section):
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
         found = _valleys(results)
         each = [b for r in results if isinstance(r, Valleys | Beside) for b in _blocks(r)]
-        return [valley_table(found), *each] if found else ()
+        return [*map(valley_table, in_one_unit(found, lambda f: seen_by_valley(f.ranges[0]))), *each]
 
     def answer(self, results: Sequence[Any]) -> Sequence[str]:
         return [s for r in results if isinstance(r, Valleys | Beside) for s in sentences(r)[:1]]
@@ -78,7 +78,7 @@ def _blocks(found: Valleys | Beside) -> list[Block]:
         )
         alt = f"Valleys of {spoken(found.without.hypothesis)} alone and of {spoken(added.hypothesis)}, side by side"
         out.append(Figure(beside_picture(found), alt, caption))
-    how = alike(map(seen_by_valley, added.ranges))
+    how = seen_by_valley(added.ranges[0])
     ends = ", ".join(how.place(v.end) for v in added.ranges)
     figure = Figure(
         valley_picture(added),

@@ -9,7 +9,7 @@ from bayesmembrane.report.blocks import Column, Table, Value
 from bayesmembrane.valleys.result import Valley, Valleys
 from bayesmembrane.words.hypothesis import spoken
 from bayesmembrane.words.next_test import ASSUMPTION, spoken_test
-from bayesmembrane.words.seen import Seen, alike, seen_by_valley
+from bayesmembrane.words.seen import seen_by_valley
 from bayesmembrane.words.valleys import limit_title, up_to
 
 TESTS = 5
@@ -27,17 +27,18 @@ _COLUMNS = (
 
 
 def valley_table(found: Sequence[Valleys]) -> Table:
-    """One row per material and range."""
-    how = alike(seen_by_valley(v) for f in found for v in f.ranges)
+    """One row per material and range; all are read in the same units."""
+    how = seen_by_valley(found[0].ranges[0])
     columns = (
         Column("material", "material"),
         Column(
-            "end_mm", f"fitted up to ({how.travel_scale[1]})" if not how.bare else f"fitted up to a {how.travel} of"
+            "end" if how.bare else "end_mm",
+            f"fitted up to ({how.travel_scale[1]})" if not how.bare else f"fitted up to a {how.travel} of",
         ),
-        Column("loss_N", f"least loss ({how.load_scale[1]})"),
+        Column(f"loss_{how.load_scale[1]}", f"least loss ({how.load_scale[1]})"),
         *_COLUMNS,
     )
-    rows = tuple(_row(v, how) for f in found for v in f.ranges)
+    rows = tuple(_row(v) for f in found for v in f.ranges)
     share = 100 * found[0].ranges[0].rise / found[0].ranges[0].best_loss
     caption = (
         f"Valleys of the loss: films on the floor that fit within {share:.3g} % of the least loss; the condition "
@@ -46,7 +47,8 @@ def valley_table(found: Sequence[Valleys]) -> Table:
     return Table("valleys", caption, columns, rows)
 
 
-def _row(v: Valley, how: Seen) -> tuple[Value, ...]:
+def _row(v: Valley) -> tuple[Value, ...]:
+    how = seen_by_valley(v)
     ends = [", ".join(f"{x:.3g}" for x in p) for p in (v.floor[0], v.floor[-1])]
     names = ", ".join(n.partition(".")[2] for n in v.chart.names)
     inside = ", ".join(p.label for p in v.published if p.within) or ("none" if v.published else "-")
