@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from bayesmembrane.calibration.joint.claim import JointTest
 from bayesmembrane.calibration.joint.fit import JointFit
 from bayesmembrane.calibration.joint.run import KIND, JointRun
-from bayesmembrane.calibration.run import has_predictions
+from bayesmembrane.calibration.run import Run, has_predictions
 from bayesmembrane.ground.parameters import Natural
 from bayesmembrane.ground.registry import components
 from bayesmembrane.ground.stored import read
@@ -23,6 +24,7 @@ from bayesmembrane.report.style import FAINT, colour
 from bayesmembrane.words.hypothesis import effect_title, material_title
 from bayesmembrane.words.joint import answer, fit_sentence, sentences
 from bayesmembrane.words.language import listed, spoken_parameter
+from bayesmembrane.words.seen import in_one_unit, seen
 
 ACROSS = 2  # pictures side by side
 
@@ -43,7 +45,7 @@ class JointSection(Section):
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
         out: list[Block] = []
         for run in of_kind(results, JointRun):
-            out += [*points([answer(run), *sentences(run)]), _posterior(run), _tests(run)]
+            out += [*points([answer(run), *sentences(run)]), _posterior(run), *_tests(run)]
             shown = _with_predictions(run)
             out += [_bands(run, shown)] if shown else []
         for fit in of_kind(results, JointFit):
@@ -119,38 +121,41 @@ def _read_as(run: JointRun, p: Natural) -> tuple[str, float, str]:
     return spoken_parameter(p.name), 1.0, p.unit
 
 
-def _tests(run: JointRun) -> Table:
-    """How well the most probable draw fits each test, by its own noise."""
+def _tests(run: JointRun) -> list[Table]:
+    """How well the most probable draw fits each test, by its own noise: a table for all that are read in one unit."""
+    every = zip(run.joint.parts, run.parts, strict=True)
+    return [_tests_table(group) for group in in_one_unit(every, lambda test: seen(test[0].measurement))]
+
+
+def _tests_table(tests: Sequence[tuple[JointTest, Run]]) -> Table:
+    unit = seen(tests[0][0].measurement).small[1]
     columns = (
         Column("test", "test"),
         Column("rig", "rig"),
         Column("points", "points", "d"),
         Column("thickness_um", "thickness (um)"),
-        Column("rmse_mN", "rms residual (mN)", PLAIN),
-        Column("own_noise_mN", "stated noise (mN)", PLAIN),
+        Column(f"rmse_{unit}", f"rms residual ({unit})", PLAIN),
+        Column(f"own_noise_{unit}", f"stated noise ({unit})", PLAIN),
         Column("reduced_chi2", "reduced chi-square", ".3g"),
         Column("p_value", "p-value", "p"),
     )
     rows = []
-    for part, found in zip(run.joint.parts, run.parts, strict=True):
+    for part, found in tests:
         g, m = found.status["goodness"], part.measurement
-        own = g["own_noise_N"]
+        factor, own = seen(m).small[0], g["own_noise_N"]
         rows.append(
             (
                 part.label,
                 m.rig.name,
                 len(m),
                 1e6 * m.specimen.thickness,
-                1e3 * g["rmse_N"],
-                None if own is None else 1e3 * own,
+                factor * g["rmse_N"],
+                None if own is None else factor * own,
                 g["reduced_chi2"],
                 g["p_value"],
             )
         )
     caption = "Every test at the most probable draw. Chi-square and p-value use the noise that the test states."
-    for part in run.joint.parts:
-        if not part.measurement.rig.homogeneous and (said := part.measurement.rig.remark_on_units(1.0)):
-            caption += f" {part.label}: {said}."
     return Table("joint tests", caption, columns, tuple(rows))
 
 
