@@ -1,17 +1,20 @@
 """A fit alone on a page."""
 
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from bayesmembrane.calibration.fit import Fit, FittedParameter
 from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.report.page import TWIN, write_report
+from bayesmembrane.report.sections.fits import curves_of, curves_picture, on_page
 from bayesmembrane.words.calibration import fit_sentence
 from tests.report.pages import without_pictures
 
@@ -76,6 +79,44 @@ def test_a_bound_and_a_prior_that_is_not_met_are_said() -> None:
     assert "no film that meets the convexity prior was found" in fit_sentence(
         replace(found, margins={"reached": -0.1}, constrained=None)
     )
+
+
+@pytest.mark.filterwarnings("error")
+def test_any_number_of_fits_of_one_energy_can_be_told_apart(tmp_path: Path) -> None:
+    names = [f"film-a_yeoh_35mm_fit_{i:02d}" for i in range(23)]
+    for name in names:
+        store(tmp_path / "chains" / name, "fit", fitted(), {})
+    write_report([tmp_path / "chains"], tmp_path)
+    twin = json.loads((tmp_path / TWIN).read_text())
+    assert [row["which"] for row in twin["tables"]["optima"]] == names
+    assert [row["about"] for row in twin["tables"]["glance"]] == [f"Yeoh, {name}, up to 35 mm" for name in names]
+    assert all(said.startswith(f"{name}: Yeoh fitted") for name, said in zip(names, twin["answer"], strict=True))
+
+
+def test_a_legend_has_ten_lines_that_look_apart_and_says_how_many_more_there_are() -> None:
+    other = replace(fitted(), hypothesis=hypothesis("gent"))
+    shown = curves_of(on_page([*[fitted()] * 30, other]))
+    told, more = [c for c in shown if c.look is not None], [c for c in shown if c.look is None]
+    assert len(told) == 10
+    assert len({c.look for c in told}) == len({c.label for c in told}) == 10
+    assert "Gent (rms 3.00 mN)" in [c.label for c in told]  # an energy of its own comes before a tenth of the same
+    assert [c.label for c in more if c.label] == ["21 more, which the table lists"]
+
+
+def test_fits_that_were_asked_otherwise_are_told_apart_by_that() -> None:
+    one, free = fitted(), replace(fitted(), hypothesis=hypothesis("yeoh", convexity="none"))
+    assert [f.name for f in on_page([one, free])] == ["Yeoh, white, reached", "Yeoh, white, none"]
+    assert [f.name for f in on_page([one, fitted()])] == ["Yeoh, fit 1", "Yeoh, fit 2"]
+
+
+def test_a_panel_of_many_fits_is_as_high_as_one_of_few() -> None:
+    def axes_height(fits: list[Fit]) -> float:
+        pixels = imread(io.BytesIO(curves_picture(on_page(fits), "png").data))[:, :, :3]
+        dark = np.mean(pixels.sum(axis=2) < 1.5, axis=0)  # of each column: the axis is the darkest
+        return float(np.max(dark)) * len(pixels)
+
+    few, many = axes_height([fitted()]), axes_height([fitted() for _ in range(30)])
+    assert many > 0.8 * few
 
 
 def test_a_fit_that_found_nothing_says_why(tmp_path: Path) -> None:
