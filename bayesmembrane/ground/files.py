@@ -72,6 +72,15 @@ def ensure_writable(folder: Path, what: str = "the answer") -> None:
         raise unwritable(what, folder, error) from None
 
 
+def check_folder(folder: Path) -> None:
+    """Raise `StorageError` unless something can be read in the folder: it is not there, or a file."""
+    if folder.is_dir():
+        return
+    if folder.exists():
+        raise StorageError("this is a file and no folder", str(folder), "name the folder that holds it")
+    raise StorageError("there is no such folder", str(folder), "name one that holds stored answers, as chains/ does")
+
+
 def remove_parts(folder: Path, name: str) -> None:
     """Remove what a process that was killed left of files called ``name`` (a pattern) while it wrote them.
 

@@ -105,6 +105,12 @@ def answer_folders(place: Path) -> list[Path]:
     return [folder for folder in (place, *inner) if stored_kinds(folder)]
 
 
+def damaged_answers(place: Path) -> list[Path]:
+    """Documents in ``place``, or right under it, beside arrays of their name, that do not begin as an answer does."""
+    found = sorted([*Path(place).glob("*.json"), *Path(place).glob("*/*.json")])
+    return [path for path in found if path.with_suffix(".npz").is_file() and not _begins(path)]
+
+
 def _files(folder: Path, kind: str) -> tuple[Path, Path]:
     return folder / f"{kind}.json", folder / f"{kind}.npz"
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.ground.errors import BayesmembraneError, SettingsError, StorageError
-from bayesmembrane.ground.files import write_text
+from bayesmembrane.ground.files import check_folder, write_text
 from bayesmembrane.ground.jobs import Submit, Tell
 from bayesmembrane.ground.plain import json_text
 from bayesmembrane.ground.registry import components
@@ -214,10 +214,7 @@ def gathered(found: Sequence[Any]) -> Gathered:
 
 def _stored(folder: Path, every: Sequence[Section], faults: list[tuple[Path, BayesmembraneError]]) -> list[Any]:
     """All that the sections read from a folder and from those right under it; what cannot be read joins ``faults``."""
-    if not folder.is_dir():
-        raise StorageError(
-            "there is no such folder", str(folder), "name one that holds stored answers, as chains/ does"
-        )
+    check_folder(folder)
     places = [folder, *sorted(p for p in folder.iterdir() if p.is_dir())]
     results, before = [], len(faults)
     for place, section in ((place, section) for place in places for section in every):

@@ -205,6 +205,16 @@ def test_a_folder_without_anything_is_told(tmp_path: Path) -> None:
             lying([tmp_path / place])
 
 
+def test_what_lies_there_and_cannot_be_read_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    for name in ("fit.json", "fit.npz"):
+        (tmp_path / "a" / name).write_text("garbage")
+    with pytest.raises(StorageError, match=r"cannot be read: a/fit.json; compute it again"):
+        lying([tmp_path])
+    with pytest.raises(StorageError, match="this is a file and no folder"):
+        lying([tmp_path / "a" / "fit.json"])
+
+
 def test_what_is_no_result_has_no_document() -> None:
     with pytest.raises(SettingsError, match="a float is no result"):
         bm.as_dict(3.0)

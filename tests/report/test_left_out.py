@@ -82,6 +82,10 @@ def strange_run(folder: Path) -> None:
     path.write_text(path.read_text().replace('"neo_hookean"', '"isihara"'))
 
 
+def without_its_question(folder: Path) -> None:
+    (folder / "run.toml").unlink()
+
+
 def unpredicted(folder: Path) -> None:
     (folder / FILE).unlink()
 
@@ -91,6 +95,7 @@ RUNS = {
     without_draws: "the run is damaged",
     older_run: "another version wrote the run",
     strange_run: 'no material called "isihara"',
+    without_its_question: "run.toml is missing",
     unpredicted: "ask for the same again",
 }
 
@@ -165,6 +170,24 @@ def test_the_command_says_it_on_stderr_and_in_its_answer(
     out, err = capsys.readouterr()
     (sentence,) = json.loads(out)["left_out"]
     assert " ".join(err.split()) == sentence
+
+
+def test_the_command_says_what_cannot_be_read_and_what_is_no_folder(tmp_path: Path, fitted: Fit, stored: Run) -> None:
+    from bayesmembrane.app.options import OutputOptions
+
+    garbage = store(tmp_path / "odd" / "a", "fit", fitted, {}) / "fit.json"
+    garbage.write_text("garbage")
+    spoilt(without_its_question, tmp_path / "old", fitted, stored)
+    wrong = {
+        tmp_path / "odd": rf"{re.escape(str(garbage))}: the stored fit cannot be read \(it is no whole JSON document\)",
+        tmp_path / "old": r"old/without_its_question: the run cannot be read \(run.toml is missing\)",
+        tmp_path / "absent": "absent: there is no such folder",
+        garbage: "fit.json: this is a file and no folder",
+    }
+    for place, said in wrong.items():
+        with pytest.raises(StorageError, match=said):
+            report_verb.verb([place], OutputOptions(as_json=True, seed=0), tmp_path / "page", None)
+    assert not (tmp_path / "page").exists()
 
 
 # ---- nothing is solved -----------------------------------------------------------------------------------------------

@@ -22,14 +22,14 @@ def verb(
     title: Annotated[str | None, typer.Option(help="Title of the page.")] = None,
 ) -> None:
     """One self-contained HTML page about whatever answers and runs lie there."""
-    from bayesmembrane.app.folders import RUN, lying
+    from bayesmembrane.app.folders import RUN, lying_in
     from bayesmembrane.report.page import write_report
 
-    found = lying(folders)
     left_out: list[str] = []
     page = write_report(folders, page_folder, title, left_out.append)
     for sentence in left_out:
         note(sentence)
+    found = list(dict.fromkeys(one for folder in folders for one in lying_in(folder)))
     document = {
         "report": str(page),
         "left_out": left_out,

@@ -13,6 +13,7 @@ import numpy as np
 from bayesmembrane.calibration import store
 from bayesmembrane.calibration.beside_paper import Compared
 from bayesmembrane.calibration.run import Run, has_predictions
+from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.report.blocks import Block, Figure, Heading, Part, Text
 from bayesmembrane.report.render import fragment
 from bayesmembrane.report.runs import Shown, in_order, reach, read
@@ -45,8 +46,12 @@ class RunSection(Section):
     shows = Run
 
     def reads(self, folder: Path) -> Any | None:
-        stored = (folder / store.ASKED).is_file() and (folder / store.STATUS).is_file()
-        return read(folder) if stored else None
+        asked, ended = (folder / store.ASKED).is_file(), (folder / store.STATUS).is_file()
+        if ended and not asked and (folder / store.POSTERIOR).is_file():
+            raise StorageError(
+                f"the run cannot be read ({store.ASKED} is missing)", str(folder), "put it back, or sample again"
+            )
+        return read(folder) if asked and ended else None
 
     def blocks(self, results: Sequence[Any]) -> Sequence[Block]:
         parts = self.parts(results)
