@@ -44,7 +44,7 @@ def _document(result: Any) -> Mapping[str, Any]:
             known = {} if result.rig is None else {"read_as": read_as(result.rig.shown(result.thickness))}
             return {**result.summary(), **known}
         case JointFit():
-            return result.summary()
+            return joint.document_of_fit(result)
         case Population():
             return {**result.summary(), "sentences": list(population.sentences(result))}
         case JointRun():

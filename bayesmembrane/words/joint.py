@@ -1,9 +1,10 @@
-"""What is said of several tests of one material, and the JSON answer of ``sample`` on them."""
+"""What is said of several tests of one material, and the JSON answers of ``sample`` and ``fit`` on them."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from bayesmembrane.calibration.joint.claim import Joint
 from bayesmembrane.calibration.joint.fit import JointFit
 from bayesmembrane.calibration.joint.run import JointRun
 from bayesmembrane.words.hypothesis import material_title
@@ -16,11 +17,21 @@ from bayesmembrane.words.sampling import (
     smooth_sentence,
 )
 from bayesmembrane.words.seen import seen
+from bayesmembrane.words.units import read_as_by_test
 
 
 def document(run: JointRun) -> dict[str, Any]:
     """The JSON answer: what was stored, and what a reader must know before trusting it."""
-    return {**run.summary(), "sentences": list(sentences(run))}
+    return {**run.summary(), "read_as": _read_as(run.joint), "sentences": list(sentences(run))}
+
+
+def document_of_fit(found: JointFit) -> dict[str, Any]:
+    """The JSON answer of ``fit`` on several tests."""
+    return {**found.summary(), "read_as": _read_as(found.joint)}
+
+
+def _read_as(joint: Joint) -> dict[str, dict[str, dict[str, float | str]]]:
+    return read_as_by_test((part.label, part.measurement) for part in joint.parts)
 
 
 def sentences(run: JointRun) -> tuple[str, ...]:

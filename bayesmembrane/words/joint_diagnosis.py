@@ -23,7 +23,7 @@ from bayesmembrane.words.hypothesis import effect_title, material_title
 from bayesmembrane.words.language import listed, spoken_parameter
 from bayesmembrane.words.seen import seen
 from bayesmembrane.words.sizes import units_of
-from bayesmembrane.words.units import read_as, size_in_words
+from bayesmembrane.words.units import read_as, read_as_by_test, size_in_words
 
 
 def document(found: JointDiagnosis) -> dict[str, Any]:
@@ -73,6 +73,7 @@ def document(found: JointDiagnosis) -> dict[str, Any]:
             }
             for t in found.tests
         },
+        "read_as": read_as_by_test((t.label, t.measurement) for t in found.tests),
     }
 
 

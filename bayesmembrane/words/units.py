@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
+from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.thresholds import WORDS
 
 Units = Mapping[str, tuple[float, str]]
@@ -20,6 +21,11 @@ NOTHING_LEFT = 1e-30
 def read_as(shown: Units) -> dict[str, dict[str, float | str]]:
     """By SI unit, the factor and the unit in which this rig's numbers are read, as plain values."""
     return {unit: {"factor": factor, "unit": name} for unit, (factor, name) in shown.items()}
+
+
+def read_as_by_test(tests: Iterable[tuple[str, Measurement]]) -> dict[str, dict[str, dict[str, float | str]]]:
+    """`read_as` of each test of a joint answer, by its label: each has a rig and a thickness of its own."""
+    return {label: read_as(m.rig.shown(m.specimen.thickness)) for label, m in tests}
 
 
 def size_in_words(value: float, unit: str, shown: Units = SCALES, null: float | None = None) -> str:

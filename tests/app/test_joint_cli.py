@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,6 +36,15 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def assert_read_as(answer: dict[str, Any], rmse: float) -> None:
+    """What is in N of a test becomes the stress that was measured: ``rmse`` N is the noise that the strip states."""
+    assert set(answer["read_as"]) == {"strip", "sheet"}
+    told = answer["read_as"]["strip"]["N"]
+    assert told["unit"] == "MPa"
+    assert told["factor"] * rmse == pytest.approx(NOISE)
+    assert answer["read_as"]["sheet"]["N"]["factor"] == pytest.approx(told["factor"] / 3)  # thrice as thick
+
+
 def test_with_and_a_project_are_the_same_question(run: Run) -> None:
     one = run(
         "fit",
@@ -55,6 +65,7 @@ def test_with_and_a_project_are_the_same_question(run: Run) -> None:
     assert answer["parameters"]["c1"]["value"] == pytest.approx(20.0, rel=0.02)
     assert answer["tests"]["sheet"]["parameters"]["c1"] == pytest.approx(60.0, rel=0.02)
     assert Path(answer["stored"]).is_dir()
+    assert_read_as(answer, rmse=answer["tests"]["strip"]["noise_N"])
 
 
 def test_an_effect_is_claimed_of_all_tests_or_of_one(run: Run) -> None:
@@ -72,6 +83,7 @@ def test_sampling_and_comparing(run: Run, short_walks: None) -> None:
     assert answer["posterior"]["c1"]["mean"] == pytest.approx(20.0, rel=0.05)
     assert set(answer["tests"]) == {"strip", "sheet"}
     assert answer["sentences"]
+    assert_read_as(answer, rmse=answer["tests"]["strip"]["goodness"]["own_noise_N"])
     code, out, err = run("report", answer["stored"], "--out", "page")
     assert code == 0, err
     assert "Stability limits" in (Path("page") / "index.html").read_text()

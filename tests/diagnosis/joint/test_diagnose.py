@@ -55,6 +55,7 @@ def test_a_fault_of_one_test_is_found_in_that_test(tmp_path) -> None:
         "error",
     }
     assert sum(answer["probabilities"]["effects"].values()) == pytest.approx(1.0)
+    assert answer["read_as"] == {label: test["read_as"] for label, test in answer["tests"].items()}
     if found.probabilities.nearly_certain():  # known, even where the whole is not
         left = sentence(replace(found, verdict="unknown", members=()))
         assert "beside offset of the deflection zero" in left
