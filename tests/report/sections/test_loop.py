@@ -16,6 +16,7 @@ from bayesmembrane.diagnosis.other_tests import predicted
 from bayesmembrane.ground.stored import store
 from bayesmembrane.next_test.further import FurtherTest, Kind
 from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from bayesmembrane.report.blocks import Figure, Points, Table, Text
 from bayesmembrane.report.page import PAGE, TWIN, write_report
 from bayesmembrane.report.runs import Shown
@@ -406,6 +407,14 @@ def test_other_tests_stand_with_their_errors_and_their_band(named: Loop) -> None
     assert other.rmse_after < 0.5 * other.rmse_before, "friction was named, and is in the prediction"
     assert len([b for b in blocks if isinstance(b, Figure)]) == 1
     assert others([], "") == []
+    pulled = replace(other, measurement=replace(other.measurement, rig=Uniaxial()))
+    blocks = others([other, pulled], "")
+    film, strip = (b for b in blocks if isinstance(b, Table))
+    factor = pulled.measurement.rig.shown(pulled.measurement.specimen.thickness)["N"][0]
+    assert film.records()[0]["after"] == pytest.approx(1e3 * other.rmse_after)
+    assert strip.records()[0]["after"] == pytest.approx(factor * other.rmse_after)
+    (figure,) = (b for b in blocks if isinstance(b, Figure))
+    assert figure.caption.startswith("Force (N) over deflection (mm) and stress (MPa) over stretch (-)")
     told = loop_words.document(replace(named, others=(other,)))["predicted"]
     assert [t["inside_90"] for t in told] == [other.covered]
     assert "no fit saw" in told[0]["sentence"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,11 @@ from bayesmembrane.ground.registry import material
 from bayesmembrane.ground.stored import store
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
+from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from bayesmembrane.report.blocks import Table
 from bayesmembrane.report.page import write_report
 from bayesmembrane.report.runs import Shown
-from bayesmembrane.report.sections.valleys import write_valleys
+from bayesmembrane.report.sections.valleys import ValleysSection, write_valleys
 from bayesmembrane.report.sections.valleys.figures import valley_picture
 from bayesmembrane.report.sections.valleys.tables import TESTS, next_table, valley_table
 from bayesmembrane.valleys.follow import valleys
@@ -60,6 +63,16 @@ def test_table_has_a_row_per_range_and_says_where_a_valley_is_open(one: Valleys,
     assert records[0]["open"] == "no"
     assert "neo-Hookean" in str(records[2]["open"])
     assert len(table.cells()[0]) == len(table.columns)
+
+
+@pytest.mark.usefixtures("blank_pictures")
+def test_valleys_of_a_film_and_of_a_strip_are_in_two_tables(two: Valleys) -> None:
+    strip = replace(two, ranges=tuple(replace(v, rig=Uniaxial(), thickness=1e-3) for v in two.ranges))
+    film, pulled = (b for b in ValleysSection().blocks([two, strip]) if isinstance(b, Table) and b.name == "valleys")
+    (one,), (other,) = film.records(), pulled.records()
+    assert one["loss_N"] == pytest.approx(two.ranges[0].best_loss)
+    assert other["loss_MPa"] == pytest.approx(0.1 * two.ranges[0].best_loss)  # 10 mm by 1 mm
+    assert (one["end_mm"], other["end"]) == pytest.approx((30.0, 1.6))
 
 
 def test_next_measurements_are_a_short_list_ordered_by_what_they_are_worth(two: Valleys) -> None:
