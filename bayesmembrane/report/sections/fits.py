@@ -238,7 +238,7 @@ def curves_picture(fits: Sequence[OnPage], kind: str = "svg") -> Picture:
 
 
 @dataclass(frozen=True)
-class Curve:
+class FitCurve:
     """A fit in a panel: how it looks, None for thin and grey; ``label`` is its line in the legend, or ""."""
 
     of: OnPage
@@ -250,7 +250,7 @@ class Curve:
         return self.of.how.along(self.of.fit.deflection)
 
 
-def curves_of(fits: Sequence[OnPage]) -> list[Curve]:
+def curves_of(fits: Sequence[OnPage]) -> list[FitCurve]:
     """The curves of a panel: `LEGEND` at most have a look, of which no two are alike, the first of each name first."""
     met = Counter[str]()
     turns = []
@@ -262,13 +262,13 @@ def curves_of(fits: Sequence[OnPage]) -> list[Curve]:
     if len(set(looks)) < len(looks):
         looks = list(PALETTE[: len(looks)])
     labels = [f"{fits[i].name} (rms {fits[i].how.force(fits[i].fit.rmse_N)})" for i in told]
-    curves = [Curve(fits[i], own, textwrap.fill(s, LONGEST)) for i, own, s in zip(told, looks, labels, strict=True)]
+    curves = [FitCurve(fits[i], own, textwrap.fill(s, LONGEST)) for i, own, s in zip(told, looks, labels, strict=True)]
     more = [f for i, f in enumerate(fits) if i not in told]
     words = f"{len(more)} more, which the table lists"
-    return curves + [Curve(f, None, "" if i else words) for i, f in enumerate(more)]
+    return curves + [FitCurve(f, None, "" if i else words) for i, f in enumerate(more)]
 
 
-def _draw(ax: Axes, curve: Curve) -> None:
+def _draw(ax: Axes, curve: FitCurve) -> None:
     f, own = curve.of.fit, curve.look
     path = f.rig is None or f.rig.has_path
     dashes: LineStyle = (0.0, own.dashes) if own is not None and own.dashes else "-"
@@ -285,7 +285,7 @@ def _draw(ax: Axes, curve: Curve) -> None:
     )
 
 
-def _legend(ax: Axes, curves: Sequence[Curve]) -> None:
+def _legend(ax: Axes, curves: Sequence[FitCurve]) -> None:
     if not _lines_below(curves):
         ax.legend(loc="upper left")
         return
@@ -293,12 +293,12 @@ def _legend(ax: Axes, curves: Sequence[Curve]) -> None:
     ax.legend(loc="upper left", bbox_to_anchor=place, borderaxespad=0.0, ncols=_columns(curves))
 
 
-def _lines_below(curves: Sequence[Curve]) -> int:
+def _lines_below(curves: Sequence[FitCurve]) -> int:
     """How many lines a legend has, if it would cover the curves; 0 if it has room among them."""
     labels = [c.label for c in curves if c.label]
     rows = -(-len(labels) // _columns(curves)) + sum(label.count("\n") for label in labels)
     return rows if len(labels) > INSIDE or max(map(len, labels)) > WIDE else 0
 
 
-def _columns(curves: Sequence[Curve]) -> int:
+def _columns(curves: Sequence[FitCurve]) -> int:
     return legend_columns([c.label for c in curves], 3)
