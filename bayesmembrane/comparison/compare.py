@@ -56,7 +56,10 @@ def ranges_of(whole: Measurement, ends: Sequence[float]) -> dict[str, Range]:
         rest = whole if len(part) < len(whole) else None
         reached = float(np.max(part.deflection))
         place = whole.rig.place(reached) if whole.rig.homogeneous else f"{1e3 * reached:.4g} mm"
-        found[f"up to {place}"] = Range(part, rest)
+        name = f"up to {place}"
+        if name in found:
+            raise SettingsError(f'two ranges would both be called "{name}"', remedy="give ends farther apart")
+        found[name] = Range(part, rest)
     return found
 
 

@@ -143,8 +143,7 @@ def _tail_index(log_ratio: Array, worth: float) -> float:
     largest = np.partition(log_ratio, -int(np.ceil(0.2 * len(log_ratio))))[-int(np.ceil(0.2 * len(log_ratio))) :]
     if np.ptp(largest) < 1e-6:
         return 0.0
-    with np.errstate(all="ignore"):  # its own fit overflows harmlessly
-        return pareto_shape(log_ratio, worth)
+    return pareto_shape(log_ratio, worth)
 
 
 def _index_sd(k: float, effective: float) -> float:

@@ -140,7 +140,8 @@ def check_lifted(columns: Mapping[str, Array], file: str, lines: Sequence[int]) 
         raise DataError(fault, file, "change the sign of the column")
     # Friction on the way back and an offset may leave most forces negative; none turns the film's pull round.
     far = deflection >= FAR * np.max(deflection)
-    if np.mean(force[far] < 0) > 0.5 and np.sum((deflection - np.mean(deflection)) * force) <= 0:
+    negative = min(np.mean(force < 0), np.mean(force[far] < 0)) > 0.5
+    if negative and np.sum((deflection - np.mean(deflection)) * force) <= 0:
         fault = "the force is negative where the disc is lifted most, and the film pulls it back with a positive one"
         raise DataError(fault, file, "change the sign of the column")
     if not np.any(columns["deflection"] > 0):

@@ -117,11 +117,12 @@ def _rig(section: TomlSection) -> Fixture:
 def _check_width(root: TomlSection, rig: Fixture, columns: Mapping[str, Array]) -> None:
     """Raise `DataError` if the noise of a stress is stated in newtons, and nothing says of what width."""
     given, options = root.section("rig").table, root.section("measurement", required=False)
-    newtons = [name for name, quantity in rig.noise.items() if quantity == FORCE]
-    stated = [n for n in newtons if n in columns or any(split_header(k)[0] == n for k in options.table)]
-    if "nominal_stress" in rig.columns and stated and not any(split_header(k)[0] == "width" for k in given):
+    newtons = ["covariance", *(name for name, quantity in rig.noise.items() if quantity == FORCE)]
+    stated = [n for n in newtons if n in columns or any(n in (k, split_header(k)[0]) for k in options.table)]
+    if STRESS in rig.columns.values() and stated and not any(split_header(k)[0] == "width" for k in given):
         fault = f"{stated[0]} is in newtons, the readings are stresses, and no width says how the two go together"
-        raise DataError(fault, root.where, "add width_mm to [rig], or state nominal_stress_sd_MPa instead")
+        instead = [f"{name}_MPa" for name, quantity in rig.noise.items() if quantity == STRESS]
+        raise DataError(fault, root.where, f"add width_mm to [rig], or state {' or '.join(instead)} instead")
 
 
 def _check_kind(rig: Fixture, table: TextTable, where: str) -> None:

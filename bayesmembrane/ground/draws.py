@@ -11,8 +11,8 @@ from scipy.special import logsumexp
 
 from bayesmembrane.ground.parameters import Array
 
-FEWEST = 25
-"""Weights of which a fifth are the five that a tail is fitted to at least."""
+FEWEST = 5
+"""Weights that a tail is fitted to at least."""
 
 
 @cache
@@ -32,7 +32,8 @@ def pareto_shape(log_weights: Array, worth: float = 1.0) -> float:
 def pareto_smoothed(log_weights: Array, worth: float = 1.0) -> tuple[Array, Array]:
     """(smoothed logarithms of weights (..., n), k-hat (...)), each sum of the weights being one.
 
-    Where the largest are all alike they are bounded, k-hat 0; of fewer than five of the largest nothing is said, inf.
+    Where the largest are all alike they are bounded, k-hat 0. Where few of them are more than nothing beside the very
+    largest, or there are fewer than five, no tail can be fitted: they stay as they are, k-hat inf.
     """
     given = np.asarray(log_weights, dtype=float)
     found = [_of_one(row, worth) for row in given.reshape(-1, given.shape[-1])]
@@ -43,10 +44,20 @@ def pareto_smoothed(log_weights: Array, worth: float = 1.0) -> tuple[Array, Arra
 def _of_one(log_weights: Array, worth: float) -> tuple[Array, float]:
     try:
         # What is asked for there is a log likelihood, whose reciprocals are the weights of leaving out.
-        smoothed, shape = _statistics().psislw(-log_weights, r_eff=worth)
+        with np.errstate(all="ignore"):  # exponentials of which all but one may vanish
+            smoothed, shape = _statistics().psislw(-log_weights, r_eff=worth)
     except ValueError:  # no tail that could be fitted
-        return log_weights - logsumexp(log_weights), 0.0 if len(log_weights) >= FEWEST else np.inf
+        return log_weights - logsumexp(log_weights), 0.0 if _alike(log_weights, worth) else np.inf
+    if np.any(np.isnan(smoothed)):  # a fit to exceedances of which a quarter vanish
+        return log_weights - logsumexp(log_weights), np.inf
     return np.asarray(smoothed, dtype=float), float(shape)
+
+
+def _alike(log_weights: Array, worth: float) -> bool:
+    """True if there are as many as make a tail, and its members are all the same."""
+    n = len(log_weights)
+    tail = int(np.ceil(min(0.2 * n, 3 * np.sqrt(n / worth))))
+    return tail >= FEWEST and bool(np.ptp(np.sort(log_weights)[-tail:]) == 0)
 
 
 def rank_r_hat(chains: Array) -> float:

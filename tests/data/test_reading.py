@@ -212,6 +212,11 @@ def test_an_offset_and_friction_may_leave_most_forces_negative(files: Files, for
     assert np.array_equal(files.read("time_s,deflection_mm,force_N\n" + rows).force, force)
 
 
+def test_a_film_that_tears_before_an_offset_is_no_wrong_sign(files: Files) -> None:
+    rows = "".join(f"{d},{0.05 * d if d <= 14 else -0.01}\n" for d in range(1, 21))
+    assert files.read("deflection_mm,force_N\n" + rows).force[-1] == -0.01
+
+
 def test_reversals_of_several_steps_are_a_protocol_without_times(files: Files) -> None:
     m = files.read("deflection_mm,force_N\n" + "".join(f"{x},{x}\n" for x in (1, 2, 3, 4, 2, 1, 3, 5)))
     assert m.cycle.tolist() == [1, 1, 1, 1, 1, 1, 2, 2]
@@ -295,6 +300,8 @@ def test_a_noise_in_newtons_of_a_stress_needs_the_width(files: Files) -> None:
         "stretch,nominal_stress_MPa,force_sd_N\n1.1,0.1,0.01\n1.5,0.3,0.01\n2,0.5,0.01\n", strip
     )
     files.read(curve, f"{strip}[measurement]\nnominal_stress_sd_MPa = 0.002\n")
+    sheared = "shear,shear_stress_MPa\n0.1,0.1\n0.5,0.3\n1,0.5\n"
+    assert "no width says" in files.fault(sheared, strip.replace("uniaxial", "shear") + noise)
 
 
 @pytest.mark.parametrize("specimen", ["", " \r\n", "# film 1\n"])

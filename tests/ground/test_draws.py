@@ -39,6 +39,29 @@ def test_weights_that_are_alike_are_bounded_and_few_say_nothing() -> None:
     assert pareto_shape(np.zeros(12)) == np.inf
 
 
+@pytest.mark.parametrize("spread", [700.0, 1500.0, 3000.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_weights_of_which_one_is_all_are_bad(spread: float, seed: int) -> None:
+    """Beside it the others vanish, and so do the exceedances that a tail would be fitted to."""
+    log_weights = -0.5 * spread * np.random.default_rng(seed).chisquare(4, 200)
+    smoothed, shape = pareto_smoothed(log_weights)
+    assert shape > 0.7
+    assert not np.any(np.isnan(smoothed))
+    assert np.sum(np.exp(smoothed)) == pytest.approx(1.0)
+
+
+def test_a_reading_of_which_three_draws_know_better_is_not_told_as_known() -> None:
+    likelihood = np.zeros((1, 1000, 2))
+    likelihood[0, :3, 0] = -5.0
+    terms, shape = left_out(likelihood, 1.0)
+    assert np.all(np.isfinite(terms))
+    assert shape[0] > 0.7
+
+
+def test_too_few_for_a_tail_say_nothing_however_much_each_is_worth() -> None:
+    assert pareto_shape(9.0 * np.random.default_rng(7).standard_normal(30), worth=20.0) == np.inf
+
+
 def test_they_are_those_of_arviz() -> None:
     rng = np.random.default_rng(5)
     chains = rng.standard_normal((2, 900)) + 0.1 * np.cumsum(rng.standard_normal((2, 900)), axis=1)

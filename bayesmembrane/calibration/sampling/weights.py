@@ -56,8 +56,7 @@ def worth(log_weights: Array) -> Worth:
     if len(positive) < FEWEST:
         return NOTHING
     w = np.exp(lw - np.max(lw))
-    with np.errstate(all="ignore"):  # its exponentials may all vanish but one
-        k_hat = pareto_shape(positive)
+    k_hat = pareto_shape(positive)
     efficiency = effective_draws(w) / len(w)
     return Worth(
         k_hat=k_hat,

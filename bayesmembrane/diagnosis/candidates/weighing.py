@@ -241,18 +241,16 @@ class Weighing(ABC):
         taken = np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=SEARCH.rank)[0]
         low, high = self._room(candidate, slopes.shape[1])
         if np.any((taken < low) | (taken > high)):
-            taken = lsq_linear(white[:, :-1], white[:, -1], (low, high), method="bvls").x
+            taken = _within(white[:, :-1], white[:, -1], low, high)
         return np.asarray(candidate.residual - slopes @ taken)
 
     @staticmethod
     def _room(candidate: Candidate, count: int) -> tuple[Array, Array]:
         """(count,), (count,): how far each coordinate may still go; those beyond the candidate's own anywhere."""
         bounds = [p.bounds for p in candidate.hypothesis.parameters[: candidate.x.size]]
-        room = np.array(bounds).T - candidate.x
+        low, high = np.array(bounds).T - candidate.x
         far = np.full(count - candidate.x.size, np.inf)
-        # A coordinate at its bound has round-off left, and the solver wants some width.
-        low, high = np.minimum(room[0], -TINY), np.maximum(room[1], TINY)
-        return np.concatenate([low, -far]), np.concatenate([high, far])
+        return np.concatenate([np.minimum(low, 0.0), -far]), np.concatenate([np.maximum(high, 0.0), far])
 
     def excess(self, candidate: Candidate) -> float:
         """Squares of its best fit beyond those of noise, in variances of the noise; 0 or more."""
@@ -433,6 +431,20 @@ class Weighing(ABC):
         low, high = axes.ends
         inside = log_inside(mean, covariance, low / spread, high / spread)
         return inside + axes.log_replaced(u, mean * spread, np.diag(covariance) * spread**2)
+
+
+def _within(white: Array, data: Array, low: Array, high: Array) -> Array:
+    """(k,) x between ``low`` and ``high`` with the least squares of white (N, k) x - data (N,); 0 where none shows.
+
+    Columns are brought to one length, so that the ends of a search do not hang on units.
+    """
+    lengths = np.sqrt(np.sum(white**2, axis=0))
+    shown = lengths > SEARCH.rank * np.max(lengths)
+    scale, out = lengths[shown], np.zeros(lengths.size)
+    # A coordinate at its bound has no room, and the solver wants some.
+    bounds = np.minimum(low[shown] * scale, -TINY), np.maximum(high[shown] * scale, TINY)
+    out[shown] = lsq_linear(white[:, shown] / scale, data, bounds, method="bvls").x / scale
+    return out
 
 
 def beyond_noise(white: Array, candidate: Candidate) -> float:
