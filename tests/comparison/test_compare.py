@@ -281,3 +281,11 @@ def test_auto_judges_each_hypothesis_under_every_noise() -> None:
     assert [(h.label(), h.noise.name) for h in found] == [
         (f"{m}+friction", n) for m in ("yeoh", "gent") for n in ("white", "ar1", "form")
     ]
+
+
+def test_ranges_of_one_name_are_refused() -> None:
+    """Readings are closer together than ends are told."""
+    d = 1e-3 * np.array([2.0, 5.0, 10.0001, 10.0003, 12.0])
+    whole = Measurement(d, 100 * d, Annulus(0.01, 0.035), Specimen("film", 5e-5))
+    with pytest.raises(SettingsError, match="both be called"):
+        ranges_of(whole, [10.0002e-3, 10.0004e-3])
