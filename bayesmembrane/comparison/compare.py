@@ -37,9 +37,7 @@ def claimed(materials: str, effects: str, noise: str, convexity: str) -> tuple[H
     for name in (m.strip() for m in materials.split(",") if m.strip()):
         material, *own = (part.strip() for part in name.split("+"))
         common = [e.strip() for e in effects.split(",") if e.strip()]
-        if twice := sorted({e for e in own if own.count(e) > 1}):
-            raise SettingsError(f'the effect "{twice[0]}" is named twice', name, "name every effect once")
-        effects_of = dict.fromkeys([*own, *common])
+        effects_of = [*own, *(e for e in common if e not in own)]
         for model in NOISES if noise == AUTO else (noise,):
             found.append(hypothesis(material, effects_of, model, convexity))
     return tuple(found)

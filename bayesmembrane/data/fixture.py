@@ -144,7 +144,7 @@ def check_lifted(columns: Mapping[str, Array], file: str, lines: Sequence[int]) 
     if negative and np.sum((deflection - np.mean(deflection)) * force) <= 0:
         fault = "the force is negative where the disc is lifted most, and the film pulls it back with a positive one"
         raise DataError(fault, file, "change the sign of the column")
-    if not np.any(columns["deflection"] > 0):
+    if not np.any(deflection > 0):
         raise DataError("the disc is never lifted: no deflection is positive", file, "check the column")
     check_deviations(columns, places)
 

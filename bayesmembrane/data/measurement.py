@@ -200,14 +200,15 @@ class Measurement:
 
     def ranges_up_to(self, ends: Sequence[float]) -> list[Measurement]:
         """`up_to` each of several ends (m); raises `SettingsError` for two that leave the same points, too."""
-        parts = [self.up_to(end) for end in ends]
-        for i, part in enumerate(parts):
-            for k in range(i):
-                if len(parts[k]) == len(part):
-                    both = " and ".join(self.rig.place(end) for end in (ends[k], ends[i]))
-                    last = self.rig.place(float(np.max(self.deflection)))
-                    fault = f"the ranges up to {both} hold the same readings"
-                    raise SettingsError(fault, remedy=f"give ends with readings between them; the curve ends at {last}")
+        parts, of_length = [self.up_to(end) for end in ends], dict[int, float]()
+        for end, part in zip(ends, parts, strict=True):
+            if len(part) in of_length:
+                one, other, last = map(self.rig.place, (of_length[len(part)], end, float(np.max(self.deflection))))
+                raise SettingsError(
+                    f"the ranges up to {one} and {other} hold the same readings",
+                    remedy=f"give ends with readings between them; the curve ends at {last}",
+                )
+            of_length[len(part)] = end
         return parts
 
     def select(self, keep: NDArray[Any]) -> Measurement:

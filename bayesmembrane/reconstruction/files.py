@@ -21,7 +21,7 @@ STATEMENT = (
     "RECONSTRUCTED, not raw data: these forces were never printed; they are inferred from the 30 losses and 15 "
     "parameter sets that the paper prints, and from the forward model, by `bayesmembrane reconstruct`"
 )
-_SIGN = STATEMENT.partition(":")[0]
+_OURS = STATEMENT.partition(":")[0]
 METHOD = (
     "a loss is the Euclidean distance between measured and simulated forces, so the losses locate the measured curve; "
     "number and first position of the evenly spaced deflections are inferred too. One curve for both ranges, of one of "
@@ -71,7 +71,7 @@ def _texts(
 def refuse_others(files: dict[Path, str]) -> None:
     """Raise `StorageError` if one of these files of a measurement exists, and no TOML there says that it is ours."""
     (toml,) = (path for path in files if path.suffix == ".toml")
-    if toml.is_file() and _SIGN in toml.read_text(encoding="utf-8", errors="replace"):
+    if toml.is_file() and _OURS in toml.read_text(encoding="utf-8", errors="replace"):
         return
     for path in files:
         if path.exists():

@@ -316,14 +316,7 @@ def _completed(hints: Hints, template: TomlSection | None) -> Hints:
 
 def _specimen_text(imported: Imported, hints: Hints, importer: str, template: TomlSection | None) -> tuple[str, bool]:
     """(TOML, whether it is complete): film and rig as far as they are known, and how the export was understood."""
-    content: dict[str, Any] = {"measurement": {"origin": imported.origin}}
-    if template is not None and isinstance(measured := template.table.get("measurement"), dict):
-        # Named from where the specimen file lies, which is not where what is written will lie.
-        beside = Path(template.file).resolve().parent
-        files = {k: str(beside / measured[k]) for k in NAMES_FILES if isinstance(measured.get(k), str)}
-        content["measurement"] |= measured | files
-    if template is not None and "origin" in template.table:  # what was reconstructed is no measurement afterwards
-        content["origin"] = template.table["origin"]
+    content = _said_of_the_test(imported, template)
     understood = {g.what.replace(" ", "_"): str(g).split(": ", 1)[1] for g in imported.guesses}
     listed = {"contradictions": imported.contradictions, "notes": imported.notes}
     if understood or imported.contradictions:
@@ -346,6 +339,23 @@ def _specimen_text(imported: Imported, hints: Hints, importer: str, template: To
     text = "\n".join([*texts, rest])
     complete = not any(line.startswith("# ") for t in texts for line in t.split("\n"))
     return (text if complete else f"{_TO_COMPLETE.lstrip().splitlines()[0]}\n{text}"), complete
+
+
+def _said_of_the_test(imported: Imported, template: TomlSection | None) -> dict[str, Any]:
+    """Sections of the measurement and its origin: what a specimen file says stays; what was reconstructed is still so.
+
+    Files that it names from where it lies are named whole: what is written will lie elsewhere.
+    """
+    content: dict[str, Any] = {"measurement": {"origin": imported.origin}}
+    if template is None:
+        return content
+    if isinstance(measured := template.table.get("measurement"), dict):
+        beside = Path(template.file).resolve().parent
+        files = {k: str(beside / measured[k]) for k in NAMES_FILES if isinstance(measured.get(k), str)}
+        content["measurement"] |= measured | files
+    if "origin" in template.table:
+        content["origin"] = template.table["origin"]
+    return content
 
 
 def _section(name: str, known: Mapping[str, Any], optional: set[str]) -> str:

@@ -20,7 +20,6 @@ from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
 from bayesmembrane.diagnosis.explanation.unfitted import Key, unfitted
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.effects.base import Effect
 
 Named = TypeVar("Named")
 
@@ -294,11 +293,6 @@ def _tears(f: Foreign, every: Sequence[Candidate], search: Weighing) -> list[Can
         )
         and -_fits_better(c, f, search) < TWINS.behind
     ]
-
-
-def _beyond(base: Candidate, c: Candidate) -> list[Effect]:
-    """Effects of ``c`` that ``base`` does not have."""
-    return [e for e in c.hypothesis.effects if e.name not in base.names]
 
 
 def _fits_better(c: Candidate, f: Foreign, search: Weighing) -> float:
