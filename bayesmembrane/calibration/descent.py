@@ -17,7 +17,7 @@ DAMPING, EASIER, HARDER, HOPELESS = 1e-2, 0.1, 4.0, 1e12
 LEAST_DAMPING = 1e-12
 SLOW = 1e-9  # relative decrease of |r|^2 below which a step counts as slow
 PATIENCE = 3  # slow steps in a row that end a search
-CRAWL, CRAWLS = 1e-3, 4  # the same of a search that is far behind the best one
+CRAWL, CRAWLS = 1e-3, 4  # the same of a search that is far behind the best one, if nothing else is asked
 
 
 @dataclass(frozen=True)
@@ -25,12 +25,14 @@ class Patience:
     """When a search is given up, or done.
 
     behind : times the least sum of squares from which on a search that crawls is not waited for
+    crawls_below : relative decrease of |r|^2 by one step below which it does
     slow_below : relative decrease of |r|^2 below which a step counts as slow
     enough : |r| below which nothing lower is asked for
     settled : relative decrease of |r|^2 below which a whole step, undamped, is not worth taking
     """
 
     behind: float = np.inf
+    crawls_below: float = CRAWL
     slow_below: float = SLOW
     enough: float = 0.0
     settled: float = 0.0
@@ -122,7 +124,7 @@ class Descent:
         promise = square[rows] - _square(self.r[rows] + np.einsum("mnk,mk->mn", self.jacobian[rows], moved))
         little = np.where(better, won, promise) < patience.slow_below * square[rows]
         self.slow[rows] = np.where(little, self.slow[rows] + 1, 0)
-        self.crawl[rows] = np.where(better & (won > CRAWL * square[rows]), 0, self.crawl[rows] + 1)
+        self.crawl[rows] = np.where(better & (won > patience.crawls_below * square[rows]), 0, self.crawl[rows] + 1)
         # A step that promised next to nothing may have won far more: the cube overflows, and is clipped.
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             eased = np.clip(1 - (2 * won / promise - 1) ** 3, EASIER, HARDER)

@@ -16,7 +16,6 @@ from bayesmembrane.calibration.prior import JointPrior
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.parameters import Array
-from bayesmembrane.physics.convexity import FREE
 from bayesmembrane.physics.form_error import traces
 from bayesmembrane.physics.forward import AT_ONCE, Forward, Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -182,10 +181,10 @@ class Posterior:
         return self.hypothesis.noise.bind(self.measurement)
 
     @property
-    def without_convexity(self) -> Posterior | None:
-        """The same with a convexity prior that asks nothing; None if its own does not, either."""
-        h = self.hypothesis
-        return replace(self, hypothesis=replace(h, convexity=FREE)) if h.convexity.restricts else None
+    def weaker(self) -> Posterior | None:
+        """The same with the next weaker convexity prior; None if its own asks nothing."""
+        mode = self.hypothesis.convexity.weaker
+        return None if mode is None else replace(self, hypothesis=replace(self.hypothesis, convexity=mode))
 
     @property
     def size(self) -> int:

@@ -17,10 +17,10 @@ def ruled_out_gain(posterior: Posterior | JointPosterior, x: Array, log_posterio
     """By how much ln p(x | y) is larger, at least, at a film that convexity rules out than at the best draw.
 
     x (..., k) are draws, with ``log_posterior`` (...). Films are tried around the best one, as far apart as the draws
-    are, then around the best of them, without the convexity prior. 0 if none is better; None where that prior asks
-    nothing.
+    are, then around the best of them, with the next weaker convexity prior. 0 if none is better; None where the prior
+    asks nothing.
     """
-    free = posterior.without_convexity
+    free = posterior.weaker
     if free is None:
         return None
     rng, count = np.random.default_rng([seed, 3]), max(LEAST, min(POINTS, READINGS // posterior.readings))

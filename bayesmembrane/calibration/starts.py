@@ -21,8 +21,9 @@ from bayesmembrane.physics.forward import AT_ONCE
 BROAD, CLOSE, ROUNDS, EACH = 256, 256, 5, 192
 HALVINGS = 40  # of the interval of tempering powers
 VALLEYS, ITERATIONS, TURNS = 8, 40, 8
-ROUGH = Patience(behind=10.0, slow_below=1e-2)
-"""Draws this wide do not ask for an optimum: a descent is done where its last steps won a hundredth of |r|^2 each."""
+ROUGH = Patience(behind=10.0, crawls_below=2e-2, slow_below=1e-2)
+"""Draws this wide do not ask for an optimum: a descent is done where its last steps won a hundredth of |r|^2 each, and
+one far behind the best where they won a fiftieth: what is 40 behind is not drawn around."""
 WIDER = 1.5  # of the Laplace approximation
 DEGREES = 4.0  # of freedom of the t-distribution around a valley
 SPARE = 1.5  # effective number of candidates for each walker
@@ -128,13 +129,16 @@ def candidates(posterior: Posterior, rng: np.random.Generator) -> Array:
     pool, size = objective.pool(rng)
     each = len(posterior.measurement) / len(few)
     close = _around_valleys(objective, pool, size[0] / np.sqrt(len(few)), each, rng)
-    curves = np.concatenate([pool[:: max(1, len(pool) // BROAD)], close])
+    step = max(1, len(pool) // BROAD)
+    curves = np.concatenate([pool[::step], close])
     x = posterior.prior.draw(rng, len(curves))
     k = posterior.hypothesis.curve_size
     x[:, :k] = curves
     if x.shape[1] > k:
-        force = objective.forward(curves, reached=False).force
-        rms = np.sqrt(np.mean((force - few.force) ** 2, axis=1))
+        # Of films without effects the pool has solved the curves; effects are not in it.
+        known = np.empty(0) if posterior.hypothesis.effects else size[::step]
+        force = objective.forward(curves[len(known) :], reached=False).force
+        rms = np.append(known / np.sqrt(len(few)), np.sqrt(np.mean((force - few.force) ** 2, axis=1)))
         fits = np.log(rms / posterior.hypothesis.noise.natural(np.zeros((1, x.shape[1] - k)), 1.0)[0, 0])
         fits -= np.log(np.max(np.abs(posterior.measurement.force)))
         some = np.isfinite(fits) & (rng.random(len(x)) < 0.7)

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from bayesmembrane.calibration.sampling.walk import Settings
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.files import make_folder, remove_parts, unwritable, write_whole
-from bayesmembrane.ground.fingerprint import digest
+from bayesmembrane.ground.fingerprint import digest, installed
 from bayesmembrane.ground.locks import alone
 from bayesmembrane.ground.netcdf import packed, unpacked
 from bayesmembrane.ground.sealed import (
@@ -90,7 +90,7 @@ def run_name(measurement: Measurement, hypothesis: Hypothesis, asked: dict[str, 
 
 def _version(package: str) -> str:
     try:
-        return version(package)
+        return installed(package)
     except PackageNotFoundError:
         return "unknown"
 

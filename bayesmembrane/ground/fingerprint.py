@@ -62,7 +62,16 @@ def reached(entries: Iterable[str], components: Iterable[type[Any]] = (), root: 
 
 def majors(packages: Iterable[str] = NUMERICAL) -> dict[str, str]:
     """The major versions of packages, by name."""
-    return {name: version(name).partition(".")[0] for name in packages}
+    return {name: installed(name).partition(".")[0] for name in packages}
+
+
+@cache
+def installed(package: str) -> str:
+    """The version of a package: to find it, its folder is searched.
+
+    Raises `importlib.metadata.PackageNotFoundError` where there is none.
+    """
+    return version(package)
 
 
 def digest(values: Mapping[str, Any]) -> str:

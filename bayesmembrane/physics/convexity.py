@@ -56,6 +56,14 @@ class ConvexityMode(ABC):
         values = self._margin(states, material)
         return np.where(np.isnan(values), np.inf, values)
 
+    @property
+    def weaker(self) -> ConvexityMode | None:
+        """The mode that asks for less; None if this one asks nothing.
+
+        What has lost ellipticity folds, and costs most to follow: it is asked for by nobody who asks for more than that.
+        """
+        return ELLIPTIC if self.restricts else None
+
     @abstractmethod
     def _margin(self, states: States, material: type[Material]) -> Array:
         """(B,) with nan for a film without any state."""
@@ -127,6 +135,10 @@ class Elliptic(ConvexityMode):
 
     def margins_at(self, states: States, material: type[Material]) -> Array:
         return states.ellipticity_at
+
+    @property
+    def weaker(self) -> ConvexityMode | None:
+        return FREE
 
     def holds(self, margin: Array | float) -> NDArray[np.bool_]:
         return np.asarray(np.asarray(margin) > 0)

@@ -212,13 +212,13 @@ def test_an_entry_that_is_not_there_is_told() -> None:
 
 @pytest.mark.parametrize("package", ["emcee", "numpy"])
 def test_a_major_version_counts_and_a_minor_one_does_not(monkeypatch: pytest.MonkeyPatch, package: str) -> None:
-    before, real = majors(), fingerprint.version
+    before, real = majors(), fingerprint.installed
 
     def upgraded(to: str) -> Callable[[str], str]:
         return lambda name: to if name == package else real(name)
 
     major = int(before[package])
-    monkeypatch.setattr(fingerprint, "version", upgraded(f"{major}.999.1"))
+    monkeypatch.setattr(fingerprint, "installed", upgraded(f"{major}.999.1"))
     assert majors() == before
-    monkeypatch.setattr(fingerprint, "version", upgraded(f"{major + 1}.0.0"))
+    monkeypatch.setattr(fingerprint, "installed", upgraded(f"{major + 1}.0.0"))
     assert digest(majors()) != digest(before)

@@ -15,7 +15,6 @@ from bayesmembrane.calibration.posterior import Evaluation, Outcome, Posterior
 from bayesmembrane.calibration.prior import SCRAMBLES, JointPrior, Scrambled
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.sobol import scrambled_sobol
-from bayesmembrane.physics.convexity import FREE
 from bayesmembrane.physics.forward import Solve
 from bayesmembrane.physics.hypothesis import Hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -56,11 +55,12 @@ class JointPosterior:
         return SharedPrior(cast(Hypothesis, self.joint))
 
     @property
-    def without_convexity(self) -> JointPosterior | None:
-        """The same with a convexity prior that asks nothing; None if its own does not, either."""
-        if not self.joint.convexity.restricts:
+    def weaker(self) -> JointPosterior | None:
+        """The same with the next weaker convexity prior; None if its own asks nothing."""
+        mode = self.joint.convexity.weaker
+        if mode is None:
             return None
-        parts = [replace(p, hypothesis=replace(p.hypothesis, convexity=FREE)) for p in self.joint.parts]
+        parts = [replace(p, hypothesis=replace(p.hypothesis, convexity=mode)) for p in self.joint.parts]
         return replace(self, joint=replace(self.joint, parts=tuple(parts)))
 
     @property

@@ -62,17 +62,22 @@ class Collapsed:
         if (len(known) + len(x)) * self.readings <= AT_ONCE:
             known.update(zip(_shapes(x), force, strict=True))
 
+    def remembered(self, x: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """(curves for Gd = 1 of films x (B, k), nan where they are not remembered, True for those)."""
+        kept = [self.posterior.unit_curves.get(key) for key in _shapes(x)]
+        new, force = np.array([f is None for f in kept], dtype=bool), np.full((len(x), self.readings), np.nan)
+        if not np.all(new):
+            force[~new] = np.stack([f for f in kept if f is not None])
+        return force, new
+
     def at(self, x: Array) -> Evaluation:
         """As `Posterior.evaluate` of x (B, k), from curves for Gd = 1: those that are remembered are not solved again.
 
         The same to round-off whether they are. Films that are not possible have no likelihood.
         """
-        kept = [self.posterior.unit_curves.get(key) for key in _shapes(x)]
-        new = np.array([force is None for force in kept], dtype=bool)
-        force, outcome = np.empty((len(x), self.readings)), np.full(len(x), Outcome.OK, dtype=np.int8)
+        force, new = self.remembered(x)
+        outcome = np.full(len(x), Outcome.OK, dtype=np.int8)
         log_prior, log_likelihood = self.posterior.prior.log_density(x), np.full(len(x), -np.inf)
-        if not np.all(new):
-            force[~new] = np.stack([f for f in kept if f is not None])
         if np.any(new):
             unit = x[new]
             unit[:, 0], unit[:, -1] = self.modulus.mean, self.noise.mean

@@ -116,10 +116,13 @@ class ShapeFirst:
 
     def _weighed(self, both: Array) -> Array:
         x, lp = both[:, :-1], both[:, -1]
-        e = self.collapsed.evaluate(self.places(x))
-        ok, weights = np.isfinite(e.log_prior), np.full(len(x), -np.inf)
+        force, new = self.collapsed.remembered(x)
+        ok, weights = ~new, np.full(len(x), -np.inf)
+        if np.any(new):
+            e = self.collapsed.evaluate(self.places(x[new]))
+            force[new], ok[new] = e.force, np.isfinite(e.log_prior)
         if np.any(ok):
-            weights[ok] = self._weights(x[ok], lp[ok], self.collapsed.residuals(e.force[ok]).given())
+            weights[ok] = self._weights(x[ok], lp[ok], self.collapsed.residuals(force[ok]).given())
         return weights
 
     def _weights(self, x: Array, log_posterior: Array, given: GivenShape) -> Array:

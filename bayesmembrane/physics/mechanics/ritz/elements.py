@@ -133,14 +133,14 @@ def _density(q, ends, gain, d, bubbles, share, widest):  # type: ignore[no-untyp
     for e in range(elements):
         width = (ends[e + 1] - ends[e]) / SAMPLES
         total, u, w = 0.0, 0.0, 0.0
+        falls, shrinks = np.exp(-ends[e]), np.exp(-width)
         for k in range(SAMPLES + 1):
-            t = ends[e] + k * width
-            a, b = _slopes(t, e, q, ends, bubbles)
-            b = np.exp(-t) * (d / span + b)
+            a, b = _slopes(ends[e] + k * width, e, q, ends, bubbles)
+            b = falls * (d / span + b)
             if k > 0:
-                bend[k - 1] = np.hypot(a - u, b - w)
+                bend[k - 1] = np.sqrt((a - u) ** 2 + (b - w) ** 2)
                 total += bend[k - 1]
-            u, w = a, b
+            u, w, falls = a, b, falls * shrinks
         weight = (max(gain[e], 1e-30 * most) / most) ** share if most > 0.0 else 1.0
         for k in range(SAMPLES):
             part = bend[k] / total if total > 0.0 else 1.0 / SAMPLES
