@@ -29,7 +29,7 @@ from bayesmembrane.physics.effects.base import (
 )
 from bayesmembrane.physics.frame import in_series
 from bayesmembrane.physics.mechanics.solution import Status
-from bayesmembrane.physics.shared import Shared, Varied
+from bayesmembrane.physics.shared import Shared, Varied, parted
 
 Law = Any
 """(deflection (B, N), excess (B, N) or None) -> (force (B, N), slope (B, N)), and ``status`` (B,) where it is nan."""
@@ -182,7 +182,7 @@ def differences(
         forces, why = Shared(composition.placed, composition.path, law, x, changes).forces(), law.status
     at = np.concatenate([x, *(c.x for c in changes)])
     reading, status = composition.read(at, np.concatenate(forces), np.tile(why, len(forces)))
-    first, *rest = np.split(reading, len(forces))
+    first, *rest = parted(reading, len(forces))
     slopes = [(r - first) / c.step for r, c in zip(rest, changes, strict=True)]
     return first, status[: len(x)], np.stack(slopes, axis=2)
 
@@ -198,5 +198,5 @@ def _yielding(
     moved = [c for c in changes if not isinstance(c.effect, Sensor)]
     laws, points = [c.law for c in moved], np.concatenate([c.x for c in moved])
     beside = composition.closed(type(law).stack(laws), points, np.tile(plain, (len(laws), 1)))[1]
-    each = iter(np.split(beside, len(laws)))
+    each = iter(parted(beside, len(laws)))
     return [plain, *(plain if isinstance(c.effect, Sensor) else next(each) for c in changes)], why

@@ -60,7 +60,7 @@ class ConvexityMode(ABC):
     def weaker(self) -> ConvexityMode | None:
         """The mode that asks for less; None if this one asks nothing.
 
-        What has lost ellipticity folds, and costs most to follow: it is asked for by nobody who asks for more than that.
+        What has lost ellipticity folds, and costs most to follow: nobody who asks for more than that asks for it.
         """
         return ELLIPTIC if self.restricts else None
 

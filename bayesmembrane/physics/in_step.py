@@ -59,20 +59,18 @@ def _drawn_through_points(forward: Forward, rows: int) -> bool:
 def _together(asked: Sequence[Asked], sensitivities: bool) -> list[Prediction]:
     """The curves of films of one energy, from one law of all of them."""
     each = [(f, f.hypothesis.films(x), f.effects(x)) for f, x in asked]
-    found, out = iter(_laws(each, sensitivities)), []
-    # Films in another mounting, for differences, are so few of each that they are solved together, too.
+    # Films in another mounting, for differences, are so few of each that they are solved beside them.
     moved = [f.mountings(x) if sensitivities else [] for f, x in asked]
-    others = iter(_laws([(f, p, m) for (f, p, _), ms in zip(each, moved, strict=True) for m in ms], False))
-    for (forward, x), ms in zip(asked, moved, strict=True):
-        mounted = [next(others)[0] for _ in ms]
-        out.append(forward.over(x, next(found), sensitivities, mounted))
+    mounted = [(f, p, m) for (f, p, _), ms in zip(each, moved, strict=True) for m in ms]
+    found = _laws(each + mounted, sensitivities)
+    others, out = (law for law, _ in found[len(each) :]), []
+    for (forward, x), ms, law in zip(asked, moved, found, strict=False):
+        out.append(forward.over(x, law, sensitivities, [next(others) for _ in ms]))
     return out
 
 
 def _laws(asked: Sequence[tuple[Forward, Array, Array]], sensitivities: bool) -> list[tuple[Law, tuple[Array, Array]]]:
     """What `Forward.law` finds for films (B, n) with effect parameters (B, k) of each, all of one energy."""
-    if not asked:
-        return []
     first = asked[0][0]
     trial = Trial(
         first.measurement,

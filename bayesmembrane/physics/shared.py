@@ -83,7 +83,7 @@ class Shared:
         some, number = _distinct(_numbers(self.laws), given.number, (given if excess is None else excess).number)
         law = type(self.laws[0]).stack([self.laws[i] for i in some])
         found = law(given.of(some), None if excess is None else excess.of(some))
-        force, slope = (_Parts(np.split(values, len(some)), number) for values in found)
+        force, slope = (_Parts(parted(values, len(some)), number) for values in found)
         return force, lambda some: FilmState(self.path, given.of(some), force.of(some), slope.of(some))
 
     def _acting(self, stage: type[Any]) -> Iterator[tuple[Any, slice]]:
@@ -101,12 +101,17 @@ class Shared:
         some, number = _distinct(before.number, [i if e is effect else -1 for i, e in enumerate(self.changed)])
         p = effect.within_bounds(np.concatenate([self.points[i][:, at] for i in some]))
         values = act(p, before.of(some), self.path if state is None else state(some))
-        return _Parts(np.split(values, len(some)), number)
+        return _Parts(parted(values, len(some)), number)
+
+
+def parted(values: Array, count: int) -> list[Array]:
+    """``values`` (count B, N) as ``count`` arrays (B, N), without the price of `np.split`."""
+    return list(values.reshape(count, -1, values.shape[-1]))
 
 
 def _sum(one: _Parts, other: _Parts) -> _Parts:
     some, number = _distinct(one.number, other.number)
-    return _Parts(np.split(one.of(some) + other.of(some), len(some)), number)
+    return _Parts(parted(one.of(some) + other.of(some), len(some)), number)
 
 
 def _numbers(things: Sequence[object]) -> list[int]:

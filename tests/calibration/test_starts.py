@@ -28,6 +28,19 @@ def test_films_without_slopes_on_the_way_do_not_end_the_search(seed: int) -> Non
     assert np.all(np.isfinite(posterior.evaluate(x.reshape(-1, posterior.size)).log_posterior))
 
 
+def test_noise_that_suits_a_film_is_that_of_its_solved_residual() -> None:
+    """Films that the pool has solved are not solved again to see how far off they are."""
+    curve = read_measurement(shipped("elastosil_50um_op1.csv"), shipped("elastosil_50um_op1.toml"))
+    posterior = Posterior(hypothesis("gent"), curve)
+    x = starts.candidates(posterior, np.random.default_rng(2))
+    force = posterior.forward(x[:, :-1], reached=False).force
+    with np.errstate(invalid="ignore"):
+        rms = np.sqrt(np.mean((force - curve.force) ** 2, axis=1)) / np.max(curve.force)
+    off = x[:, -1] - np.log(rms / posterior.hypothesis.noise.natural(np.zeros((1, 1)), 1.0)[0, 0])
+    for some in (off[: starts.BROAD], off[-starts.CLOSE :]):  # seven of ten have it, give or take a half
+        assert np.mean(np.abs(some[np.isfinite(some)]) < 1.5) > 0.6
+
+
 def test_a_thousand_walkers_find_a_place_each() -> None:
     """They were more than the points that were tried, and were told that no film reaches the data."""
     curve = read_measurement(shipped("elastosil_50um_op1.csv"), shipped("elastosil_50um_op1.toml"))

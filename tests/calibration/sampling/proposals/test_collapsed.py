@@ -132,8 +132,11 @@ def test_what_was_proposed_is_known_to_the_last_digit(monkeypatch: pytest.Monkey
         a, b, c = (getattr(e, name) for e in (told, solved, plain))
         assert np.array_equal(a, b, equal_nan=True)
         assert a == pytest.approx(c, rel=1e-9, abs=1e-12, nan_ok=True)
+    lp = plain.log_posterior[:-2]
+    weights = ShapeFirst(anew, proposal.mixture).log_weights(x[:-2], lp)
     monkeypatch.setattr(Posterior, "evaluate", lambda *_: pytest.fail("solved again"))
     assert np.array_equal(known.at(x[:-2]).force, told.force[:-2])
+    assert proposal.log_weights(x[:-2], lp) == pytest.approx(weights, rel=1e-9)
 
 
 def test_a_mixture_of_all_coordinates_proposes_those() -> None:
