@@ -136,10 +136,11 @@ study-sbc: $(STAMP)
 study-modes: $(STAMP)
 	$(PY) -m tests.studies.modes $(MODES)
 
-# What is compared with stays out of $(VENV).
+# What is compared with stays out of $(VENV). UltraNest may come as source, which cython, setuptools and a C compiler build.
 $(SIDE)/.installed: tests/studies/side_by_side.txt constraints.txt pyproject.toml
 	@test -x $(SIDE)/bin/python || $(PYTHON) -m venv $(SIDE)
-	$(SIDE)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt hatchling editables
+	$(SIDE)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt \
+	  hatchling editables cython setuptools numpy
 	$(SIDE)/bin/python -m pip install --quiet --disable-pip-version-check --no-build-isolation \
 	  --requirement tests/studies/side_by_side.txt --editable .
 	@touch $@
