@@ -93,6 +93,12 @@ class Motion:
         return np.asarray(self.time - self.time[0] + min(start, float(self.time[-1] - self.time[0])))
 
     @cached_property
+    def first_turn(self) -> float:
+        """s on the `clock`: when the first leg ends, or the last reading is taken."""
+        turns = np.flatnonzero(np.diff(self.leg))
+        return float(self.clock[turns[0] if turns.size else -1])
+
+    @cached_property
     def pace(self) -> float:
         """m/s: mean speed of the first loading, until it is all but over; `NOMINAL_SPEED` without times."""
         turns = np.flatnonzero(np.diff(self.leg))

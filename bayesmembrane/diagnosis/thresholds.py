@@ -160,6 +160,9 @@ class Sizes:
     force: forces, as friction, an offset, a drift until the end."""
     largest: float = 20.0
     """Times the expected size: nothing larger is looked for."""
+    largest_force: float = 50.0
+    """The same of forces, for a load cell may not have been tared, or warm up: half of what it reads at most. Of a drift,
+    which may slow down, until the first leg ends."""
 
 
 @dataclass(frozen=True)

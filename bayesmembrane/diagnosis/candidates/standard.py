@@ -13,7 +13,7 @@ from bayesmembrane.diagnosis.thresholds import SIZES
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Parameter, Prior, Uniform
 from bayesmembrane.physics.effects.base import Effect, EffectParameter
 from bayesmembrane.physics.hypothesis import Hypothesis
-from bayesmembrane.physics.reach import reach_of
+from bayesmembrane.physics.reach import SHORTEST, reach_of
 
 FAR = 1e4
 """Times the expected size: what a Cauchy prior has beyond is nothing."""
@@ -202,8 +202,8 @@ def _grid(mean: float, sd: float, low: float, high: float) -> Array:
 
 def standard(hypothesis: Hypothesis, measurement: Measurement) -> Standard:
     """Of the coordinates of ``hypothesis`` that shape the curve."""
-    scales = size_scales(measurement)
-    return Standard(tuple(_axis(p, scales) for p in hypothesis.parameters[: hypothesis.curve_size]))
+    sizes = size_scales(measurement)
+    return Standard(tuple(_axis(p, sizes) for p in hypothesis.parameters[: hypothesis.curve_size]))
 
 
 def expected_size(effect: Effect, measurement: Measurement) -> float:
@@ -211,17 +211,24 @@ def expected_size(effect: Effect, measurement: Measurement) -> float:
     return float(_axis(effect.size, size_scales(measurement)).slope(np.zeros(1))[0])
 
 
-def size_scales(measurement: Measurement) -> dict[str, float]:
-    """{SI unit: size that is expected before the data} of effects whose size is no pure number."""
-    return {unit: SIZES.part * size for unit, size in reach_of(measurement).by_unit.items()}
+def size_scales(measurement: Measurement) -> dict[str, tuple[float, float]]:
+    """{SI unit: (size that is expected before the data, largest that is looked for)} of sizes that are no pure numbers.
+
+    What grows with time is counted until the first leg ends, and may have slowed down a lot by the end of the test.
+    """
+    reach = reach_of(measurement)
+    scales = {unit: SIZES.part * size for unit, size in reach.by_unit.items()}
+    sooner = reach.duration / max(measurement.path.first_turn, SHORTEST)
+    most = {"N": SIZES.largest_force, "N/s": SIZES.largest_force * sooner}
+    return {unit: (scale, most.get(unit, SIZES.largest) * scale) for unit, scale in scales.items()}
 
 
-def _axis(p: Parameter, scales: dict[str, float]) -> Size | Shape:
+def _axis(p: Parameter, sizes: dict[str, tuple[float, float]]) -> Size | Shape:
     if not isinstance(p, EffectParameter) or p.null is None:
         return Shape(p.prior, p.bounds)
-    if p.unit not in scales:
+    if p.unit not in sizes:
         return Size(p.null, p.scale, p.one_sided, p.bounds)
-    scale = scales[p.unit]
-    low = p.null if p.one_sided and p.bounds[0] == p.null else p.null - SIZES.largest * scale
-    high = p.null if p.one_sided and p.bounds[1] == p.null else p.null + SIZES.largest * scale
+    scale, largest = sizes[p.unit]
+    low = p.null if p.one_sided and p.bounds[0] == p.null else p.null - largest
+    high = p.null if p.one_sided and p.bounds[1] == p.null else p.null + largest
     return Size(p.null, scale, p.one_sided, (low, high))

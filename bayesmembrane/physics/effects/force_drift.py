@@ -64,8 +64,7 @@ class ForceDrift(Sensor):
         return [{"swings": 0.6, "period": k * usual, "phase": f} for k in (0.7, 1.6) for f in (0.05, 0.3)]
 
     def read(self, p: Array, force: Array, path: Motion) -> Array:
-        turns = np.flatnonzero(np.diff(path.leg))
-        first = max(float(path.clock[turns[0] if turns.size else -1]), 1e-12)
+        first = max(path.first_turn, 1e-12)
         part = path.clock / first * (p[:, 2:3] + first) / (p[:, 2:3] + path.clock)
         once = part ** p[:, 1:2]
         angle = 2 * np.pi * p[:, 5:6]
