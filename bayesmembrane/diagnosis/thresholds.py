@@ -33,6 +33,15 @@ class NoiseThresholds:
     """Standard errors above zero from which readings are correlated beyond doubt."""
     doubt_below: float = 1e-3
     """Probability of a scatter as large as seen: below it, the stated standard deviation is not believed."""
+    growing_from: int = 60
+    """Readings from which noise may be seen to grow with the force."""
+    growing_below: float = 1e-3
+    """Probability of a rank correlation as large as seen between noise and force: below it, noise grows with the force.
+    """
+    growth: tuple[float, float] = (0.3, 30.0)
+    """Between how many times the noise at rest what the largest force adds to it may be."""
+    least_left: float = 0.1
+    """Part of its noise that a reading has left beside the reference, at least, to tell how large that is."""
     smallest_sd: float = 1e-9
     """Of the largest force. A perfect curve still has a noise, or everything would be infinitely significant."""
     rank: float = 1e-9

@@ -567,11 +567,13 @@ def smallest_sizes(found: Diagnosis) -> list[tuple[str, str]]:
 
 
 def _noise(found: Diagnosis) -> str:
-    """What the readings say against the stated noise; "" if nothing."""
-    noise = found.noise
-    if noise.excess == 1:
-        return ""
-    words = [f"the readings scatter {noise.excess:.2f} times as much as the measurement states"]
-    if noise.remembers:
-        words.append(f"neighbouring readings are correlated ({noise.rho:.2f}), which it does not state")
-    return f" Of the noise: {', and '.join(words)}; this is allowed for."
+    """What the readings say of the noise, beside what is stated; "" if nothing."""
+    noise, words, stated = found.noise, [], found.measurement.force_sd is not None
+    if noise.excess != 1:
+        words.append(f"the readings scatter {noise.excess:.2f} times as much as the measurement states")
+        if noise.remembers:
+            words.append(f"neighbouring readings are correlated ({noise.rho:.2f}), which it does not state")
+    if noise.profile.size > 1 and (noise.excess != 1 or not stated):
+        least, largest = (size_in_words(v, "N", _units(found)) for v in (np.min(noise.each), np.max(noise.each)))
+        words.append(f"it grows with the force, from {least} to {largest}")
+    return f" Of the noise: {', and '.join(words)}; this is allowed for." if words else ""

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.special import chdtrc
+from scipy.special import chdtrc, ndtr
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.reference.noise import OwnNoise, decorrelated, divided, forgotten, orthonormal
@@ -20,7 +20,8 @@ def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
     """Noise that the measurement states, or else what ``basis`` (N, p) leaves, by restricted maximum likelihood.
 
     A stated standard deviation is a claim, often from a data sheet: where the readings scatter more than that, or
-    remember, what they do counts, in proportion to what is stated of each. A stated covariance is believed.
+    remember, what they do counts, in proportion to what is stated of each. A stated covariance is believed. Where
+    nothing is stated, or one number for all readings that is not believed, the noise may grow with the force (`_growing`).
 
     For AR(1) noise e the restricted likelihood of rho, sd maximised away, is
     -1/2 [(N - p) ln RSS + ln |R| + ln |B^T R^-1 B|] (D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320); the prior
@@ -34,7 +35,7 @@ def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
         sd = float(np.sqrt(np.mean(np.diag(covariance))))
         return OwnNoise(sd, 0.0, 0.0, gaps, np.asarray(np.linalg.cholesky(covariance), dtype=float), np.inf)
     sd = 1.0 if stated is None else float(np.sqrt(np.mean(stated**2)))
-    profile = np.ones(1) if stated is None else stated / sd
+    profile = _growing(measurement.force, basis) if stated is None else stated / sd
     y, q = divided(measurement.force, profile), orthonormal(divided(basis, profile))
     if not measurement.rig.has_path:
         # States are no stations of one path: their order is that of a file, and nothing remembers by it.
@@ -48,7 +49,48 @@ def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
     larger = chdtrc(inferred.dof, (inferred.sd / sd) ** 2 * inferred.dof) < NOISE.doubt_below
     if inferred.dof < NOISE.doubt_from_dof or not (inferred.remembers or larger):
         return OwnNoise(sd, 0.0, 0.0, gaps, None, np.inf, profile=profile)
+    if np.all(stated == stated[0]):  # one number for all readings says nothing of which of them are noisier
+        inferred = own_noise(replace(measurement, force_sd=None), basis)
     return replace(inferred, excess=inferred.sd / sd)
+
+
+def _growing(force: Array, basis: Array) -> Array:
+    """(N,) standard deviation of each reading over the root mean square of all, sqrt(1 + (b f)^2) of the part f of the
+    largest force that ``basis`` (N, p) follows, where that is beyond doubt; else (1,) one.
+
+    Beyond doubt is a rank correlation with f of the size |r| of what is left; b minimises sum ln w + N ln sum |r| / w,
+    as of Laplace's distribution: a jump that the basis does not follow is a few large r.
+    """
+    q = orthonormal(basis)
+    followed = q @ (q.T @ force)
+    left = 1 - np.sum(q * q, axis=1)
+    some = left > NOISE.least_left
+    if np.count_nonzero(some) < NOISE.growing_from:
+        return np.ones(1)
+    f = np.abs(followed) / max(float(np.max(np.abs(followed))), TINY)
+    r = np.abs(force - followed)[some] / np.sqrt(left[some])
+    if _by_chance(r, f[some]) > NOISE.growing_below:
+        return np.ones(1)
+
+    def value(log_b: float) -> float:
+        w = np.hypot(1.0, np.exp(log_b) * f[some])
+        return float(np.mean(np.log(w)) + np.log(max(float(np.sum(r / w)), TINY)))
+
+    low, high = np.log(NOISE.growth)
+    w = np.hypot(1.0, np.exp(minimize_scalar(value, bounds=(low, high), method="bounded").x) * f)
+    return np.asarray(w / np.sqrt(np.mean(w**2)))
+
+
+def _by_chance(r: Array, f: Array) -> float:
+    """Probability of a rank correlation of r (N,) with a smooth f (N,) as large as seen.
+
+    Of N readings that are like their neighbours, with a correlation c of the ranks of r, N (1 - c) / (1 + c) count
+    (M. S. Bartlett, J. R. Stat. Soc. 98 (1935) 536, beside an f that hardly changes from one to the next).
+    """
+    a, b = (np.argsort(np.argsort(v)) - (v.size - 1) / 2 for v in (r, f))
+    alike = max(float(a[1:] @ a[:-1]) / float(a @ a), 0.0)
+    score = float(a @ b) / float(a @ a) * np.sqrt((r.size - 1) * (1 - alike) / (1 + alike))
+    return float(ndtr(-score))
 
 
 def _forgetful(measurement: Measurement, readings: _Restricted, stated: float, profile: Array) -> OwnNoise:

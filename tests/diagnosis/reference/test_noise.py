@@ -113,3 +113,30 @@ def test_noise_that_forgets_by_time_or_by_reading_is_told_apart_at_two_speeds(cl
         half = m.select(np.arange(N) < N // 2)
         assert found.part(half, np.arange(N) < N // 2).gaps.size == N // 2 - 1
     assert hits >= 5
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.8])
+def test_noise_that_does_not_grow_with_the_force_is_not_seen_to(rho: float) -> None:
+    """One in a thousand is, by design; of readings that remember, too."""
+    found = 0
+    for seed in range(200):
+        m = measured(SMOOTH + correlated(np.random.default_rng([5, seed]), TIME, rho))
+        found += own_noise(m, smooth_reference(m)).profile.size > 1
+    assert found <= 5  # of 0.2: by chance once in 10^7
+
+
+def test_noise_that_grows_with_the_force_is_weighed_so() -> None:
+    wrong, each = [], SD * np.hypot(1.0, 4 * SMOOTH / np.max(SMOOTH))
+    for seed in range(20):
+        m = measured(SMOOTH + each * np.random.default_rng([6, seed]).standard_normal(N))
+        noise = own_noise(m, smooth_reference(m))
+        wrong.append(noise.each / each)
+        assert noise.sd == pytest.approx(np.sqrt(np.mean(noise.each**2)))
+    assert np.mean(wrong) == pytest.approx(1.0, abs=0.1)
+    assert np.max(np.abs(np.log(wrong))) < np.log(2)
+
+
+def test_a_jump_at_the_largest_force_is_no_noise_that_grows() -> None:
+    noise = SD * np.random.default_rng(7).standard_normal(N)
+    m = measured(SMOOTH + noise - 20 * SD * (np.arange(N) > int(np.argmax(SMOOTH))))
+    assert own_noise(m, smooth_reference(m)).profile.size == 1
