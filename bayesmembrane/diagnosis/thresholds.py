@@ -170,8 +170,8 @@ class Sizes:
     largest: float = 20.0
     """Times the expected size: nothing larger is looked for."""
     largest_force: float = 50.0
-    """The same of forces, for a load cell may not have been tared, or warm up: half of what it reads at most. Of a drift,
-    which may slow down, until the first leg ends."""
+    """The same of forces, for a load cell may not have been tared, or warm up: half of what it reads at most. Of a
+    drift, which may slow down, until the first leg ends."""
 
 
 @dataclass(frozen=True)

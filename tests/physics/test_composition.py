@@ -273,12 +273,28 @@ def test_a_drift_swings_back() -> None:
     assert half == pytest.approx((swung + once) / 2, rel=1e-9, abs=1e-12)
 
 
-def test_speed_counts_as_a_power() -> None:
+def test_speed_counts_as_a_power_far_above_the_slow_one() -> None:
     m = measured()
-    ratio = force(m, "rate", x=np.array([0.1])) / force(m)
+    ratio = force(m, "rate", x=np.array([0.1, -14.0, 0.0, 0.0])) / force(m)
     fast = m.path.clock > m.path.clock[m.deflection.size // 2 + 8]
     slow = m.path.clock < m.path.clock[m.deflection.size // 2 - 8]
     assert np.median(ratio[fast]) / np.median(ratio[slow]) == pytest.approx(5**0.1, rel=1e-3)
+
+
+def test_what_resists_the_motion_is_gone_at_rest_and_changes_its_sign_on_the_way_back() -> None:
+    """A viscosity, far below the slow speed: a loop that is as much wider as the disc is faster, none at rest."""
+    way = np.concatenate([np.linspace(0.001, 0.02, 30), np.full(20, 0.02), np.linspace(0.0195, 0.002, 30)])
+    at = np.concatenate([np.arange(30.0), 30 + np.arange(20.0), 50 + 0.5 * np.arange(30)])
+    m = measured(way, at)
+    viscous = np.array([0.4, 2.0, 1.0, 1.0])
+    extra = force(m, "rate", x=viscous) * (1 + np.exp(-2.0)) ** 0.4 / force(m) - 1
+    up, rest, back = slice(5, 25), slice(31, 50), slice(55, 78)
+    assert extra[rest] == pytest.approx(0.0, abs=1e-12)
+    assert np.all(extra[up] > 0)
+    assert extra[up] * way[up] == pytest.approx(np.mean(extra[up] * way[up]), rel=1e-3)
+    pushed, pulled = np.mean(extra[up] * way[up]), -np.mean(extra[back] * way[back])
+    speeds = [0.019 / 29, 2 * 0.0175 / 29]
+    assert pulled / pushed == pytest.approx(speeds[1] / speeds[0], rel=0.05)
 
 
 def test_without_times_travel_is_the_clock() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.candidates.speeds import one_speed
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect
@@ -133,6 +134,8 @@ def unsought(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
 def _shows(effect: Effect, m: Measurement) -> bool:
     """True if the motion is such that it is no matter of the energy alone."""
     returns, rests = bool(np.any(m.leg < 0)), bool(m.time is not None and m.holds)
+    if effect.needs_speeds:
+        return returns or not one_speed(m)
     return returns or not effect.needs_return or (rests and effect.shows_at_rest)
 
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.diagnosis.candidates.speeds import one_speed
 from bayesmembrane.diagnosis.detection.scores import Signature, confounded
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.thresholds import TWINS
@@ -81,25 +82,6 @@ def twins_one_way(effects: Sequence[Effect], measurement: Measurement) -> dict[S
         return {}
     known = {e.name for e in effects}
     return {frozenset((e.name, o)): Near(TWINS.alike) for e in effects for o in e.twins_one_way if o in known}
-
-
-def one_speed(*measurements: Measurement) -> bool:
-    """True if the disc moved at one speed, within `TWINS.speeds`, and never stood still; also where nobody timed it.
-
-    Of several tests with ranges of their own, the speed is how much of its range each goes through in a second.
-    """
-    timed = [m for m in measurements if m.time is not None]
-    each = [v for m in timed for v in _speeds(m)]
-    return not any(m.holds for m in timed) and (len(each) < 2 or max(each) < TWINS.speeds * min(each))
-
-
-def _speeds(measurement: Measurement) -> list[float]:
-    """1/s, those of the parts of every leg over the largest deflection."""
-    leg = np.cumsum(np.abs(np.diff(measurement.leg, prepend=measurement.leg[0])) > 0)
-    speed = measurement.path.speed[measurement.on_path] / np.max(np.abs(measurement.deflection))
-    legs = [speed[leg == n] for n in np.unique(leg)]
-    parts = [p for own in legs for p in np.array_split(own, max(1, min(TWINS.parts, own.size // TWINS.readings)))]
-    return [float(np.median(p)) for p in parts if p.size >= TWINS.readings]
 
 
 def swapped(names: Set, pairs: Iterable[Set]) -> Iterator[tuple[str, str, Set]]:

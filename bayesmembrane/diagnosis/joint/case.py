@@ -12,6 +12,7 @@ from scipy.linalg import block_diag
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, hidden
 from bayesmembrane.diagnosis.candidates.sampled import checked
 from bayesmembrane.diagnosis.candidates.signatures import signatures
+from bayesmembrane.diagnosis.candidates.speeds import one_speed
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.detection.detect import Detection
 from bayesmembrane.diagnosis.detection.lack_of_fit import lack_of_fit
@@ -19,7 +20,7 @@ from bayesmembrane.diagnosis.detection.scores import Signature, score_test
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase, OpenCase, Question, Tell, renewed, seen_elsewhere
 from bayesmembrane.diagnosis.explanation.foreign import Foreign
 from bayesmembrane.diagnosis.explanation.foreign_search import OneTest, beside
-from bayesmembrane.diagnosis.explanation.twins import Near, Pairs, one_speed, twins, twins_in_time, twins_one_way
+from bayesmembrane.diagnosis.explanation.twins import Near, Pairs, twins, twins_in_time, twins_one_way
 from bayesmembrane.diagnosis.joint.effects import EffectInTests, effects_in_tests
 from bayesmembrane.diagnosis.joint.search import JointSearch, joint_noise
 from bayesmembrane.diagnosis.reference.noise import Whitened, whitened

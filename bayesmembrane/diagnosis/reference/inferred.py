@@ -21,7 +21,8 @@ def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
 
     A stated standard deviation is a claim, often from a data sheet: where the readings scatter more than that, or
     remember, what they do counts, in proportion to what is stated of each. A stated covariance is believed. Where
-    nothing is stated, or one number for all readings that is not believed, the noise may grow with the force (`_growing`).
+    nothing is stated, or one number for all readings that is not believed, the noise may grow with the force
+    (`_growing`).
 
     For AR(1) noise e the restricted likelihood of rho, sd maximised away, is
     -1/2 [(N - p) ln RSS + ln |R| + ln |B^T R^-1 B|] (D. A. Harville, J. Am. Stat. Assoc. 72 (1977) 320); the prior

@@ -106,6 +106,7 @@ class Effect(ABC):
     needs_time : True if it means nothing without times
     needs_return : True if a test that only goes one way shows nothing of it that an energy could not: not sought there
     shows_at_rest : True if a hold shows it as well as a return does
+    needs_speeds : True if a test that only goes one way at one speed shows nothing of it that an energy could not
     absorbed : "" or the sentence that says why the material absorbs it without trace; then nothing can name it
     exact : True if it has no law that could be off: an offset is an offset
     may_change : True of one that is exact, and whose size may all the same become another one while a test is made
@@ -140,6 +141,7 @@ class Effect(ABC):
     needs_time: ClassVar[bool] = False
     needs_return: ClassVar[bool] = False
     shows_at_rest: ClassVar[bool] = False
+    needs_speeds: ClassVar[bool] = False
     absorbed: ClassVar[str] = ""
     exact: ClassVar[bool] = False
     may_change: ClassVar[bool] = False

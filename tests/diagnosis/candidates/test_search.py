@@ -67,7 +67,7 @@ def test_what_a_first_loading_alone_hides_is_looked_for_where_the_film_returns_o
     """There it is another energy; further tests of the material may show it."""
     m = single[0].measurement
     sought, there = ({e.name for e in available(x, PLAIN)} for x in (m, cyclic[0].measurement))
-    kept = {"mullins", "permanent_set", "viscoelastic", "hysteresis"}
+    kept = {"mullins", "permanent_set", "viscoelastic", "hysteresis", "rate"}
     assert not kept & sought
     assert kept <= there
     assert kept <= {e.name for e in hidden(m, PLAIN)}
@@ -122,9 +122,9 @@ def test_evidence_equals_importance_sampling(cyclic, name) -> None:
     weights = np.full(4000, -np.inf)
     weights[kept] = log_likelihood + log_prior - law.logpdf(draws[kept])
     drawn = logsumexp(weights) - np.log(4000) + prior_of_sizes
-    # Of what is sudden few draws count: places that are a reading apart are no line.
-    sudden = bool(search.event_steps(found.hypothesis))
-    assert linear == pytest.approx(drawn, abs=1.5 if sudden else 0.8)
+    # Of what is sudden few draws count: places that are a reading apart are no line. Nor are signs on the way back.
+    bent = bool(search.event_steps(found.hypothesis)) or name == "rate"
+    assert linear == pytest.approx(drawn, abs=1.5 if bent else 0.8)
 
     # What the diagnosis draws itself, of fewer draws, adapted: within five standard errors of both.
     own = sampled(search, found, np.random.default_rng(9))

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.diagnosis.candidates.speeds import one_speed
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.twins import Near, Stands, levelled, one_speed, swapped, twins, twins_one_way
+from bayesmembrane.diagnosis.explanation.twins import Near, Stands, levelled, swapped, twins, twins_one_way
 from bayesmembrane.diagnosis.joint.case import JointCase
 from bayesmembrane.diagnosis.joint.effects import effects_in_tests
 from bayesmembrane.diagnosis.thresholds import TWINS
