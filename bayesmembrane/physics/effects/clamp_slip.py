@@ -49,6 +49,7 @@ class ClampSlip(Slack):
         "below loading, reloading on the unloading curve, and no return to the first curve."
     )
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("permanent_set",)  # both are a film that has become longer
+    twins_one_way: ClassVar[tuple[str, ...]] = ("machine_compliance",)  # both leave it less way, which only one returns
     like_foreign: ClassVar[tuple[str, ...]] = ("lost_steps",)
     second: ClassVar[tuple[str, str, str] | None] = ("second", "place", "second_place")
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
