@@ -28,8 +28,7 @@ NOMINAL_SPEED = 1e-3
 """m/s: without times the disc counts as moved at this speed, so that a second is a millimetre of travel."""
 OVER = 0.98
 """Of the largest deflection of a first leg: a loading is all but over there, and what follows may be a hold."""
-RESTING = 3
-"""Steps in a row that are slower than `STILL` of the fastest on a leg: there the disc rests."""
+WINDOW = 9  # steps over which a speed is averaged
 SLOWEST = 1e-3
 """Of the largest speed of a path: below it the disc counts as moving this fast."""
 
@@ -117,37 +116,40 @@ class Motion:
         """
         if self.time is None or self.time.size < 2:
             return np.full(self.deflection.size, NOMINAL_SPEED)
-        found = self._paces[0]
-        fastest = float(np.max(found))
-        return np.maximum(found, SLOWEST * fastest) if fastest > 0 else np.full(found.size, NOMINAL_SPEED)
-
-    @property
-    def rests(self) -> NDArray[np.bool_]:
-        """(N,) True where the disc has stood still since the reading before, as far as can be seen."""
-        return self._paces[1]
-
-    @cached_property
-    def _paces(self) -> tuple[Array, NDArray[np.bool_]]:
-        """(N,) m/s, speed averaged over up to nine steps of one leg between rests, and where the disc `rests`.
-
-        At a reading it is that of the step which ends there: a disc that stops has just moved, one that starts has not.
-        """
-        size = self.deflection.size
-        if self.time is None or size < 2:
-            return np.full(size, NOMINAL_SPEED), np.zeros(size, np.bool_)
-        speed, still = np.abs(np.diff(self.deflection)) / np.diff(self.time), np.zeros(size, np.bool_)
-        middle = np.empty(size)
+        speed = np.abs(np.diff(self.deflection)) / np.diff(self.time)
+        middle = np.empty(self.deflection.size)
         for leg in self._each_leg:
             # The steps that end and begin on this leg; a leg of one point has those around it.
             low, high = max(leg[0] - (leg.size < 2), 0), max(leg[-1], leg[0] + 1)
-            inner = speed[low:high]
-            resting = _lasting(inner < STILL * np.max(inner), RESTING)
-            smooth = np.empty(inner.size)
-            for part in np.split(np.arange(inner.size), np.flatnonzero(np.diff(resting)) + 1):
-                smooth[part] = _moving_mean(inner[part], 9)
-            ending = np.clip(leg - 1 - low, 0, inner.size - 1)
-            middle[leg], still[leg] = smooth[ending], resting[ending]
-        return middle, still
+            smooth = _moving_mean(speed[low:high])
+            middle[leg] = np.interp(leg, np.arange(low, low + smooth.size) + 0.5, smooth)
+        fastest = float(np.max(middle))
+        return np.maximum(middle, SLOWEST * fastest) if fastest > 0 else np.full(middle.size, NOMINAL_SPEED)
+
+    @cached_property
+    def rests(self) -> NDArray[np.bool_]:
+        """(N,) True where the disc has stood still since the reading before (`holds`)."""
+        out = np.zeros(self.deflection.size, np.bool_)
+        for still in holds(self.deflection):
+            out[still[1:]] = True
+        return out
+
+    @cached_property
+    def moving_speed(self) -> Array:
+        """(N,) m/s: as `speed`, but zero where the disc `rests`, and not averaged across a rest.
+
+        At a reading it is that of the steps up to there, and of those that follow: a disc that stops has just moved.
+        """
+        if self.time is None or not np.any(self.rests):
+            return self.speed
+        speed, out = np.abs(np.diff(self.deflection)) / np.diff(self.time), np.zeros(self.deflection.size)
+        for leg in self._each_leg:
+            moving = leg[~self.rests[leg]]
+            for part in np.split(moving, np.flatnonzero(np.diff(moving) > 1) + 1):
+                # The steps that end at these readings; the first reading of all has the one that begins there.
+                ends = np.maximum(part - 1, 0)
+                out[part] = _moving_mean(speed[ends]) if part.size else 0.0
+        return out
 
     @property
     def _each_leg(self) -> list[NDArray[np.intp]]:
@@ -164,19 +166,10 @@ class Motion:
         return out
 
 
-def _moving_mean(values: Array, window: int) -> Array:
-    """Of so many neighbours, or of as many as there are."""
-    one = np.ones(min(window, values.size))
+def _moving_mean(values: Array) -> Array:
+    """Of `WINDOW` neighbours, or of as many as there are."""
+    one = np.ones(min(WINDOW, values.size))
     return np.asarray(np.convolve(values, one, "same") / np.convolve(np.ones(values.size), one, "same"))
-
-
-def _lasting(flags: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
-    """``flags`` (N,), as far as so many follow each other."""
-    out = flags.copy()
-    for run in np.split(np.arange(flags.size), np.flatnonzero(np.diff(flags)) + 1):
-        if run.size < least:
-            out[run] = False
-    return out
 
 
 def legs(deflection: Array) -> NDArray[np.int8]:

@@ -36,39 +36,51 @@ def own_noise(measurement: Measurement, basis: Array) -> OwnNoise:
         sd = float(np.sqrt(np.mean(np.diag(covariance))))
         return OwnNoise(sd, 0.0, 0.0, gaps, np.asarray(np.linalg.cholesky(covariance), dtype=float), np.inf)
     sd = 1.0 if stated is None else float(np.sqrt(np.mean(stated**2)))
-    profile = _growing(measurement.force, basis) if stated is None else stated / sd
+    profile = _growing(measurement, basis) if stated is None else stated / sd
     y, q = divided(measurement.force, profile), orthonormal(divided(basis, profile))
     if not measurement.rig.has_path:
         # States are no stations of one path: their order is that of a file, and nothing remembers by it.
-        return _forgetful(measurement, _Restricted(y, q, readings), sd, profile)
+        return _believed(measurement, basis, _noise_at(_Restricted(y, q, readings), 0.0, 0.0, "readings"), profile)
     found = [_most_likely(_Restricted(y, q, gaps), "time")]
     if gaps.size and float(np.max(np.abs(gaps - 1))) > NOISE.even_steps:
         found.append(_most_likely(_Restricted(y, q, readings), "readings"))
-    inferred = replace(min(found, key=lambda f: f[0])[1], profile=profile)
+    return _believed(measurement, basis, min(found, key=lambda f: f[0])[1], profile)
+
+
+def _believed(measurement: Measurement, basis: Array, inferred: OwnNoise, profile: Array) -> OwnNoise:
+    """The noise that is stated, unless the readings contradict it: then what is ``inferred`` with its ``profile``."""
+    inferred, stated = replace(inferred, profile=profile), measurement.force_sd
     if stated is None:
         return inferred
+    sd = float(np.sqrt(np.mean(stated**2)))
     larger = chdtrc(inferred.dof, (inferred.sd / sd) ** 2 * inferred.dof) < NOISE.doubt_below
-    if inferred.dof < NOISE.doubt_from_dof or not (inferred.remembers or larger):
-        return OwnNoise(sd, 0.0, 0.0, gaps, None, np.inf, profile=profile)
-    if np.all(stated == stated[0]):  # one number for all readings says nothing of which of them are noisier
+    remembers = measurement.rig.has_path and inferred.remembers
+    if inferred.dof < NOISE.doubt_from_dof or not (remembers or larger):
+        return OwnNoise(sd, 0.0, 0.0, inferred.gaps, None, np.inf, profile=profile)
+    if np.allclose(stated, stated[0], rtol=1e-9):  # one number for all says nothing of which of them are noisier
         inferred = own_noise(replace(measurement, force_sd=None), basis)
     return replace(inferred, excess=inferred.sd / sd)
 
 
-def _growing(force: Array, basis: Array) -> Array:
+def _growing(measurement: Measurement, basis: Array) -> Array:
     """(N,) standard deviation of each reading over the root mean square of all, sqrt(1 + (b f)^2) of the part f of the
-    largest force that ``basis`` (N, p) follows, where that is beyond doubt; else (1,) one.
+    largest force that ``basis`` (N, p) follows, counted from that at the least deflection; else (1,) one.
 
-    Beyond doubt is a rank correlation with f of the size |r| of what is left; b minimises sum ln w + N ln sum |r| / w,
-    as of Laplace's distribution: a jump that the basis does not follow is a few large r.
+    It takes more than chance: a rank correlation with f of the size |r| of what is left. b minimises
+    sum ln w + N ln sum |r| / w, as of Laplace's distribution: a jump that the basis does not follow is a few large r.
+    Readings that repeat the one before are left out, for what is rounded off or cut off is no noise.
     """
+    force = measurement.force
     q = orthonormal(basis)
     followed = q @ (q.T @ force)
     left = 1 - np.sum(q * q, axis=1)
-    some = left > NOISE.least_left
-    if np.count_nonzero(some) < NOISE.growing_from:
+    repeated = np.diff(force) == 0
+    alike = np.append(repeated, False) | np.append(False, repeated)
+    some = (left > NOISE.least_left) & ~alike
+    if np.count_nonzero(some) < max(NOISE.growing_from, 0.5 * force.size):
         return np.ones(1)
-    f = np.abs(followed) / max(float(np.max(np.abs(followed))), TINY)
+    f = np.abs(followed - followed[int(np.argmin(np.abs(measurement.deflection)))])
+    f /= max(float(np.max(f)), TINY)
     r = np.abs(force - followed)[some] / np.sqrt(left[some])
     if _by_chance(r, f[some]) > NOISE.growing_below:
         return np.ones(1)
@@ -92,17 +104,6 @@ def _by_chance(r: Array, f: Array) -> float:
     alike = max(float(a[1:] @ a[:-1]) / float(a @ a), 0.0)
     score = float(a @ b) / float(a @ a) * np.sqrt((r.size - 1) * (1 - alike) / (1 + alike))
     return float(ndtr(-score))
-
-
-def _forgetful(measurement: Measurement, readings: _Restricted, stated: float, profile: Array) -> OwnNoise:
-    """Independent noise: what is stated, unless the readings scatter more."""
-    found = replace(_noise_at(readings, 0.0, 0.0, "readings"), profile=profile)
-    if measurement.force_sd is None:
-        return found
-    larger = chdtrc(found.dof, (found.sd / stated) ** 2 * found.dof) < NOISE.doubt_below
-    if larger and found.dof >= NOISE.doubt_from_dof:
-        return replace(found, excess=found.sd / stated)
-    return OwnNoise(stated, 0.0, 0.0, readings.gaps, None, np.inf, profile=profile)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,9 @@ from bayesmembrane.physics.effects.base import EffectParameter, Memory
 NEAR_REST = 0.03
 """Of the full range: below this deflection what it resists is the same part of the force as there."""
 
+MOST = 10.0
+"""Times as large the force of a film may be as at rest."""
+
 
 @dataclass(frozen=True)
 class Rate(Memory):
@@ -59,8 +62,8 @@ class Rate(Memory):
             "lean",
             "-",
             "power of the deflection by which it is a smaller part of the force",
-            Normal(0.5, 0.5),
-            (-1.5, 2.5),
+            Normal(0.5, 0.45),
+            (-1.0, 2.0),
         ),
     )
 
@@ -71,9 +74,9 @@ class Rate(Memory):
 
     def remember(self, p: Array, force: Array, path: Motion) -> Array:
         exponent, log_slow, reversed_, lean = (p[:, i : i + 1] for i in range(4))
-        speed = np.where(path.rests, 0.0, path.speed) / NOMINAL_SPEED
+        speed = path.moving_speed / NOMINAL_SPEED
         faster = np.expm1(exponent * np.log1p(speed * np.exp(-log_slow)))
         sense = np.where(path.leg > 0, 1.0, 1 - 2 * reversed_)
         part = np.maximum(np.abs(path.deflection) / path.full_range, NEAR_REST)
-        factor = np.maximum(1 + sense * faster * part**-lean, 0.0)
+        factor = np.clip(1 + sense * faster * part**-lean, 0.0, MOST)
         return np.asarray(force * factor * np.exp(-exponent * np.log1p(np.exp(-log_slow))))

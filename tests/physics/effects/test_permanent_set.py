@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bayesmembrane.data.motion import Motion
 from bayesmembrane.physics.effects.permanent_set import PermanentSet
 from tests.physics.effects.protocols import path
 
@@ -13,7 +14,8 @@ BACK = slice(UP.size, None)
 
 def shift(**said: float) -> np.ndarray:
     """(N,) m, of a film that is lifted once and let go."""
-    usual = {"set": 1e-4, "exponent": 2.0, "repeated": 0.0, "saturation": 0.0, "creeps": 0.0} | said
+    usual = {"set": 1e-4, "exponent": 2.0, "repeated": 0.0, "saturation": 0.0, "creeps": 0.0}
+    usual |= {"delay": 1e-9} | said
     p = np.array([[usual[c.name] for c in PermanentSet.coordinates]])
     film = PermanentSet().deflect(p, PATH[None, :], path(PATH))[0]
     return np.asarray(PATH - film)
@@ -40,3 +42,19 @@ def test_half_way_down_the_shift_is_the_set(relieved: float) -> None:
     half = UP.size + int(np.argmin(np.abs(PATH[BACK] - 0.5 * UP[-1])))
     assert found[half] == pytest.approx(0.5e-4)
     assert found[UP.size - 1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_set_that_follows_late_grows_in_a_hold_and_comes_to_the_same() -> None:
+    """Of a first-order law, z' = (G - z) / delay, beside an integration in small steps."""
+    held = np.concatenate([UP, np.full(80, UP[-1])])
+    p = np.array([[{"set": 1e-4, "exponent": 2.0, "delay": 12.0}.get(c.name, 0.0) for c in PermanentSet.coordinates]])
+    there = Motion(held, np.arange(1.0, held.size + 1), UP[-1])
+    found = held - PermanentSet().deflect(p, held[None, :], there)[0]
+    fine = np.linspace(0.0, there.clock[-1], 200_001)
+    grown = (np.interp(fine, there.clock, held) / UP[-1]) ** 2
+    z, step = np.zeros(fine.size), fine[1]
+    for i in range(1, fine.size):
+        z[i] = z[i - 1] + step * (grown[i - 1] - z[i - 1]) / 12.0
+    exact = 1e-4 * np.interp(there.clock, fine, z)
+    assert found[2:] == pytest.approx(exact[2:], rel=0.02, abs=1e-7)
+    assert found[-1] > 1.1 * found[UP.size - 1]
