@@ -71,6 +71,12 @@ def origin(folder: str | Path, hypothesis: Hypothesis) -> Origin:
             str(folder),
             "begin without it",
         )
+    if chains.x.shape[-1] != len(names):
+        raise StorageError(
+            f"the run holds {chains.x.shape[-1]} coordinates, and its hypothesis has {len(names)}: of another version",
+            str(folder),
+            "begin without it",
+        )
     return Origin(folder, chains, segments.end)
 
 

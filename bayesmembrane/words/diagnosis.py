@@ -258,9 +258,10 @@ def unsought_sentence(found: Diagnosis) -> str:
     """Which effects were not looked for, and what would show them; "" if there are none."""
     known = components("effects")
     named = listed(known[name].title for name in found.unsought)
-    return (
-        f"Not looked for, since a test that only goes one way hides them: {named}; unload to see them." if named else ""
-    )
+    if not named:
+        return ""
+    cure = "unload, or pull at another speed," if "rate" in found.unsought else "unload"
+    return f"Not looked for, since a test that only goes one way hides them: {named}; {cure} to see them."
 
 
 def set_aside(held: HeldOut | None) -> str:

@@ -76,3 +76,33 @@ def test_a_hold_is_where_the_disc_stands_still_and_not_where_it_goes_slowly() ->
     assert holds(np.linspace(0.0, 0.04, 5000)) == []
     # Ten times as many readings on a leg, as of one ten times as slow that is read at the same rate.
     assert holds(np.concatenate([up, np.linspace(0.04, 0.0, 600)])) == []
+
+
+UP = np.linspace(0.0, 0.02, 41)
+
+
+def test_a_disc_rests_where_it_is_held_and_has_just_moved_where_it_stops() -> None:
+    held = np.concatenate([UP, np.full(30, UP[-1]), UP[-2::-1]])
+    m = Motion(held, np.arange(held.size, dtype=float), UP[-1])
+    assert np.flatnonzero(m.rests).tolist() == list(range(41, 71))
+    assert m.moving_speed[m.rests] == pytest.approx(0.0)
+    assert m.moving_speed[~m.rests] == pytest.approx(0.02 / 40)
+
+
+def test_steps_of_an_encoder_slow_parts_and_turns_are_no_rests() -> None:
+    t = np.arange(2000.0) * 0.04
+    steps = Motion(np.floor(5 * t) / 5 * 1e-3, t, 0.08)  # 1 mm/s, told in steps of 0.2 mm
+    sine = Motion(0.01 * (1 - np.cos(2 * np.pi * t / 40)), t, 0.02)
+    slower = Motion(np.concatenate([UP, UP[-1] + 0.05 * UP[1:]]), np.arange(81.0), 0.021)
+    noisy = Motion(1e-3 * t + 1e-5 * np.random.default_rng(1).standard_normal(t.size), t, 0.08)
+    for m in (steps, sine, slower, noisy):
+        assert not np.any(m.rests)
+        assert np.array_equal(m.moving_speed, m.speed)
+    assert np.median(steps.moving_speed) == pytest.approx(1e-3, rel=0.15)
+
+
+def test_the_first_leg_ends_at_the_first_turn_or_with_the_test() -> None:
+    there_and_back = np.concatenate([UP, UP[-2::-1]])
+    clock = np.arange(there_and_back.size, dtype=float)
+    assert Motion(there_and_back, clock, 0.02).first_turn == pytest.approx(40.0)
+    assert Motion(UP, clock[:41], 0.02).first_turn == pytest.approx(40.0)

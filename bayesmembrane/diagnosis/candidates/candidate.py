@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.speeds import one_speed
+from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect
@@ -44,6 +45,12 @@ class Candidate:
     theta: Array
     form: Array
     by_draws: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.x.size != self.hypothesis.curve_size:
+            size = self.hypothesis.curve_size
+            said = f"{self.label} has {size} parameters, and {self.x.size} are given: another version wrote them"
+            raise StorageError(said, remedy="diagnose again")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -127,7 +134,7 @@ def absorbed(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
 
 
 def unsought(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
-    """Effects that the test shows, if at all, as another energy would, since it only goes one way."""
+    """Effects that the test shows, if at all, as another energy would, since it only goes one way, or at one speed."""
     return [e for e in hidden(measurement, hypothesis) if not e.absorbed]
 
 
