@@ -203,7 +203,7 @@ def test_the_tape_that_ships_relaxes() -> None:
     found = diagnose(m, Question(hypothesis("yeoh"), False))
     assert found.verdict in ("named", "ambiguous")
     assert sum(q for name, q in found.probabilities.effects.items() if "viscoelastic" in name) > 0.6
-    assert max(found.probabilities.effects, key=found.probabilities.effects.__getitem__) == "viscoelastic"
+    assert "viscoelastic" in max(found.probabilities.effects, key=found.probabilities.effects.__getitem__).split("+")
 
 
 def test_a_stated_deviation_that_the_readings_contradict_raises_no_alarm(tmp_path) -> None:
