@@ -15,7 +15,7 @@ NEAR_REST = 0.03
 """Of the full range: below this deflection what it resists is the same part of the force as there."""
 
 MOST = 10.0
-"""Times as large the force of a film may be as at rest."""
+"""Times as large as at rest the force of a film may be."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Rate(Memory):
     1 - 2 reversed while it comes back. The material's constants are those on the way at 1 mm/s. Far above the slow
     speed this is a power of the speed, far below it a viscosity, and at rest it is gone. Chains that have no time to
     rearrange are stiffer on both ways (reversed = 0); what a fluid between them resists has the sign of the motion
-    (1), and is a larger part of the force where that is small (lean = 1 of a strip).
+    (1), and is a larger part of the force where that is small (lean = 1 of a strip), up to `MOST` times all of it.
     """
 
     name: ClassVar[str] = "rate"
