@@ -45,15 +45,17 @@ class Rate(Memory):
     of_the_material = True
     constant = True
     needs_speeds: ClassVar[bool] = True
-    twins_at_one_speed: ClassVar[tuple[str, ...]] = ("hysteresis", "friction")
+    # Far above the slow speed a loop is hardly wider where the disc is faster: only a hold shows that it is gone.
+    twins_at_one_speed: ClassVar[tuple[str, ...]] = ("viscoelastic",)
+    twins_at_any_speed: ClassVar[tuple[str, ...]] = ("hysteresis", "friction")
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("exponent", "-", "power of the speed", HalfNormal(0.05), (0.0, 0.5), 0.0),
         EffectParameter(
             "log_slow",
             "-",
             "ln of the speed, in mm/s, below which it is nearly as at rest",
-            Normal(-4.6, 2.5),
-            (-16.0, 9.0),
+            Normal(-1.5, 1.45),
+            (-6.0, 5.0),
         ),
         EffectParameter(
             "reversed", "-", "part of it that changes its sign on the way back", Uniform(0.0, 1.0), (0.0, 1.0)
