@@ -91,12 +91,13 @@ def test_levels_are_those_of_a_first_look_whoever_is_raised() -> None:
 def test_loops_losses_and_longer_films_of_whatever_law_are_twins_whatever_the_motion() -> None:
     every = [cls() for cls in components("effects").values()]
     alike = (("friction", "hysteresis"), ("mullins", "tearing"), ("clamp_slip", "permanent_set"))
+    alike += (("rate", "friction"), ("rate", "hysteresis"))
     found = twins(every, ())
     assert set(found) == {frozenset(pair) for pair in alike}
     # Of loops no shape is sure: what is no more than a little behind is alike, whatever it leaves.
     loose = [pair for pair, near in found.items() if near.left == np.inf and near.behind > TWINS.behind]
     assert loose == [frozenset({"friction", "hysteresis"})]
-    assert not twins([e for e in every if e.name not in ("friction", "mullins", "clamp_slip")], ())
+    assert not twins([e for e in every if e.name not in ("friction", "mullins", "clamp_slip", "rate")], ())
 
 
 def test_sets_differ_by_one_twin() -> None:
