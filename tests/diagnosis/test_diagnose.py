@@ -192,7 +192,7 @@ def test_a_power_law_of_time_over_four_decades_is_relaxation() -> None:
     m = pulled_and_held(time, 10.0, lambda lag: (1 + lag / 0.05) ** -0.12, 1e-3, 50812)
     found = diagnose(m, Hypothesis(materials()["mooney_rivlin"]))
     assert found.verdict in ("named", "ambiguous")
-    assert all("viscoelastic" in j.candidate.names for j in found.members)
+    assert all("viscoelastic" in j.candidate.names for j in found.members if j.probability > 0.01)
     assert next(iter(found.probabilities.effects)) == "viscoelastic"
     assert found.after.reduced_chi2 < 2
 

@@ -79,7 +79,7 @@ def test_a_set_that_a_cycle_leaves_is_the_same_in_a_prediction_of_a_shorter_one(
     claim = hypothesis("neo_hookean", effects=["permanent_set"])
     whole = cycle(STRETCH, 4e4 * (STRETCH - 1) + 1.0).measurement
     part = whole.select(np.arange(15))
-    x = np.array([np.log(60.0), 0.01, 2.0, 0.3, 0.2, 1.0, 0.5, 0.5])
+    x = np.array([np.log(60.0), 0.01, 2.0, 0.3, 0.2, 1.0, 0.5, -5.5, 0.5])
     force = Forward(claim, whole, whole.deflection)(x[None, :]).force[0]
     nothing = np.zeros((0, len(whole))), np.zeros(2), np.zeros(len(whole))
     fitted = Candidate(claim, x, whole.force - force, np.zeros((len(whole), x.size)), 0.0, (), *nothing)

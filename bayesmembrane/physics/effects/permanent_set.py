@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.data.motion import Motion
-from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
+from bayesmembrane.ground.parameters import Array, HalfNormal, Normal, Uniform
 from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, REPEATED, SATURATION, growth, relaxing
 from bayesmembrane.physics.effects.base import Deflection, EffectParameter, running_max
 
@@ -21,7 +21,7 @@ class PermanentSet(Deflection):
     """delta_film = delta - set G (1 - rejoin y) (1 / (2 y))^relieved, y = delta / m, slack below; m: largest deflection
     so far.
 
-    G is the growth law of the test (1 after a first loading to its full range), which the set follows with a ``delay``,
+    G is the growth law of the test (1 after a first loading to its full range), which the set follows with a delay,
     in holds and on the way back, too. ``rejoin`` 1 comes back to the first
     loading curve at m, 0 keeps the whole shift. What is lost may be a length (``relieved`` 0), or stay in the film as a
     force, which moves a flat, soft film further than a taut one (1 to 2, as the slope of its curve rises).
@@ -58,12 +58,11 @@ class PermanentSet(Deflection):
         SATURATION,
         CREEPS,
         EffectParameter(
-            "delay",
-            "s",
-            "time with which the set follows",
-            LogNormal(0.35, 1.2),
-            (1e-3, 35.0),
-            of_the_test=True,
+            "log_delay",
+            "-",
+            "ln of the time with which the set follows, over that of a first loading to the full range",
+            Normal(-5.5, 1.3),
+            (-11.0, 1.0),
         ),
         EffectParameter(
             "relieved",
@@ -77,7 +76,8 @@ class PermanentSet(Deflection):
     def deflect(self, p: Array, deflection: Array, path: Motion) -> Array:
         largest = running_max(deflection)
         grown = growth(p[:, 1:2], p[:, 3:4], deflection, path, p[:, 4:5], p[:, 5:6])
-        lasting = p[:, :1] * (grown - relaxing(grown, np.diff(path.clock, prepend=0.0), p[:, 6:7]))
+        delay = np.exp(p[:, 6:7]) * path.full_range / path.pace
+        lasting = p[:, :1] * (grown - relaxing(grown, np.diff(path.clock, prepend=0.0), delay))
         with np.errstate(all="ignore"):
             part = np.where(largest > 0, np.maximum(deflection, 0.0) / largest, 0.0)
         further = (2 * np.maximum(part, FLAT)) ** -p[:, 7:8]

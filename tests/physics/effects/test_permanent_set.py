@@ -15,7 +15,7 @@ BACK = slice(UP.size, None)
 def shift(**said: float) -> np.ndarray:
     """(N,) m, of a film that is lifted once and let go."""
     usual = {"set": 1e-4, "exponent": 2.0, "repeated": 0.0, "saturation": 0.0, "creeps": 0.0}
-    usual |= {"delay": 1e-9} | said
+    usual |= {"log_delay": -25.0} | said
     p = np.array([[usual[c.name] for c in PermanentSet.coordinates]])
     film = PermanentSet().deflect(p, PATH[None, :], path(PATH))[0]
     return np.asarray(PATH - film)
@@ -47,8 +47,11 @@ def test_half_way_down_the_shift_is_the_set(relieved: float) -> None:
 def test_a_set_that_follows_late_grows_in_a_hold_and_comes_to_the_same() -> None:
     """Of a first-order law, z' = (G - z) / delay, beside an integration in small steps."""
     held = np.concatenate([UP, np.full(80, UP[-1])])
-    p = np.array([[{"set": 1e-4, "exponent": 2.0, "delay": 12.0}.get(c.name, 0.0) for c in PermanentSet.coordinates]])
     there = Motion(held, np.arange(1.0, held.size + 1), UP[-1])
+    late = float(np.log(12.0 * there.pace / UP[-1]))
+    p = np.array(
+        [[{"set": 1e-4, "exponent": 2.0, "log_delay": late}.get(c.name, 0.0) for c in PermanentSet.coordinates]]
+    )
     found = held - PermanentSet().deflect(p, held[None, :], there)[0]
     fine = np.linspace(0.0, there.clock[-1], 200_001)
     grown = (np.interp(fine, there.clock, held) / UP[-1]) ** 2

@@ -145,7 +145,7 @@ def test_a_mixture_of_all_coordinates_proposes_those() -> None:
 
 
 def test_what_is_not_proportional_to_a_modulus_is_not_collapsed() -> None:
-    m = strip("sd")
+    m = strip("sd", 15)
     assert collapsed(Posterior(hypothesis("gent"), m)) is not None
     assert collapsed(Posterior(hypothesis("neo_hookean"), m)) is None
     assert collapsed(Posterior(hypothesis("gent", noise="ar1"), m)) is None

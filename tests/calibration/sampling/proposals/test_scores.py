@@ -89,8 +89,8 @@ def test_a_place_at_an_end_of_the_support_stays_possible() -> None:
 
 def test_a_posterior_of_scores_is_that_of_coordinates_stretched() -> None:
     """Also what an emulator asks, which takes a shorter way where the noise allows for it."""
-    stretch = np.linspace(1.1, 2.5, 12)
-    force = 0.15 * (stretch - stretch**-2) + 2e-3 * np.random.default_rng(7).standard_normal(12)
+    stretch = np.linspace(1.1, 2.5, 15)
+    force = 0.15 * (stretch - stretch**-2) + 2e-3 * np.random.default_rng(7).standard_normal(15)
     m = Measurement(0.05 * (stretch - 1), force, Uniaxial(0.05, 0.01), Specimen("band", 5e-4))
     for noise in ("white", "ar1", "form"):
         p = Posterior(hypothesis("gent", ["permanent_set", "machine_compliance"], noise), m)
