@@ -181,7 +181,7 @@ class Posterior:
         return self.hypothesis.noise.bind(self.measurement)
 
     @property
-    def weaker(self) -> Posterior | None:
+    def with_weaker_convexity(self) -> Posterior | None:
         """The same with the next weaker convexity prior; None if its own asks nothing."""
         mode = self.hypothesis.convexity.weaker
         return None if mode is None else replace(self, hypothesis=replace(self.hypothesis, convexity=mode))

@@ -20,8 +20,8 @@ def ruled_out_gain(posterior: Posterior | JointPosterior, x: Array, log_posterio
     are, then around the best of them, with the next weaker convexity prior. 0 if none is better; None where the prior
     asks nothing.
     """
-    free = posterior.weaker
-    if free is None:
+    wider = posterior.with_weaker_convexity
+    if wider is None:
         return None
     rng, count = np.random.default_rng([seed, 3]), max(LEAST, min(POINTS, READINGS // posterior.readings))
     x, log_posterior = x.reshape(-1, x.shape[-1]), log_posterior.ravel()
@@ -29,13 +29,13 @@ def ruled_out_gain(posterior: Posterior | JointPosterior, x: Array, log_posterio
     some = x[chosen]
     apart = WIDER * (some - some.mean(axis=0)) / np.sqrt(len(some))  # z @ apart has the covariance of the draws
     best = some[int(np.argmax(log_posterior[chosen]))]
-    highest = within = float(weighed(free, best[None]).log_posterior[0])
+    highest = within = float(weighed(wider, best[None]).log_posterior[0])
     for _ in range(ROUNDS):
         tried = best + rng.standard_normal((count, len(some))) @ apart
         tried = tried[~posterior.prior.surely_inside(tried)]  # of the others none is ruled out
         if not len(tried):
             continue
-        lp = weighed(free, tried).log_posterior
+        lp = weighed(wider, tried).log_posterior
         if np.nanmax(lp) > highest:
             best, highest = tried[int(np.nanargmax(lp))], float(np.nanmax(lp))
     allowed = bool(np.isfinite(weighed(posterior, best[None]).log_prior[0]))

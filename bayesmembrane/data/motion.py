@@ -138,7 +138,7 @@ class Motion:
     def moving_speed(self) -> Array:
         """(N,) m/s: as `speed`, but zero where the disc `rests`, and not averaged across a rest.
 
-        At a reading it is that of the steps up to there, and of those that follow: a disc that stops has just moved.
+        It is the mean over the steps that end at the readings around one: where a disc stops it has just moved.
         """
         if self.time is None or not np.any(self.rests):
             return self.speed

@@ -172,8 +172,8 @@ class Sizes:
     largest_force: float = 50.0
     """The same of forces, for a load cell may not have been tared, or warm up: half of what it reads at most. Of a
     drift, which may slow down, until the first leg ends."""
-    soonest: float = 10.0
-    """Times as long as its first leg a test counts for that, at most: a preload is no part of it."""
+    first_legs: float = 10.0
+    """A test counts for that as no longer than so many of its first leg: a preload is none."""
 
 
 @dataclass(frozen=True)

@@ -204,6 +204,9 @@ class Decoder:
         value = object.__new__(kind)
         for name in given:
             object.__setattr__(value, name, self(tree["fields"][name]))
+        # What hangs on classes that are not stored with it may be another one now.
+        if hasattr(value, "check_restored"):
+            value.check_restored()
         return value
 
 

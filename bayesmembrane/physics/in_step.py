@@ -63,8 +63,8 @@ def _together(asked: Sequence[Asked], sensitivities: bool) -> list[Prediction]:
     moved = [f.mountings(x) if sensitivities else [] for f, x in asked]
     mounted = [(f, p, m) for (f, p, _), ms in zip(each, moved, strict=True) for m in ms]
     found = _laws(each + mounted, sensitivities)
-    others, out = (law for law, _ in found[len(each) :]), []
-    for (forward, x), ms, law in zip(asked, moved, found, strict=False):
+    own, others, out = found[: len(each)], (law for law, _ in found[len(each) :]), []
+    for (forward, x), ms, law in zip(asked, moved, own, strict=True):
         out.append(forward.over(x, law, sensitivities, [next(others) for _ in ms]))
     return out
 

@@ -260,7 +260,8 @@ def unsought_sentence(found: Diagnosis) -> str:
     named = listed(known[name].title for name in found.unsought)
     if not named:
         return ""
-    cure = "unload, or pull at another speed," if "rate" in found.unsought else "unload"
+    speeds = any(known[name].needs_speeds for name in found.unsought)
+    cure = "unload, or pull at another speed," if speeds else "unload"
     return f"Not looked for, since a test that only goes one way hides them: {named}; {cure} to see them."
 
 
@@ -569,12 +570,13 @@ def smallest_sizes(found: Diagnosis) -> list[tuple[str, str]]:
 
 def _noise(found: Diagnosis) -> str:
     """What the readings say of the noise, beside what is stated; "" if nothing."""
-    noise, words, stated = found.noise, [], found.measurement.force_sd is not None
+    noise, words, stated = found.noise, [], found.measurement.force_sd
     if noise.excess != 1:
         words.append(f"the readings scatter {noise.excess:.2f} times as much as the measurement states")
         if noise.remembers:
             words.append(f"neighbouring readings are correlated ({noise.rho:.2f}), which it does not state")
-    if noise.profile.size > 1 and (noise.excess != 1 or not stated):
+    # What is stated of each reading is kept in proportion: only beside one number, or none, readings say what grows.
+    if noise.profile.size > 1 and not noise.stated and (stated is None or np.ptp(stated) == 0):
         least, largest = (size_in_words(v, "N", _units(found)) for v in (np.min(noise.each), np.max(noise.each)))
         words.append(f"it grows with the force, from {least} to {largest}")
     return f" Of the noise: {', and '.join(words)}; this is allowed for." if words else ""

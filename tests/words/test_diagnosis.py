@@ -1,5 +1,8 @@
 """Sentences speak in the units of the rig: forces and lengths of a lifted disc, stresses and stretches of a strip."""
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
@@ -7,13 +10,15 @@ from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.total import NOTHING, Probabilities
 from bayesmembrane.diagnosis.left.shape import residual_shape
-from bayesmembrane.diagnosis.result import Thinned, thinning
+from bayesmembrane.diagnosis.reference.noise import OwnNoise
+from bayesmembrane.diagnosis.result import Diagnosis, Thinned, thinning
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 from bayesmembrane.physics.rigs.base import Rig
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
+from bayesmembrane.words import diagnosis as words
 from bayesmembrane.words.diagnosis import elsewhere, percent, probabilities_told, thinning_sentence
 from bayesmembrane.words.shape import shape_in_words
 from bayesmembrane.words.sizes import flagged_size, units_of
@@ -152,3 +157,19 @@ def test_what_is_told_of_other_sets_is_said_from_a_twentieth_on() -> None:
     p = Probabilities(told, {"gent": 1.0}, {NOTHING: 1.0})
     assert elsewhere(p, {"friction", "mullins"}) == "; or another set (10 %)"
     assert elsewhere(p, {"friction", "mullins", "tearing"}) == ""
+
+
+@pytest.mark.parametrize(
+    ("stated", "grows"), [(None, True), (np.full(3, 1e-3), True), (np.array([1e-3, 2e-3, 3e-3]), False)]
+)
+def test_noise_is_told_to_grow_where_readings_say_so_and_not_where_it_is_stated(
+    stated: Array | None, grows: bool
+) -> None:
+    """Of readings that scatter more than a deviation that is stated for each, its proportions are kept."""
+    rig, specimen = Annulus(0.01, 0.035), Specimen("film", 5e-5)
+    film = Measurement(np.linspace(0.01, 0.03, 3), np.linspace(0.1, 1.0, 3), rig, specimen, force_sd=stated)
+    noise = OwnNoise(4e-3, 0.0, 0.0, np.ones(2), None, 40.0, profile=np.array([0.5, 1.0, 1.3]), excess=2.0)
+    found = SimpleNamespace(noise=noise, measurement=film, rig=rig, thickness=specimen.thickness)
+    told = words._noise(cast(Diagnosis, found))
+    assert ("it grows with the force, from 2 mN to 5.2 mN" in told) is grows
+    assert "2.00 times" in told

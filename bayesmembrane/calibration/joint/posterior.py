@@ -55,7 +55,7 @@ class JointPosterior:
         return SharedPrior(cast(Hypothesis, self.joint))
 
     @property
-    def weaker(self) -> JointPosterior | None:
+    def with_weaker_convexity(self) -> JointPosterior | None:
         """The same with the next weaker convexity prior; None if its own asks nothing."""
         mode = self.joint.convexity.weaker
         if mode is None:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.speeds import one_speed
-from bayesmembrane.ground.errors import StorageError
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect
@@ -46,11 +45,11 @@ class Candidate:
     form: Array
     by_draws: float = 0.0
 
-    def __post_init__(self) -> None:
-        if self.x.size != self.hypothesis.curve_size:
-            size = self.hypothesis.curve_size
-            said = f"{self.label} has {size} parameters, and {self.x.size} are given: another version wrote them"
-            raise StorageError(said, remedy="diagnose again")
+    def check_restored(self) -> None:
+        """Raise `ValueError` if its effects had other parameters when it was stored."""
+        size = self.hypothesis.curve_size
+        if self.x.size != size:
+            raise ValueError(f"{self.label} has {size} parameters, and {self.x.size} are stored")
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -218,7 +218,7 @@ def size_scales(measurement: Measurement) -> dict[str, tuple[float, float]]:
     """
     reach = reach_of(measurement)
     scales = {unit: SIZES.part * size for unit, size in reach.by_unit.items()}
-    sooner = min(reach.duration / max(measurement.path.first_turn, SHORTEST), SIZES.soonest)
+    sooner = min(reach.duration / max(measurement.path.first_turn, SHORTEST), SIZES.first_legs)
     most = {"N": SIZES.largest_force, "N/s": SIZES.largest_force * sooner}
     return {unit: (scale, most.get(unit, SIZES.largest) * scale) for unit, scale in scales.items()}
 

@@ -11,7 +11,7 @@ from bayesmembrane.data.motion import NOMINAL_SPEED, Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, Normal, Uniform
 from bayesmembrane.physics.effects.base import EffectParameter, Memory
 
-NEAR_REST = 0.03
+SMALLEST = 0.03
 """Of the full range: below this deflection what it resists is the same part of the force as there."""
 
 MOST = 10.0
@@ -79,6 +79,6 @@ class Rate(Memory):
         speed = path.moving_speed / NOMINAL_SPEED
         faster = np.expm1(exponent * np.log1p(speed * np.exp(-log_slow)))
         sense = np.where(path.leg > 0, 1.0, 1 - 2 * reversed_)
-        part = np.maximum(np.abs(path.deflection) / path.full_range, NEAR_REST)
+        part = np.maximum(np.abs(path.deflection) / path.full_range, SMALLEST)
         factor = np.clip(1 + sense * faster * part**-lean, 0.0, MOST)
         return np.asarray(force * factor * np.exp(-exponent * np.log1p(np.exp(-log_slow))))

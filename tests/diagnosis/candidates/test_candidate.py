@@ -1,9 +1,13 @@
 """Which effects are sought in a test."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from bayesmembrane.diagnosis.candidates.candidate import available
+from bayesmembrane.diagnosis.candidates.candidate import Candidate, available
+from bayesmembrane.ground.errors import StorageError
+from bayesmembrane.ground.stored import read, store
 from bayesmembrane.physics.hypothesis import hypothesis
 from tests.physics.effects.protocols import measured, staircase
 
@@ -13,3 +17,15 @@ def test_hysteresis_is_sought_where_a_leg_comes_back(comes_back: bool) -> None:
     """On a single loading it is a power of the deflection, as an energy is that differs a little."""
     m = measured() if comes_back else measured(np.linspace(1e-3, float(np.max(staircase())), 60), np.arange(60) + 1.0)
     assert ("hysteresis" in {e.name for e in available(m, hypothesis("gent"))}) == comes_back
+
+
+def test_what_was_stored_of_an_effect_with_other_parameters_is_told_so(tmp_path: Path) -> None:
+    claim, none = hypothesis("gent", ["rate"]), np.zeros(0)
+    for size, known in ((claim.curve_size, True), (3, False)):  # as many as it had when it was a power of the speed
+        held = Candidate(claim, np.zeros(size), none, none, 0.0, (), none, none, none)
+        folder = store(tmp_path / str(size), "diagnosis", held, {})
+        if known:
+            assert read(folder, "diagnosis").parameters["rate.exponent"] == 0.0
+        else:
+            with pytest.raises(StorageError, match=r"another version.*gent\+rate has \d parameters, and 3 are stored"):
+                read(folder, "diagnosis")

@@ -48,7 +48,7 @@ def test_a_target_that_no_draw_finds_leaves_the_linear_evidence(target) -> None:
     target.log_density = nothing
     two = np.zeros(2)
     for by_draws in (0.0, 1.5):  # and of what was drawn before
-        known = Candidate(hypothesis("mooney_rivlin"), two, two, two, -4.0 + by_draws, (), two, two, two, by_draws)
+        known = Candidate(hypothesis("neo_hookean"), two, two, two, -4.0 + by_draws, (), two, two, two, by_draws)
         after = checked(cast(Weighing, SimpleNamespace(seed=0)), known)
         assert (after.log_evidence, after.by_draws) == (-4.0, 0.0)
 

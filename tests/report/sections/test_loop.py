@@ -96,8 +96,7 @@ def test_candidates_are_ranked_against_the_model_as_it_was(named: Loop) -> None:
 def test_an_effect_with_another_energy_keeps_its_name(named: Loop) -> None:
     d = named.rounds[0].diagnosis
     best = d.ranking[0].candidate
-    gent = replace(best.hypothesis, material=hypothesis("gent").material)
-    other = replace(best, hypothesis=gent, x=np.append(best.x, 1.0))
+    other = replace(best, hypothesis=replace(best.hypothesis, material=hypothesis("gent").material))
     effect = best.hypothesis.effects[0].title
     assert candidate_title(other, d.null) == f"{effect} and the energy Gent"
 
