@@ -7,7 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import FrameType
+from types import FrameType, TracebackType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 AGAIN = 0.01  # s, until an interrupt that got lost is raised once more
@@ -67,22 +67,27 @@ def raised() -> Iterator[None]:
 def insistent() -> Iterator[None]:
     """While the body runs, an interrupt that nobody could catch is not told, but raised again a moment later.
 
-    A signal may arrive while Python calls a finaliser or the callback of a weak reference. What is raised there is told
-    on standard error, as "Exception ignored in", and lost (`sys.unraisablehook`).
+    A signal may arrive while Python calls a finaliser, the callback of a weak reference, or a compiled function that
+    cannot raise, as the one by which SciPy reads its Sobol numbers. What is raised there is told on standard error and
+    lost (`sys.unraisablehook`); compiled functions have its traceback printed before (`sys.excepthook`).
     """
-    before = sys.unraisablehook
+    lost_before, told_before = sys.unraisablehook, sys.excepthook
 
     def raise_again(lost: sys.UnraisableHookArgs) -> None:
         if issubclass(lost.exc_type, KeyboardInterrupt):
             threading.Timer(AGAIN, _signal_main_thread).start()
         else:
-            before(lost)
+            lost_before(lost)
 
-    sys.unraisablehook = raise_again
+    def tell(kind: type[BaseException], error: BaseException, where: TracebackType | None) -> None:
+        if not issubclass(kind, KeyboardInterrupt):
+            told_before(kind, error, where)
+
+    sys.unraisablehook, sys.excepthook = raise_again, tell
     try:
         yield
     finally:
-        sys.unraisablehook = before
+        sys.unraisablehook, sys.excepthook = lost_before, told_before
 
 
 def _signal_main_thread() -> None:

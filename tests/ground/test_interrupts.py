@@ -1,15 +1,32 @@
 """Interrupts that arrive where Python lets no exception through."""
 
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from bayesmembrane.ground.interrupts import deferred, raised
 
 LONGEST = 30.0  # s, for what takes a hundredth
+
+INTERRUPTED_WHILE_READING = """
+import signal, time
+import numpy as np
+from scipy.stats import qmc
+from bayesmembrane.ground.interrupts import raised
+
+np.load = lambda *given, **named: signal.raise_signal(signal.SIGTERM)
+try:
+    with raised():
+        qmc.Sobol(2, scramble=False)
+        time.sleep(30)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
 
 
 class Fragile:
@@ -41,6 +58,17 @@ def test_second_interrupt_in_a_finaliser_ends_a_deferred_body(capfd: pytest.Capt
         with pytest.raises(KeyboardInterrupt):
             interrupted_in_a_finaliser()
     assert capfd.readouterr().err == ""
+
+
+def test_interrupt_in_a_compiled_function_that_cannot_raise_is_not_told(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """In a process of its own, since SciPy reads those numbers once in a process."""
+    program = tmp_path / "interrupted.py"
+    program.write_text(INTERRUPTED_WHILE_READING)
+    subprocess.run([sys.executable, program], check=True)
+    out, err = capfd.readouterr()
+    assert (out, err) == ("interrupted\n", "")
 
 
 def test_other_lost_exceptions_are_told_as_ever(monkeypatch: pytest.MonkeyPatch) -> None:
