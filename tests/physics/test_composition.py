@@ -11,17 +11,18 @@ from bayesmembrane.ground.errors import SettingsError
 from bayesmembrane.ground.registry import materials
 from bayesmembrane.physics.effects._history import growth
 from bayesmembrane.physics.effects.base import FilmState
+from bayesmembrane.physics.effects.friction import Friction
 from bayesmembrane.physics.effects.machine_compliance import MachineCompliance
 from bayesmembrane.physics.effects.permanent_set import PermanentSet
 from bayesmembrane.physics.effects.tearing import Tearing
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import Status, request, solve
-from bayesmembrane.physics.reach import Reach
+from bayesmembrane.physics.reach import SOURCE, Reach
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 from tests.physics.effects.protocols import FILMS, RIG, force, measured, path, staircase, timeless, two_speeds, vector
 
-UNSEATED = -20.0  # log odds of the part of a frame's yielding that stays
+FIRM = (-20.0, -20.0, 1.0)  # of a frame: log odds of the part that stays, and of play; the force that takes this up
 RADII = {"inner_radius": RIG.inner_radius, "outer_radius": RIG.outer_radius}
 
 
@@ -79,7 +80,7 @@ def test_a_taut_film_pulls_back_below_its_plane_and_what_it_has_lost_does_not() 
         assert np.min(f) < -1e-3 * np.max(f)
         assert np.max(np.abs(f - exact)) < 1e-5 * np.max(exact)
     names = ("machine_compliance", "prestretch", "zero_offset")
-    f = force(m, *names, x=np.array([c, 1.0, UNSEATED, 1.05, 2e-3]))
+    f = force(m, *names, x=np.array([c, 1.0, *FIRM, 1.05, 2e-3]))
     d = m.deflection - 2e-3 - c * f
     assert np.max(np.abs(f - np.sign(d) * direct("yeoh", np.abs(d), prestretch=1.05))) < 1e-5 * np.max(f)
     lost = [1e-3 if p.name == "set" else p.typical for p in PermanentSet.coordinates]
@@ -100,11 +101,19 @@ def test_a_set_is_the_same_on_both_sides_of_a_taut_film_and_pushes_no_less_on_a_
     assert np.any(left[d > 0] < 0)
 
 
+def test_a_frame_with_play_takes_it_up_at_small_forces() -> None:
+    """delta_film + (1 - q) C F + q C F_r (1 - exp(-F / f)) = delta, F_r the largest force of the test."""
+    m, c, small = measured(), 8e-4, 0.05
+    f = force(m, "machine_compliance", x=np.array([c, 1.0, -20.0, np.log(0.4 / 0.6), small]))
+    lost = 0.6 * c * f + 0.4 * c * SOURCE.force * (1 - np.exp(-f / small))
+    assert f == pytest.approx(direct("yeoh", m.deflection - lost), rel=1e-6, abs=1e-9)
+
+
 @pytest.mark.parametrize("exponent", [2 / 3, 1.0, 1.3])
 def test_the_frame_takes_its_part(exponent: float) -> None:
     """delta_film + C F^n = delta, with a film force that is itself solved at delta_film; with memory too."""
     m, c = measured(), 8e-4
-    f = force(m, "machine_compliance", x=np.array([c, exponent, UNSEATED]))
+    f = force(m, "machine_compliance", x=np.array([c, exponent, *FIRM]))
     assert f == pytest.approx(direct("yeoh", m.deflection - c * f**exponent), rel=1e-6, abs=1e-9)
     names = ("machine_compliance", "mullins", "viscoelastic", "clamp_slip")
     h = hypothesis("yeoh", names)
@@ -239,17 +248,29 @@ def test_slip_of_a_longer_film_is_a_film_of_that_length() -> None:
 
 def test_friction_changes_sign_at_each_turn() -> None:
     m = measured()
-    extra = force(m, "friction", x=np.array([0.02, 1e-4, 0.0])) - force(m)
+    extra = force(m, "friction", x=np.array([0.02, 1e-4, -20.0, 1.0, 0.0])) - force(m)
     settled = np.abs(np.gradient(m.leg)) == 0
     assert extra[settled & (m.leg > 0)][3:] == pytest.approx(0.02, rel=0.01)
     assert extra[settled & (m.leg < 0)] == pytest.approx(-0.02, rel=0.01)
 
 
-def test_a_guide_rubs_the_more_the_farther_the_disc_is_lifted() -> None:
+@pytest.mark.parametrize("load", [0.5, 1.0, 2.0])
+def test_a_guide_rubs_the_more_the_larger_the_force_is(load: float) -> None:
     m = measured()
-    plain, part = force(m), m.deflection / m.full_range
-    level, more = (force(m, "friction", x=np.array([0.02, 1e-4, grows])) - plain for grows in (0.0, 1.5))
-    assert more == pytest.approx(level * (1 + 1.5 * part), rel=1e-9, abs=1e-12)
+    plain = force(m)
+    level, more = (force(m, "friction", x=np.array([0.02, 1e-4, odds, load, 0.0])) - plain for odds in (-20.0, 0.0))
+    assert more == pytest.approx(level * (0.5 + 0.5 * (plain / SOURCE.force) ** load), rel=1e-6, abs=1e-12)
+
+
+def test_a_dry_guide_rubs_more_where_it_is_slower_and_at_rest_as_before() -> None:
+    """At a tenth of the speed 10^0.2 times as much; what the last motion left stays in a hold."""
+    x = np.linspace(0.0, 0.03, 61)
+    d = np.concatenate([x, np.full(20, x[-1]), x[-2::-1]])
+    t = np.cumsum(np.concatenate([np.full(81, 1.0), np.full(60, 10.0)]))
+    p = np.array([[0.02, 1e-4, -20.0, 1.0, 0.2]])
+    found = Friction().read(p, np.zeros((1, d.size)), Motion(d, t, 0.03))[0]
+    assert found[10:81] == pytest.approx(0.02, rel=1e-6)
+    assert found[100:] == pytest.approx(-0.02 * 10**0.2, rel=1e-6)
 
 
 def test_a_drift_comes_to_rest() -> None:
@@ -339,7 +360,7 @@ def test_a_frame_that_yields_keeps_a_film_from_locking() -> None:
     every = solve(request(materials()["gent"], np.stack([np.full(101, 5.3), limits], 1), [0.04], **RADII))
     limit = limits[np.argmax(every.ok[:, 0]) - 1]
     film = materials()["gent"].to_coordinates([5.3, limit])
-    stiff, soft = (Forward(h, m, m.deflection)([*film, c, 1.0, UNSEATED]) for c in (0.0, 2e-4))
+    stiff, soft = (Forward(h, m, m.deflection)([*film, c, 1.0, *FIRM]) for c in (0.0, 2e-4))
     assert not stiff.ok[0]
     assert soft.ok[0]
     delta = m.deflection - 2e-4 * soft.force[0]

@@ -13,6 +13,8 @@ from bayesmembrane.physics.mechanics import Status
 from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 
 MEASURED = np.linspace(0.0, 1.0, 41)
+NO_PLAY = (-20.0, 1.0)
+"""Log odds of what is taken up by small forces, and the force that takes it up."""
 EXPONENTS = np.array([[0.3], [0.5], [1.0], [1.4]])
 
 
@@ -46,7 +48,7 @@ def test_it_is_the_root_that_bisection_finds() -> None:
 def test_a_frame_that_seats_is_the_root_of_one_reading_after_the_other(power: float) -> None:
     """Two cycles, the second one higher: by bisection at each reading, with the largest force of those before."""
     measured = np.interp(np.linspace(0, 4, 81), range(5), [0.0, 0.6, 0.1, 0.85, 0.3])
-    x = np.array([[0.05, power, np.log(0.4 / 0.6)]])
+    x = np.array([[0.05, power, np.log(0.4 / 0.6), *NO_PLAY]])
 
     def seats(_: np.ndarray, force: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return MachineCompliance().yielding(x, force, most)
@@ -71,7 +73,7 @@ def test_a_frame_that_seats_is_the_root_of_one_reading_after_the_other(power: fl
 
 def test_a_lost_station_leaves_the_curve_after_it() -> None:
     """What the film cannot follow has no force, and nothing is remembered of it."""
-    x = np.array([[0.02, 0.8, -0.8]])
+    x = np.array([[0.02, 0.8, -0.8, *NO_PLAY]])
     way = np.append(np.linspace(0, 0.8, 9), np.linspace(0.7, 0.3, 5))
 
     def seats(_: np.ndarray, force: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,10 +95,19 @@ def test_no_film_near_locking_is_lost_for_a_frame_that_seats() -> None:
     f = Forward(h, m, m.deflection)
     limits, rng = np.geomspace(0.3, 3.0, 300), np.random.default_rng(0)
     film = np.stack([h.material.to_coordinates(np.array([20.0, limit])) for limit in limits])
-    frames = np.stack([10 ** rng.uniform(-4, -2, 300), rng.uniform(0.5, 1.2, 300), rng.normal(-1, 2, 300)], axis=1)
+    frames = np.stack(
+        [
+            10 ** rng.uniform(-4, -2, 300),
+            rng.uniform(0.5, 1.2, 300),
+            rng.normal(-1, 2, 300),
+            rng.normal(-2, 2, 300),
+            0.05 * np.exp(rng.standard_normal(300)),
+        ],
+        axis=1,
+    )
     seats = np.concatenate([film, frames], axis=1)
     plain = seats.copy()
-    plain[:, -1] = -20.0
+    plain[:, h.names.index("machine_compliance.log_odds_seated")] = -20.0
     kept, lost = (np.array(f(x).ok) for x in (plain, seats))
     assert 30 < np.count_nonzero(kept) < 300
     assert np.array_equal(kept, lost)
@@ -130,22 +141,24 @@ def test_what_does_not_close_has_no_force() -> None:
     assert force[1, 0] == 0.0
 
 
-def test_a_relaxed_film_on_a_frame_that_is_soft_at_no_force_closes() -> None:
-    """The return of a relaxing strip, whose force falls through zero, on a seat that yields like F^0.3."""
+@pytest.mark.parametrize("play", [NO_PLAY, (1.0, 1e-3)])
+def test_a_relaxed_film_on_a_frame_that_is_soft_at_no_force_closes(play: tuple[float, float]) -> None:
+    """The return of a relaxing strip, whose force falls through zero; the seat yields like F^0.3, and has play."""
     strip = Uniaxial(0.1, 0.01)
     time = np.linspace(0.5, 40.0, 80)
     way = np.interp(time, [0.0, 20.0, 40.0], [0.0, 0.2, 0.02])
     m = Measurement(way, np.ones(way.size), strip, Specimen("tape", 1e-3), time=time)
     h = hypothesis("gent", ["viscoelastic", "machine_compliance"])
     f = Forward(h.on(m), m, m.deflection)
-    theta = {"viscoelastic": [0.5, 20.0, 0.0, 0.5, -1.5, 0.0], "machine_compliance": [2e-3, 0.3, -0.8]}
+    theta = {"viscoelastic": [0.5, 20.0, 0.0, 0.5, -1.5, 0.0], "machine_compliance": [2e-3, 0.3, -0.8, *play]}
     x = np.concatenate([theta[e.name] for e in f.composition.effects])[None]
     law, _ = f.law(np.array([[20.0, 60.0]]), x)
     delta, force, status = f.composition.closed(law, x)
     assert status[0] != Status.ITERATION_LIMIT
     assert np.min(force) < 0 < np.max(force)
     p, before = np.array([theta["machine_compliance"]]), np.maximum.accumulate(np.append(0.0, force))[None, :-1]
-    yielded, _ = MachineCompliance().yielding(p, force, before)
+    seat = next(e for e in f.composition.effects if isinstance(e, MachineCompliance))
+    yielded, _ = seat.yielding(p, force, before)
     assert np.max(np.abs(delta + yielded - m.deflection)) < 1e-9 * m.full_range
 
 

@@ -5,24 +5,50 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from scipy.special import expit
+
 from bayesmembrane.data.motion import Motion
-from bayesmembrane.ground.parameters import Array, Normal
+from bayesmembrane.ground.parameters import Array, LogNormal, Normal
 from bayesmembrane.physics.effects.base import EffectParameter, Sensor
 
 
 @dataclass(frozen=True)
 class ForceOffset(Sensor):
-    """F_read = F + offset."""
+    """F_read = F + offset [1 - s exp(-|delta| / lift)], with s = 1 / (1 + exp(-log_odds_resting)).
+
+    A load cell that was tared while the disc, or what hangs from it, rested on something reads its weight once it is
+    lifted (s = 1); one that was not tared reads it from the start (0). Of a film pulled on both ways the zero is passed
+    where it began.
+    """
 
     name: ClassVar[str] = "force_offset"
     title: ClassVar[str] = "offset of the force zero"
     reference: ClassVar[str] = "ISO 376:2011, zero error of force-proving instruments"
-    signature: ClassVar[str] = "A constant force everywhere, also where the film is slack."
+    signature: ClassVar[str] = (
+        "A constant force everywhere, also where the film is slack; or one that comes with the first of the way, where "
+        "what was resting is lifted."
+    )
     exact: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("offset", "N", "reading without load", Normal(0.0, 0.03), (-1.0, 1.0), 0.0),
+        EffectParameter(
+            "log_odds_resting",
+            "-",
+            "log odds of the part of it that rests on something until the disc is lifted",
+            Normal(-4.0, 3.0),
+            (-20.0, 8.0),
+            begin=-4.0,
+        ),
+        EffectParameter("lift", "m", "way on which that is lifted", LogNormal(1e-3, 0.7), (5e-5, 1e-2)),
     )
 
+    @property
+    def starts(self) -> list[dict[str, float]]:
+        """All of it resting: of a part that hardly does, the way on which it is lifted is not seen."""
+        return [{"log_odds_resting": 3.0}]
+
     def read(self, p: Array, force: Array, path: Motion) -> Array:
-        return force + p[:, :1]
+        resting = expit(p[:, 1:2]) * np.exp(-np.abs(path.deflection) / p[:, 2:3])
+        return np.asarray(force + p[:, :1] * (1 - resting))

@@ -45,7 +45,7 @@ def test_a_size_of_either_sign_may_be_as_large_on_both_sides(name: str) -> None:
 
 def test_pulls_are_roots_of_the_prior_and_local_normals_have_its_value_and_slope() -> None:
     axes = standard(Hypothesis(materials()["gent"], (components("effects")["machine_compliance"](),)), CURVE)
-    u = np.array([0.4, -1.2, 3.0, 0.7, -0.3])
+    u = np.array([0.4, -1.2, 3.0, 0.7, -0.3, 0.2, -0.6])
     pull, steep = axes.pull(u)
     log_prior = np.where(axes.heavy, cauchy.logpdf(u), norm.logpdf(u))
     at_zero = np.where(axes.heavy, cauchy.logpdf(0.0), norm.logpdf(0.0))
@@ -61,10 +61,11 @@ def test_pulls_are_roots_of_the_prior_and_local_normals_have_its_value_and_slope
 def test_a_size_is_integrated_under_its_own_prior(at, sd) -> None:
     """Of a normal likelihood of one size, against the integral."""
     axes = standard(Hypothesis(materials()["neo_hookean"], (components("effects")["machine_compliance"](),)), CURVE)
-    u = np.array([0.0, at, 0.0, 0.0])
+    size = np.eye(axes.one_sided.size)[1]
+    u = at * size
     s = axes.local(u)
-    precision = 1 / s**2 + np.array([0.0, 1 / sd**2, 0.0, 0.0])
-    mean = np.array([0.0, at / sd**2, 0.0, 0.0]) / precision
+    precision = 1 / s**2 + size / sd**2
+    mean = u / sd**2 / precision
     inside = norm.logcdf(mean[1] * np.sqrt(precision[1]))
 
     def likelihood(v: float) -> float:

@@ -35,20 +35,20 @@ def fitted() -> tuple[Search, Candidate]:
     return search, found
 
 
-def columns(search: Search, base: Candidate) -> Array:
-    """Slopes of both offsets by their expected sizes, which have one shape each."""
+def columns(search: Search, base: Candidate, shape: int = 0) -> Array:
+    """Slopes of both offsets by their expected sizes, that of the force in one of its shapes."""
     each = [(slopes_of_effect(search, base, e), float(search.expected_sizes(e)[0])) for e in OFFSETS]
-    assert all(len(slopes) == 1 for slopes, _ in each)
-    return np.column_stack([slopes[0][0] * size for slopes, size in each])
+    return np.column_stack([slopes[min(shape, len(slopes) - 1)][0] * size for slopes, size in each])
 
 
 def test_two_at_once_equal_two_further_columns(fitted: tuple[Search, Candidate]) -> None:
     search, base = fitted
-    model, white = search.linear(base), search.noise.white(columns(search, base))
+    model = search.linear(base)
     usual = np.minimum(base.theta, model.priors[:, 0])
     here = model.log_density(base.theta).value
-    more = extended(model, [Block(white)])
-    expected = max(more.log_density(theta).value - here for theta in (base.theta, usual))
+    shapes = range(len(slopes_of_effect(search, base, OFFSETS[0])))
+    more = [extended(model, [Block(search.noise.white(columns(search, base, s)))]) for s in shapes]
+    expected = max(m.log_density(theta).value - here for m in more for theta in (base.theta, usual))
     assert gains_of_pairs(search, base, OFFSETS) == {
         frozenset(("force_offset", "zero_offset")): pytest.approx(expected, abs=0.01)
     }

@@ -20,6 +20,8 @@ from tests.generator.film import Film
 
 SD = 0.004
 OFFSET = components("effects")["force_offset"]()
+SIZE = 1
+"""Number of the offset, after the modulus: what follows are its shapes."""
 
 
 def evidence(density: object, centre: float, ends: tuple[float, float], counts: float) -> float:
@@ -130,16 +132,16 @@ def test_the_square_of_a_ratio_is_what_chi_square_loses_without_the_effect(film:
     """Of a linear effect: what is left of its trace once the film has taken what it can, by least squares."""
     search, offset = film
     found = fitted(search)
-    assert abs(found.x[-1]) == pytest.approx(offset, rel=0.3)
+    assert abs(found.x[SIZE]) == pytest.approx(offset, rel=0.3)
 
     def ratio(size: float) -> float:
         white = search.noise.white(found.slopes)
-        taken = np.linalg.lstsq(white[:, :-1], white[:, -1] * size, rcond=None)[0]
-        return float(np.linalg.norm(white[:, -1] * size - white[:, :-1] @ taken))
+        taken = np.linalg.lstsq(white[:, :SIZE], white[:, SIZE] * size, rcond=None)[0]
+        return float(np.linalg.norm(white[:, SIZE] * size - white[:, :SIZE] @ taken))
 
-    size, sd = abs(found.x[-1]), np.sqrt(search.covariance(found)[-1, -1])
+    size, sd = abs(found.x[SIZE]), np.sqrt(search.covariance(found)[SIZE, SIZE])
     usual = float(search.expected_sizes(OFFSET)[0])
-    local = ratio(float(search.steepness(found)[-1]))
+    local = ratio(float(search.steepness(found)[SIZE]))
     expected = Ratio(ratio(size), ratio(sd), ratio(usual), False).without_prior(local).resolved
     assert log_seen(search, found, (), {}, 0.5) == pytest.approx(expected.log_seen(0.5), rel=1e-6)
     assert log_seen(search, found, ("force_offset",), {}, 0.5) == 0.0
@@ -149,7 +151,7 @@ def test_a_bent_trace_is_as_large_as_what_a_fit_without_it_leaves(film: tuple[Se
     """Where the film absorbs it nearby, but not elsewhere: by the squares that the effect takes away."""
     search, _ = film
     found = fitted(search)
-    faint = replace(found, slopes=np.column_stack([found.slopes[:, :-1], 1e-3 * found.slopes[:, -1]]))
+    faint = replace(found, slopes=found.slopes * np.where(np.arange(found.x.size) < SIZE, 1.0, 1e-3))
     absorbed = log_seen(search, faint, (), {}, 1.0)
     seen = [log_seen(search, faint, (), {"force_offset": r**2}, 1.0) for r in (1.0, 2.0, 4.0)]
     assert absorbed < np.log(0.1)

@@ -143,7 +143,7 @@ def test_a_known_frame_is_claimed_once_and_has_no_value_at_which_it_is_not_there
     plain = replace(m, blank_run=None)
     assert hypothesis("gent").with_frame(plain) == hypothesis("gent")
     for other in (hypothesis("gent", ["machine_compliance"]), claim, claim.held):  # no frame of another rig
-        assert len(frame(other.on(plain)).coordinates) == 3
+        assert len(frame(other.on(plain)).coordinates) == len(MachineCompliance.coordinates)
 
 
 def test_a_stored_run_knows_the_frame() -> None:
