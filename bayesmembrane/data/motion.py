@@ -20,6 +20,11 @@ LONG, SWINGS, MOST_JITTER = 200, 12.0, 0.05
 standard deviations (two extremes of 200 000 readings lie nine apart), but by no more than this part of the range."""
 HELD, STILL = 12, 0.1
 """Readings of a hold, at least, and the part of the speed before it at which the disc counts as standing still."""
+SHORT_REST = 4
+"""Steps of a rest that is no hold, at least, and of the motion between two of them."""
+NO_STEP, SCATTER = 1e-3, 6.0
+"""Of the mean step between two readings: what is less is none; of the median distance of the readings of a hold from
+their median: what is farther is on its way."""
 MOST_HELD = 4000
 """In a longer record holds are looked for in means of neighbours, half as many as this."""
 CONTRADICTED = 0.1
@@ -128,10 +133,16 @@ class Motion:
 
     @cached_property
     def rests(self) -> NDArray[np.bool_]:
-        """(N,) True where the disc has stood still since the reading before (`holds`)."""
-        out = np.zeros(self.deflection.size, np.bool_)
+        """(N,) True where the disc stands still.
+
+        That is in `holds`, but for what is still or again on its way at their ends, and in shorter ones than these
+        where all readings of the motion differ. It has just moved where it stops.
+        """
+        out = _short_rests(self.deflection)
         for still in holds(self.deflection):
-            out[still[1:]] = True
+            away = np.abs(self.deflection[still] - np.median(self.deflection[still]))
+            there = away <= SCATTER * np.median(away) + NO_STEP * np.mean(self.steps)
+            out[still[1:]] = there[1:] & there[:-1]
         return out
 
     @cached_property
@@ -242,6 +253,24 @@ def holds(deflection: Array) -> list[NDArray[np.intp]]:
         else:
             i += 1
     return found
+
+
+def _short_rests(deflection: Array) -> NDArray[np.bool_]:
+    """(N,) True after each of at least `SHORT_REST` steps in a row that are hardly any.
+
+    Not where the steps between those come one at a time: so does a coarse encoder show a motion that goes on.
+    """
+    out = np.zeros(deflection.size, np.bool_)
+    steps = np.abs(np.diff(deflection))
+    if not steps.size:
+        return out
+    still = steps <= NO_STEP * np.mean(steps)
+    parts = np.split(np.arange(steps.size), np.flatnonzero(np.diff(still)) + 1)
+    moves = [part.size for part in parts if not still[part[0]]]
+    if moves and np.median(moves) >= SHORT_REST:
+        for part in parts:
+            out[part + 1] = still[part[0]] and part.size >= SHORT_REST
+    return out
 
 
 def _holds_of_means(deflection: Array) -> list[NDArray[np.intp]]:

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from bayesmembrane.data.corners import with_corners
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement, Provenance, Specimen, check_blank_run, check_covariance
 from bayesmembrane.data.motion import Motion, contradicted
@@ -92,7 +93,8 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
         across=across,
         blank_run=blank_run,
     )
-    return of_few(measured if motion is None else replace(measured, motion=motion, places=np.arange(force.size)), READ)
+    moved = measured if motion is None else replace(measured, motion=motion, places=np.arange(force.size))
+    return of_few(with_corners(moved), READ)
 
 
 def _rig(section: TomlSection) -> Fixture:

@@ -89,6 +89,15 @@ def test_a_disc_rests_where_it_is_held_and_has_just_moved_where_it_stops() -> No
     assert m.moving_speed[~m.rests] == pytest.approx(0.02 / 40)
 
 
+def test_short_rests_of_a_staircase_are_seen() -> None:
+    each = [np.append(np.linspace(low, low + 1e-3, 6)[1:], np.full(5, low + 1e-3)) for low in 1e-3 * np.arange(8)]
+    m = Motion(np.concatenate([[0.0], *each]), np.arange(81.0), 8e-3)
+    assert holds(m.deflection) == []
+    assert np.array_equal(m.rests, np.append(False, np.tile(np.arange(10) >= 5, 8)))
+    assert m.moving_speed[m.rests] == pytest.approx(0.0)
+    assert m.moving_speed[~m.rests] == pytest.approx(2e-4)
+
+
 def test_steps_of_an_encoder_slow_parts_and_turns_are_no_rests() -> None:
     t = np.arange(2000.0) * 0.04
     steps = Motion(np.floor(5 * t) / 5 * 1e-3, t, 0.08)  # 1 mm/s, told in steps of 0.2 mm

@@ -1,0 +1,73 @@
+"""Where the disc turned, stopped or changed its speed between two readings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesmembrane.data.measurement import Measurement, without_round_off
+from bayesmembrane.data.motion import Motion
+from bayesmembrane.ground.parameters import Array
+
+STEADY = 0.05
+"""Of the larger speed of both sides: by no more may two intervals in a row differ, for their mean to be a speed."""
+OTHER = 0.2
+"""Of the same: by so much the speeds of both sides differ, at least, at a corner."""
+INSIDE = 0.03
+"""Of an interval: closer to a reading no corner is told from one at it."""
+SMALLEST = 2e-4
+"""Of the largest deflection: by so much a corner moves the disc in an interval, at least."""
+
+
+def with_corners(measurement: Measurement) -> Measurement:
+    """The same, whose path has a station more in each interval in which the disc had one steady speed v1 at its
+    beginning and another one v2 at its end:
+
+        x_c = x_0 + v1 (t_c - t_0),    t_c = t_0 + (x_1 - x_0 - v2 (t_1 - t_0)) / (v1 - v2).
+
+    A machine at constant speed turns wherever it was told to, and not at a reading: the first reading after a turn has
+    been on the way back already. What remembers signs of the motion, largest stretches or times at rest needs to know
+    it. Speeds are those that two intervals agree about; one interval is enough on one side where it is as fast as the
+    other side. A turn that slows down, as of a sine wave, has no corner. Without times, for stretches across, and where
+    legs are said, the path is as it was.
+    """
+    path = measurement.path
+    if path.time is None or path.across is not None or path.said or path.time.size < 6:
+        return measurement
+    after, at, clock = _corners(path.deflection, path.time, measurement.full_range)
+    if not after.size:
+        return measurement
+    way = without_round_off(np.insert(path.deflection, after + 1, at))
+    motion = Motion(way, np.insert(path.time, after + 1, clock), measurement.full_range)
+    places = measurement.on_path + np.searchsorted(after, measurement.on_path, side="left")
+    return replace(measurement, motion=motion, places=places)
+
+
+def _corners(deflection: Array, time: Array, full_range: float) -> tuple[NDArray[np.intp], Array, Array]:
+    """(n,) numbers of the readings before corners, (n,) m, and (n,) s on the clock of the (N,) readings."""
+    gap = np.diff(time)
+    speed = np.diff(deflection) / gap
+    inner = np.arange(1, speed.size - 1)
+    larger = np.maximum(np.abs(speed[inner - 1]), np.abs(speed[inner + 1]))
+    (before, fore), (after, aft) = (_steady(speed, inner, side, STEADY * larger) for side in (-1, 1))
+    alike = np.abs(np.abs(before) - np.abs(after)) <= STEADY * larger
+    turned = np.abs(before - after)
+    other = (turned >= OTHER * larger) & (turned * gap[inner] >= SMALLEST * full_range)
+    with np.errstate(all="ignore"):
+        part = (speed[inner] - after) / (before - after)
+    found = ((fore & aft) | ((fore | aft) & alike)) & other & (part > INSIDE) & (part < 1 - INSIDE)
+    rows, part = inner[found], part[found]
+    return rows, deflection[rows] + before[found] * part * gap[rows], time[rows] + part * gap[rows]
+
+
+def _steady(speed: Array, inner: NDArray[np.intp], side: int, most: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """((n,) m/s, (n,)): mean of the two intervals on one ``side`` of each, and True, where these differ by no more than
+    ``most`` (n,); else that of the next one.
+    """
+    near = speed[inner + side]
+    far = speed[np.clip(inner + 2 * side, 0, speed.size - 1)]
+    there = (inner + 2 * side >= 0) & (inner + 2 * side < speed.size)
+    agree = there & (np.abs(near - far) <= most)
+    return np.where(agree, 0.5 * (near + far), near), agree

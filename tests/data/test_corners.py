@@ -1,0 +1,78 @@
+"""Turns, stops and changes of the speed between readings: where they are, and where there are none."""
+
+import numpy as np
+import pytest
+
+from bayesmembrane.data.corners import with_corners
+from bayesmembrane.data.measurement import Measurement, Specimen
+from bayesmembrane.data.motion import Motion
+from bayesmembrane.physics.effects.friction import Friction
+from bayesmembrane.physics.rigs.annulus import Annulus
+
+KNOTS = 1e-3 * np.array([0, 17.13, 3.4, 3.4, 20.9, 30.9])
+CLOCK = np.array([0, 17.13, 30.86, 42.2, 59.7, 109.7])
+"""Up, back, at rest, up again, and on at a fifth of the speed."""
+
+
+def moved(time: np.ndarray, way: np.ndarray) -> Measurement:
+    return Measurement(way, 1e3 * way**2 + 1e-3, Annulus(0.010, 0.035), Specimen("film", 5e-5), time=time)
+
+
+def read_at(time: np.ndarray) -> Measurement:
+    return moved(time, np.interp(time, CLOCK, KNOTS))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_corners_are_found_where_they_are(seed: int) -> None:
+    """Of readings at uneven times, and with a deflection that is read to 1e-4 of a step."""
+    rng = np.random.default_rng(seed)
+    time = np.cumsum(rng.uniform(0.5, 1.0, 140))
+    m = read_at(time[time < 109])
+    noisy = moved(m.time, m.deflection + 5e-8 * rng.standard_normal(len(m)))
+    found = with_corners(noisy)
+    between = np.setdiff1d(np.arange(found.path.deflection.size), found.on_path)
+    near = [np.min(np.abs(time - c)) > 0.1 for c in CLOCK[1:-1]]
+    assert between.size >= np.count_nonzero(near)
+    for c, x in zip(CLOCK[1:-1][near], KNOTS[1:-1][near], strict=True):
+        k = between[np.argmin(np.abs(found.path.time[between] - c))]
+        assert found.path.time[k] == pytest.approx(c, abs=2e-3)
+        assert found.path.deflection[k] == pytest.approx(x, abs=1e-6)
+    assert np.array_equal(found.path.deflection[found.on_path], noisy.deflection)
+    assert np.array_equal(found.path.time[found.on_path], noisy.time)
+    assert found.full_range == noisy.full_range
+
+
+def test_a_disc_that_stopped_between_two_readings_rests_at_the_second() -> None:
+    m = with_corners(read_at(np.linspace(0.0, 100.0, 331)))
+    stands = (m.time > 30.86) & (m.time <= 42.2)
+    assert np.array_equal(m.path.rests[m.on_path], stands)
+    assert m.leg[np.searchsorted(m.time, 17.13)] == -1
+
+
+def test_friction_after_a_turn_between_readings_is_that_of_the_motion() -> None:
+    """Against the same guide read five hundred times as often."""
+    coarse, fine = np.linspace(0.0, 100.0, 331), np.linspace(0.0, 100.0, 165_001)
+    p = np.array([[0.02, 2e-4, -20.0, 1.0, 0.0]])
+    m = with_corners(read_at(coarse))
+    found = Friction().read(p, np.zeros((1, m.path.deflection.size)), m.path)[0, m.on_path]
+    way = np.interp(fine, CLOCK, KNOTS)
+    exact = Friction().read(p, np.zeros((1, fine.size)), Motion(way, fine, m.full_range))[0, ::500]
+    plain = Friction().read(p, np.zeros((1, coarse.size)), read_at(coarse).path)[0]
+    assert found == pytest.approx(exact, abs=2e-4)
+    assert np.max(np.abs(plain - exact)) > 5e-3
+
+
+def test_no_corner_is_made_up() -> None:
+    """At readings, in sine waves, in noise, of a coarse encoder, and without times."""
+    t = np.arange(0.0, 120.0, 0.5)
+    rng = np.random.default_rng(3)
+    each = [
+        moved(t, np.interp(t, [0, 40, 80, 120], [0, 0.04, 0, 0.04])),
+        moved(t, 0.01 * (1 - np.cos(2 * np.pi * t / 40))),
+        moved(t, np.floor(t / 1.7) * 2e-4 + 1e-4),
+        moved(t, np.abs(1e-6 * rng.standard_normal(t.size))),
+    ]
+    for m in each:
+        assert with_corners(m) is m
+    timeless = Measurement(each[0].deflection, each[0].force, each[0].rig, each[0].specimen)
+    assert with_corners(timeless) is timeless
