@@ -160,7 +160,7 @@ def _fitted(
     measurement: Measurement, hypothesis: Hypothesis, loss: str, seed: int, films: list[Array], solve: Solve
 ) -> Fit:
     """`fit` of a hypothesis all of whose coordinates are in question; ``films`` to start from, too."""
-    enough_points(hypothesis, measurement)
+    enough_points(hypothesis, measurement, priors=False)
     few = shortened(measurement, MANY)
     objective = Objective(hypothesis, few, loss, solve)
     pool, contained, (x, status) = _searched(objective, seed, films)

@@ -339,10 +339,14 @@ class Outcomes(Counter[str]):
                 self.examples[o.label] = tuple(map(float, x[int(np.argmax(outcome == o))]))
 
 
-def enough_points(hypothesis: Hypothesis, measurement: Measurement) -> None:
-    """Raise `SettingsError` if the curve has more parameters than the measurement has points."""
-    if len(measurement) < hypothesis.curve_size:
+def enough_points(hypothesis: Hypothesis, measurement: Measurement, priors: bool = True) -> None:
+    """Raise `SettingsError` if the curve has more parameters than the measurement has points; where there are
+    ``priors``, these hold the shapes of effects, and only their sizes count.
+    """
+    sizes = hypothesis.material_size + sum(len(e.sizes) for e in hypothesis.effects)
+    count = sizes if priors else hypothesis.curve_size
+    if len(measurement) < count:
         raise SettingsError(
-            f"{len(measurement)} points cannot fix the {hypothesis.curve_size} parameters of {hypothesis.label()}",
+            f"{len(measurement)} points cannot fix the {count} parameters of {hypothesis.label()}",
             remedy="use a longer range or a simpler material",
         )

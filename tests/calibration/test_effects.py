@@ -83,5 +83,8 @@ def test_too_few_points_are_refused_with_effects() -> None:
     m = Measurement(np.array([0.01, 0.02, 0.03]), np.ones(3), Uniaxial(), Specimen("strip", 1e-3))
     from bayesmembrane.ground.errors import SettingsError
 
+    claim = hypothesis("yeoh", ("zero_offset", "force_offset"))
     with pytest.raises(SettingsError, match="3 points cannot fix the 5 parameters of yeoh"):
-        Posterior(hypothesis("yeoh", ("zero_offset", "force_offset")), m)
+        Posterior(claim, m)
+    with pytest.raises(SettingsError, match="3 points cannot fix the 7 parameters of yeoh"):  # nothing holds shapes
+        fit(m, claim)

@@ -133,7 +133,7 @@ def fit_jointly(joint: Joint, *, seed: int = 0, solve: Solve = api.solve) -> Joi
     """
     joint = joint.held
     for part in joint.parts:
-        enough_points(part.hypothesis, part.measurement)
+        enough_points(part.hypothesis, part.measurement, priors=False)
     few = with_fewer_readings(joint)
     objective = JointObjective(few, solve)
     x, _, noises = objective.settled(objective.starts(np.random.default_rng(seed)))
