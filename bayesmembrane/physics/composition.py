@@ -192,11 +192,18 @@ def _yielding(
 ) -> tuple[list[Array], NDArray[np.int8]]:
     """Forces (B, N) of films with effect parameters x (B, k), and of each change; and `Status` (B,) where they are nan.
 
-    Each film lies elsewhere, so that nothing is shared but with what only the load cell adds.
+    Each film lies elsewhere, so that nothing is shared but with what only the load cell adds. Beside one that does not
+    close none is sought.
     """
     _, plain, why = composition.closed(law, x)
     moved = [c for c in changes if not isinstance(c.effect, Sensor)]
-    laws, points = [c.law for c in moved], np.concatenate([c.x for c in moved])
-    beside = composition.closed(type(law).stack(laws), points, np.tile(plain, (len(laws), 1)))[1]
-    each = iter(parted(beside, len(laws)))
+    closed = np.flatnonzero(np.any(np.isfinite(plain), axis=1))
+    beside = np.full((len(moved), *plain.shape), np.nan)
+    if closed.size:
+        laws, points = [c.law.of(closed) for c in moved], np.concatenate([c.x[closed] for c in moved])
+        near = np.tile(plain[closed], (len(laws), 1))
+        beside[:, closed] = np.reshape(
+            composition.closed(type(law).stack(laws), points, near)[1], (len(laws), closed.size, -1)
+        )
+    each = iter(beside)
     return [plain, *(plain if isinstance(c.effect, Sensor) else next(each) for c in changes)], why

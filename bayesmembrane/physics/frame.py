@@ -13,7 +13,7 @@ from bayesmembrane.ground.parameters import Array
 MOST_ITERATIONS, QUICK, QUICK_LOST = 40, 15, 4
 """Turns of a search, at most; of one in which what a frame remembers moves; and of one of a film without a force."""
 CLOSED = 1e-11  # of the largest deflection: so far what both give way may be from the measured one
-SHORT, STEEP = 1e-7, 5.0  # a secant over a shorter step is round-off, a steeper one no slope
+SHORT, STEEP = 1e-9, 5.0  # a secant over a shorter step is round-off, a steeper one no slope
 LONG, TURNS = 0.1, 4
 """A step longer than this part of the force is made along the curve of the frame, which takes so many turns to find."""
 PASSES = 12
