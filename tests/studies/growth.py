@@ -40,15 +40,13 @@ FEW, MANY = 10, 60  # readings where their number does not vary
 EMCEE_STEPS, FORM_DRAWS = 100, 32
 # Added one after another to a neo-Hookean film of stated noise; the last makes it fourteen parameters.
 EFFECTS = (
-    "force_offset",
     "zero_offset",
     "prestretch",
     "thickness",
     "clamp_bending",
     "off_centre_disc",
-    "force_gain",
+    "force_offset",
     "machine_compliance",
-    "friction",
 )
 Case = tuple[str, int, int]
 
@@ -168,7 +166,7 @@ AXES: dict[str, tuple[Callable[[int, int], Row], tuple[int, ...]]] = {
     "readings, a draw with form error": (readings_form, (15, 60, 250, 1000, 4500, 20000)),
     "walkers": (walkers, (32, 64, 128, 256, 512, 1024)),
     "walkers, a hundred steps of emcee": (walkers_emcee, (32, 64, 128, 256, 512, 1024)),
-    "parameters": (parameters, (1, 2, 3, 4, 6, 8, 11, 14)),
+    "parameters": (parameters, (1, 2, 3, 4, 6, 9, 14)),
     "specimens, joint": (specimens_joint, (1, 3, 10, 30, 100)),
     "specimens, population": (specimens_population, (3, 10, 30, 100)),
 }
