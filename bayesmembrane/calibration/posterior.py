@@ -339,14 +339,18 @@ class Outcomes(Counter[str]):
                 self.examples[o.label] = tuple(map(float, x[int(np.argmax(outcome == o))]))
 
 
+def to_be_fixed(hypothesis: Hypothesis) -> int:
+    """Parameters that data have to fix where there are priors: the material's, and sizes of effects, without shapes."""
+    return hypothesis.material_size + sum(len(e.sizes) for e in hypothesis.effects)
+
+
 def enough_points(hypothesis: Hypothesis, measurement: Measurement, priors: bool = True) -> None:
-    """Raise `SettingsError` if the curve has more parameters than the measurement has points; where there are
-    ``priors``, these hold the shapes of effects, and only their sizes count.
+    """Raise `SettingsError` if the curve has more parameters than the measurement has points: those `to_be_fixed`,
+    or without ``priors`` all.
     """
-    sizes = hypothesis.material_size + sum(len(e.sizes) for e in hypothesis.effects)
-    count = sizes if priors else hypothesis.curve_size
+    count = to_be_fixed(hypothesis) if priors else hypothesis.curve_size
     if len(measurement) < count:
         raise SettingsError(
             f"{len(measurement)} points cannot fix the {count} parameters of {hypothesis.label()}",
-            remedy="use a longer range or a simpler material",
+            remedy=f"use a longer range or a simpler material{' or fewer effects' if hypothesis.effects else ''}",
         )

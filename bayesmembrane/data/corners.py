@@ -17,6 +17,11 @@ OTHER = 0.2
 """Of the same: by so much the speeds of both sides differ, at least, at a corner."""
 INSIDE = 0.03
 """Of an interval: closer to a reading no corner is told from one at it."""
+LONGER = 1.5
+"""Times as long as the longer one beside it: in a longer interval nobody knows what the disc did, as where an export
+leaves out a pause."""
+STOOD = 0.003
+"""Of the speed before: by no more was the disc moved in an interval with a turn in which it may have stood still."""
 SMALLEST = 2e-4
 """Of the largest deflection: by so much a corner moves the disc in an interval, at least."""
 
@@ -30,8 +35,9 @@ def with_corners(measurement: Measurement) -> Measurement:
     A machine at constant speed turns wherever it was told to, and not at a reading: the first reading after a turn has
     been on the way back already. What remembers signs of the motion, largest stretches or times at rest needs to know
     it. Speeds are those that two intervals agree about; one interval is enough on one side where it is as fast as the
-    other side. A turn that slows down, as of a sine wave, has no corner. Without times, for stretches across, and where
-    legs are said, the path is as it was.
+    other side. A turn that slows down, as of a sine wave, has no corner, and nobody says where it is in an interval
+    that is longer than those beside it, or at whose ends the disc is in one place: it may have stood still there.
+    Without times, for stretches across, and where legs are said, the path is as it was.
     """
     path = measurement.path
     if path.time is None or path.across is not None or path.said or path.time.size < 6:
@@ -57,7 +63,9 @@ def _corners(deflection: Array, time: Array, full_range: float) -> tuple[NDArray
     other = (turned >= OTHER * larger) & (turned * gap[inner] >= SMALLEST * full_range)
     with np.errstate(all="ignore"):
         part = (speed[inner] - after) / (before - after)
-    found = ((fore & aft) | ((fore | aft) & alike)) & other & (part > INSIDE) & (part < 1 - INSIDE)
+    known = gap[inner] <= LONGER * np.maximum(gap[inner - 1], gap[inner + 1])
+    known &= (before * after >= 0) | (np.abs(speed[inner]) > STOOD * larger)
+    found = ((fore & aft) | ((fore | aft) & alike)) & other & known & (part > INSIDE) & (part < 1 - INSIDE)
     rows, part = inner[found], part[found]
     return rows, deflection[rows] + before[found] * part * gap[rows], time[rows] + part * gap[rows]
 

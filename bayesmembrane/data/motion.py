@@ -141,8 +141,8 @@ class Motion:
         out = _short_rests(self.deflection)
         for still in holds(self.deflection):
             away = np.abs(self.deflection[still] - np.median(self.deflection[still]))
-            there = away <= SCATTER * np.median(away) + NO_STEP * np.mean(self.steps)
-            out[still[1:]] = there[1:] & there[:-1]
+            there = np.flatnonzero(away <= SCATTER * np.median(away) + NO_STEP * np.mean(self.steps))
+            out[still[there[0] + 1 : there[-1] + 1]] = True  # what flickers between its ends is at rest, too
         return out
 
     @cached_property

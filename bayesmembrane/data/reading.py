@@ -94,7 +94,7 @@ def read_measurement(curve_csv: str | Path, specimen_toml: str | Path) -> Measur
         blank_run=blank_run,
     )
     moved = measured if motion is None else replace(measured, motion=motion, places=np.arange(force.size))
-    return of_few(with_corners(moved), READ)
+    return with_corners(of_few(moved, READ))
 
 
 def _rig(section: TomlSection) -> Fixture:

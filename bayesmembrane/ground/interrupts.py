@@ -72,15 +72,27 @@ def insistent() -> Iterator[None]:
     lost (`sys.unraisablehook`); compiled functions have its traceback printed before (`sys.excepthook`).
     """
     lost_before, told_before = sys.unraisablehook, sys.excepthook
+    due = threading.Event()  # one interrupt may come both ways
+
+    def signal_again() -> None:
+        due.clear()
+        _signal_main_thread()
+
+    def later() -> None:
+        if not due.is_set():
+            due.set()
+            threading.Timer(AGAIN, signal_again).start()
 
     def raise_again(lost: sys.UnraisableHookArgs) -> None:
         if issubclass(lost.exc_type, KeyboardInterrupt):
-            threading.Timer(AGAIN, _signal_main_thread).start()
+            later()
         else:
             lost_before(lost)
 
     def tell(kind: type[BaseException], error: BaseException, where: TracebackType | None) -> None:
-        if not issubclass(kind, KeyboardInterrupt):
+        if issubclass(kind, KeyboardInterrupt):
+            later()
+        else:
             told_before(kind, error, where)
 
     sys.unraisablehook, sys.excepthook = raise_again, tell

@@ -26,7 +26,7 @@ def read_at(time: np.ndarray) -> Measurement:
 def test_corners_are_found_where_they_are(seed: int) -> None:
     """Of readings at uneven times, and with a deflection that is read to 1e-4 of a step."""
     rng = np.random.default_rng(seed)
-    time = np.cumsum(rng.uniform(0.5, 1.0, 140))
+    time = np.cumsum(rng.uniform(0.7, 1.0, 140))
     m = read_at(time[time < 109])
     noisy = moved(m.time, m.deflection + 5e-8 * rng.standard_normal(len(m)))
     found = with_corners(noisy)
@@ -52,7 +52,7 @@ def test_a_disc_that_stopped_between_two_readings_rests_at_the_second() -> None:
 def test_friction_after_a_turn_between_readings_is_that_of_the_motion() -> None:
     """Against the same guide read five hundred times as often."""
     coarse, fine = np.linspace(0.0, 100.0, 331), np.linspace(0.0, 100.0, 165_001)
-    p = np.array([[0.02, 2e-4, -20.0, 1.0, 0.0]])
+    p = np.array([[0.02, 2e-4, 2e3, 1.0, 0.0]])
     m = with_corners(read_at(coarse))
     found = Friction().read(p, np.zeros((1, m.path.deflection.size)), m.path)[0, m.on_path]
     way = np.interp(fine, CLOCK, KNOTS)
@@ -60,6 +60,20 @@ def test_friction_after_a_turn_between_readings_is_that_of_the_motion() -> None:
     plain = Friction().read(p, np.zeros((1, coarse.size)), read_at(coarse).path)[0]
     assert found == pytest.approx(exact, abs=2e-4)
     assert np.max(np.abs(plain - exact)) > 5e-3
+
+
+@pytest.mark.parametrize("pause", [2.0, 60.0])
+@pytest.mark.parametrize("read_twice", [False, True])
+def test_a_pause_that_nobody_read_is_no_way_on(pause: float, read_twice: bool) -> None:
+    """At the top, of which the export keeps one reading or two, and at zero between two cycles."""
+    up, back = np.arange(0.0, 31.0), np.arange(29.0, -1.0, -1.0)
+    cycle = np.concatenate([up, up[-1:] if read_twice else [], back])
+    gaps = np.ones(cycle.size)
+    gaps[31] = pause
+    way, time = np.tile(cycle, 2), np.cumsum(np.tile(gaps, 2))
+    time[cycle.size :] += pause
+    m = moved(time, 1e-3 * way)
+    assert with_corners(m) is m
 
 
 def test_no_corner_is_made_up() -> None:

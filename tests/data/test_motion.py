@@ -89,6 +89,14 @@ def test_a_disc_rests_where_it_is_held_and_has_just_moved_where_it_stops() -> No
     assert m.moving_speed[~m.rests] == pytest.approx(0.02 / 40)
 
 
+def test_a_hold_in_which_an_encoder_flickers_is_a_rest_from_end_to_end() -> None:
+    rng = np.random.default_rng(4)
+    held = np.full(60, UP[-1]) + 1e-5 * (rng.random(60) < 0.3)
+    m = Motion(np.concatenate([UP, held, UP[-2::-1]]), np.arange(141.0), 0.02)
+    assert np.flatnonzero(m.rests)[[0, -1]] == pytest.approx([41, 100], abs=2)
+    assert np.all(m.rests[43:98])
+
+
 def test_short_rests_of_a_staircase_are_seen() -> None:
     each = [np.append(np.linspace(low, low + 1e-3, 6)[1:], np.full(5, low + 1e-3)) for low in 1e-3 * np.arange(8)]
     m = Motion(np.concatenate([[0.0], *each]), np.arange(81.0), 8e-3)

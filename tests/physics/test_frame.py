@@ -14,7 +14,7 @@ from bayesmembrane.physics.rigs.uniaxial import Uniaxial
 
 MEASURED = np.linspace(0.0, 1.0, 41)
 NO_PLAY = (-20.0, 1.0)
-"""Log odds of what is taken up by small forces, and the force that takes it up."""
+"""ln of the play, and the force that takes it up."""
 EXPONENTS = np.array([[0.3], [0.5], [1.0], [1.4]])
 
 
@@ -100,7 +100,7 @@ def test_no_film_near_locking_is_lost_for_a_frame_that_seats() -> None:
             10 ** rng.uniform(-4, -2, 300),
             rng.uniform(0.5, 1.2, 300),
             rng.normal(-1, 2, 300),
-            rng.normal(-2, 2, 300),
+            rng.normal(0, 2, 300),
             0.05 * np.exp(rng.standard_normal(300)),
         ],
         axis=1,

@@ -6,27 +6,26 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.special import expit
 
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal
 from bayesmembrane.physics.effects._history import relaxing
 from bayesmembrane.physics.effects.base import EffectParameter, Sensor
-from bayesmembrane.physics.reach import SOURCE
 
-SMALLEST = 1e-6
-"""Of the largest force: a power of nothing has no slope."""
+SMALLEST = 1e-9  # N: a power of nothing has no slope
+SLOWEST, FASTEST = 0.03, 30.0
+"""Times the speed of the first loading: what comes to rest, or waits before it starts, has any speed."""
 
 
 @dataclass(frozen=True)
 class Friction(Sensor):
-    """F_read = F + level [1 - p + p (|F| / F_r)^load] (v / v_1)^-slower z, p = 1 / (1 + exp(-log_odds_pressed)), with z
-    relaxing to +1 on loading and -1 on unloading over ``travel``.
+    """F_read = F + level [1 + (|F| / doubled_at)^load] (v / v_1)^-slower z, with z relaxing to +1 on loading and -1 on
+    unloading over ``travel``.
 
     dz/ds = (direction - z) / travel along the distance s travelled, z = 0 at the start. A guide that the film presses
-    to its side rubs the more the larger the force is (p), as a rope does on its pulley; F_r is the largest force of the
-    test. A dry guide rubs somewhat more when it moves slower, an oiled one less (R. Stribeck, Z. VDI 46 (1902) 1341);
-    v_1 is the speed of the first loading, and a guide at rest rubs as when it last moved.
+    to its side rubs the more the larger the force is, as a rope does on its pulley. A dry guide rubs somewhat more when
+    it moves slower, an oiled one less (R. Stribeck, Z. VDI 46 (1902) 1341), down to `SLOWEST` and up to `FASTEST` times
+    the speed v_1 of the first loading; a guide at rest rubs as when it last moved.
     """
 
     name: ClassVar[str] = "friction"
@@ -36,20 +35,16 @@ class Friction(Sensor):
         "A force up on loading and down on unloading: jumps at each reversal, also at small deflections and at any "
         "speed, the same at large forces or larger, and somewhat larger or less where the disc moves slower."
     )
+    rank: ClassVar[int] = -1  # the guide has the film's force, before the load cell adds to it
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
-        EffectParameter("level", "N", "sliding friction at the largest force", HalfNormal(0.03), (0.0, 2.0), 0.0),
+        EffectParameter("level", "N", "sliding friction without a force", HalfNormal(0.03), (0.0, 2.0), 0.0),
         EffectParameter(
             "travel", "m", "distance after a reversal over which it turns", LogNormal(3e-4, 1.0), (1e-6, 2e-2)
         ),
         EffectParameter(
-            "log_odds_pressed",
-            "-",
-            "log odds of the part of it that grows with the force",
-            Normal(-2.5, 2.0),
-            (-20.0, 6.0),
-            begin=-1.0,
+            "doubled_at", "N", "force at which it is twice as large", LogNormal(10.0, 1.5), (5e-2, 2e3), begin=3.0
         ),
-        EffectParameter("load", "-", "power of the force with which that part grows", LogNormal(1.0, 0.4), (0.2, 4.0)),
+        EffectParameter("load", "-", "power of the force with which it grows", LogNormal(1.0, 0.4), (0.2, 4.0)),
         EffectParameter("slower", "-", "power of the speed by which it falls", Normal(0.0, 0.1), (-0.5, 0.5)),
     )
 
@@ -57,10 +52,9 @@ class Friction(Sensor):
         # A pull of one per length travelled, and its own relaxation: z = direction (1 - exp(-s / travel)).
         signed = np.cumsum(path.steps * path.leg) / p[:, 1:2]
         z = relaxing(signed, path.steps, p[:, 1:2])
-        pressed = expit(p[:, 2:3])
-        part = np.maximum(np.abs(force) / (self.reach or SOURCE).force, SMALLEST) ** p[:, 3:4]
-        faster = _last_moving(path) / path.pace
-        return np.asarray(force + p[:, :1] * (1.0 - pressed + pressed * part) * faster ** -p[:, 4:5] * z)
+        pressed = (np.maximum(np.abs(force), SMALLEST) / p[:, 2:3]) ** p[:, 3:4]
+        faster = np.clip(_last_moving(path) / path.pace, SLOWEST, FASTEST)
+        return np.asarray(force + p[:, :1] * (1.0 + pressed) * faster ** -p[:, 4:5] * z)
 
 
 def _last_moving(path: Motion) -> Array:

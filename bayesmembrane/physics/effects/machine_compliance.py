@@ -13,7 +13,6 @@ from scipy.special import expit
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Lomax, Normal
 from bayesmembrane.physics.effects.base import Compliance, EffectParameter
-from bayesmembrane.physics.reach import SOURCE
 
 if TYPE_CHECKING:
     from scipy.interpolate import PchipInterpolator
@@ -73,18 +72,18 @@ class FrameCurve:
 
 @dataclass(frozen=True)
 class MachineCompliance(Compliance):
-    """delta_film = delta - (1 - s) u(F) - s u(F_m), u(F) = (1 - q) v(F) + q v(F_r) (1 - exp(-|F| / take_up)) sign(F),
-    v(F) = compliance F |F / 1 N|^(exponent - 1), s = 1 / (1 + exp(-log_odds_seated)), q alike of log_odds_taken_up.
+    """delta_film = delta - (1 - s) u(F) - s u(F_m), s = 1 / (1 + exp(-log_odds_seated)),
+    u(F) = v(F) + e^log_play v(take_up) (1 - exp(-|F| / take_up)) sign(F), v(F) = compliance F |F / 1 N|^(exponent - 1).
 
-    F_m is the largest force so far, F_r that of the whole test. Beams and load cells yield in proportion to the force
-    (exponent 1), contacts of round bodies as F^(2/3) (H. Hertz, J. Reine Angew. Math. 92 (1882) 156), joints that open
-    the other way round: the compliance of real frames changes with the load, by tens of percents. Pins, couplings and
-    rough seats have play that a small force takes up (q), as in the toe of a tensile test (ASTM D638, annex on toe
-    compensation). A load string that was not preloaded gives way for good at its first loading, in grips, lock
-    nuts and couplings (s; that is what its makers have it preloaded for: Instron 34SC, operator's guide, "Preload the
-    load string"), and a film behind it looks longer after its first pull. Of one that was, next to nothing stays: s may
-    have any order of magnitude. Only a way back shows it. And frames differ by orders of magnitude: a prior that falls
-    like a normal one would rather let the film be softer than the frame.
+    F_m is the largest force so far. Beams and load cells yield in proportion to the force (exponent 1), contacts of
+    round bodies as F^(2/3) (H. Hertz, J. Reine Angew. Math. 92 (1882) 156), joints that open the other way round: the
+    compliance of real frames changes with the load, by tens of percents. Pins, couplings and rough seats have play that
+    a small force takes up, as in the toe of a tensile test (ASTM D638, annex on toe compensation). A load string that
+    was not preloaded gives way for good at its first loading, in grips, lock nuts and couplings (s; that is what its
+    makers have it preloaded for: Instron 34SC, operator's guide, "Preload the load string"), and a film behind it looks
+    longer after its first pull. Of one that was, next to nothing stays: s may have any order of magnitude. Only a way
+    back shows it. And frames differ by orders of magnitude: a prior that falls like a normal one would rather let the
+    film be softer than the frame.
 
     Where a blank run shows the frame, delta_film = delta - compliance F_m g(F / F_m) with the run's curve g up to its
     largest force F_m: there is no exponent then, nothing is seated any more, and the compliance is the run's, but for
@@ -116,12 +115,11 @@ class MachineCompliance(Compliance):
             begin=-2.0,
         ),
         EffectParameter(
-            "log_odds_taken_up",
+            "log_play",
             "-",
-            "log odds of the part of it that is play, at the largest force of the test",
-            Normal(-2.5, 2.0),
-            (-20.0, 4.0),
-            begin=-2.0,
+            "ln of the play, in parts of what else is lost at the force that takes it up",
+            Normal(0.3, 2.2),
+            (-20.0, 8.0),
         ),
         EffectParameter("take_up", "N", "force by which the play is taken up", LogNormal(0.1, 0.8), (2e-3, 2.0)),
     )
@@ -140,7 +138,7 @@ class MachineCompliance(Compliance):
     @property
     def starts(self) -> list[dict[str, float]]:
         """Most of it play: of a frame with hardly any, the force that takes it up is not seen."""
-        return [{"log_odds_taken_up": 1.0}] if self.curve is None else []
+        return [{"log_play": 3.0}] if self.curve is None else []
 
     def shown_by(self, measurement: Measurement) -> Self:
         shown = None if measurement.blank_run is None else _curve_of(measurement.blank_run.tobytes())
@@ -151,26 +149,21 @@ class MachineCompliance(Compliance):
 
     def yielding(self, p: Array, force: Array, peaks: Array) -> tuple[Array, Array]:
         if self.curve is None:
-            most = (self.reach or SOURCE).force
-            now, soft = _with_play(p, force, most)
+            now, soft = _with_play(p, force)
             so_far = np.maximum(force, peaks)
             seated = expit(p[:, 2:3])
-            lost = (1 - seated) * now + seated * _with_play(p, so_far, most)[0]
+            lost = (1 - seated) * now + seated * _with_play(p, so_far)[0]
             return lost, np.where(force >= so_far, soft, (1 - seated) * soft)
         compliance = np.full((len(force), 1), self.curve.compliance) if self.held else p[:, :1]
         lost, slope = self.curve.at(force)
         return compliance * lost, compliance * slope
 
 
-def _with_play(p: Array, force: Array, most: float) -> tuple[Array, Array]:
-    """u(F) and its derivative, of parameters p (B, 5), in a test whose largest force is ``most`` N."""
+def _with_play(p: Array, force: Array) -> tuple[Array, Array]:
+    """u(F) and its derivative, of parameters p (B, 5)."""
     lost, soft = _power(p, force)
-    part, whole = expit(p[:, 3:4]), _power(p, np.full((1, 1), most))[0]
-    left = np.exp(-np.abs(force) / p[:, 4:5])
-    return (
-        (1 - part) * lost + part * whole * np.sign(force) * (1 - left),
-        (1 - part) * soft + part * whole * left / p[:, 4:5],
-    )
+    play, left = np.exp(p[:, 3:4]) * _power(p, p[:, 4:5])[0], np.exp(-np.abs(force) / p[:, 4:5])
+    return lost + play * np.sign(force) * (1 - left), soft + play * left / p[:, 4:5]
 
 
 def _power(p: Array, force: Array) -> tuple[Array, Array]:
