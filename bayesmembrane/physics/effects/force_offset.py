@@ -18,8 +18,7 @@ class ForceOffset(Sensor):
     """F_read = F + offset [1 - s exp(-|delta| / lift)], with s = 1 / (1 + exp(-log_odds_resting)).
 
     A load cell that was tared while the disc, or what hangs from it, rested on something reads its weight once it is
-    lifted (s = 1); one that was not tared reads it from the start (0). Of a film pulled on both ways the zero is passed
-    where it began.
+    lifted (s = 1); one that was not tared reads it from the start (0).
     """
 
     name: ClassVar[str] = "force_offset"
@@ -39,7 +38,6 @@ class ForceOffset(Sensor):
             "log odds of the part of it that rests on something until the disc is lifted",
             Normal(-4.0, 3.0),
             (-20.0, 8.0),
-            begin=-4.0,
         ),
         EffectParameter("lift", "m", "way on which that is lifted", LogNormal(1e-3, 0.7), (5e-5, 1e-2)),
     )
