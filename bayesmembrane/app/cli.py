@@ -8,6 +8,7 @@ import pkgutil
 import sys
 
 import typer
+from typer.main import get_command
 
 from bayesmembrane.app import verbs
 from bayesmembrane.app.options import spread
@@ -41,7 +42,8 @@ def main() -> None:
     ready()
     try:
         with raised():  # the signal by which clusters and shutdowns end programs, as Ctrl-C
-            assembled()(standalone_mode=True)
+            # Not by calling it: that sets a hook of its own for what nobody catches (`insistent`).
+            get_command(assembled())(standalone_mode=True)
     except BayesmembraneError as error:
         note(str(error))
         sys.exit(1)

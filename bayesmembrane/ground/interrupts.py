@@ -54,6 +54,19 @@ def deferred(stop: Stop = never) -> Iterator[StopAsked]:
 
 
 @contextmanager
+def held_back() -> Iterator[None]:
+    """While the body runs, SIGINT and SIGTERM wait, and arrive after it: for what is short, and wrong if half done."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    waiting = list[int]()
+    with _handled(lambda number, frame: waiting.append(number)):
+        yield
+    for number in waiting:
+        signal.raise_signal(number)
+
+
+@contextmanager
 def raised() -> Iterator[None]:
     """While the body runs, SIGTERM raises KeyboardInterrupt, as SIGINT does; in threads nothing changes."""
     if threading.current_thread() is not threading.main_thread():

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bayesmembrane.ground.interrupts import deferred, raised
+from bayesmembrane.ground.interrupts import deferred, held_back, raised
 
 LONGEST = 30.0  # s, for what takes a hundredth
 
@@ -26,6 +26,28 @@ try:
         time.sleep(30)
 except KeyboardInterrupt:
     print("interrupted")
+"""
+INTERRUPTED_AT_THE_FIRST_SEQUENCE = """
+import signal, time
+import numpy as np
+from bayesmembrane.ground.interrupts import raised
+from bayesmembrane.ground.sobol import scrambled_sobol
+
+load = np.load
+
+def interrupted(*given, **named):
+    signal.raise_signal(signal.SIGTERM)
+    return load(*given, **named)
+
+np.load = interrupted
+try:
+    with raised():
+        scrambled_sobol(2, 0)
+        time.sleep(30)
+except KeyboardInterrupt:
+    print("interrupted")
+points = np.sort(scrambled_sobol(2, 0).random(4)[:, 0])
+print(np.floor(4 * points[1]) / 4)  # one in each quarter
 """
 
 
@@ -69,6 +91,33 @@ def test_interrupt_in_a_compiled_function_that_cannot_raise_is_not_told(
     subprocess.run([sys.executable, program], check=True)
     out, err = capfd.readouterr()
     assert (out, err) == ("interrupted\n", "")
+
+
+def signalled_while_held_back(done: list[str]) -> None:
+    with held_back():
+        signal.raise_signal(signal.SIGTERM)
+        done.append("the body")
+    time.sleep(LONGEST)
+    done.append("what follows")
+
+
+def test_what_is_held_back_arrives_after_it() -> None:
+    done = list[str]()
+    with raised(), pytest.raises(KeyboardInterrupt):
+        signalled_while_held_back(done)
+    assert done == ["the body"]
+    with raised(), deferred() as asked:
+        with held_back():
+            signal.raise_signal(signal.SIGINT)
+            assert not asked.signalled
+        assert asked.signalled
+
+
+def test_an_interrupt_does_not_take_the_numbers_of_a_sobol_sequence(tmp_path: Path) -> None:
+    program = tmp_path / "sobol.py"
+    program.write_text(INTERRUPTED_AT_THE_FIRST_SEQUENCE)
+    told = subprocess.run([sys.executable, program], check=True, capture_output=True, text=True)
+    assert (told.stdout, told.stderr) == ("interrupted\n0.25\n", "")
 
 
 def test_other_lost_exceptions_are_told_as_ever(monkeypatch: pytest.MonkeyPatch) -> None:
