@@ -339,16 +339,16 @@ class Outcomes(Counter[str]):
                 self.examples[o.label] = tuple(map(float, x[int(np.argmax(outcome == o))]))
 
 
-def to_be_fixed(hypothesis: Hypothesis) -> int:
-    """Parameters that data have to fix where there are priors: the material's, and sizes of effects, without shapes."""
+def fixed_by_data(hypothesis: Hypothesis) -> int:
+    """How many parameters only data fix: the material's, and sizes of effects; priors hold their shapes."""
     return hypothesis.material_size + sum(len(e.sizes) for e in hypothesis.effects)
 
 
 def enough_points(hypothesis: Hypothesis, measurement: Measurement, priors: bool = True) -> None:
-    """Raise `SettingsError` if the curve has more parameters than the measurement has points: those `to_be_fixed`,
+    """Raise `SettingsError` if the curve has more parameters than the measurement has points: those `fixed_by_data`,
     or without ``priors`` all.
     """
-    count = to_be_fixed(hypothesis) if priors else hypothesis.curve_size
+    count = fixed_by_data(hypothesis) if priors else hypothesis.curve_size
     if len(measurement) < count:
         raise SettingsError(
             f"{len(measurement)} points cannot fix the {count} parameters of {hypothesis.label()}",

@@ -13,7 +13,7 @@ from bayesmembrane.ground.parameters import Array
 
 STEADY = 0.05
 """Of the larger speed of both sides: by no more may two intervals in a row differ, for their mean to be a speed."""
-OTHER = 0.2
+APART = 0.2
 """Of the same: by so much the speeds of both sides differ, at least, at a corner."""
 INSIDE = 0.03
 """Of an interval: closer to a reading no corner is told from one at it."""
@@ -40,14 +40,14 @@ def with_corners(measurement: Measurement) -> Measurement:
     Without times, for stretches across, and where legs are said, the path is as it was.
     """
     path = measurement.path
-    if path.time is None or path.across is not None or path.said or path.time.size < 6:
+    if path.time is None or path.across is not None or path.said:
         return measurement
-    after, at, clock = _corners(path.deflection, path.time, measurement.full_range)
-    if not after.size:
+    rows, at, clock = _corners(path.deflection, path.time, measurement.full_range)
+    if not rows.size:
         return measurement
-    way = without_round_off(np.insert(path.deflection, after + 1, at))
-    motion = Motion(way, np.insert(path.time, after + 1, clock), measurement.full_range)
-    places = measurement.on_path + np.searchsorted(after, measurement.on_path, side="left")
+    way = without_round_off(np.insert(path.deflection, rows + 1, at))
+    motion = Motion(way, np.insert(path.time, rows + 1, clock), measurement.full_range)
+    places = measurement.on_path + np.searchsorted(rows, measurement.on_path, side="left")
     return replace(measurement, motion=motion, places=places)
 
 
@@ -57,15 +57,16 @@ def _corners(deflection: Array, time: Array, full_range: float) -> tuple[NDArray
     speed = np.diff(deflection) / gap
     inner = np.arange(1, speed.size - 1)
     larger = np.maximum(np.abs(speed[inner - 1]), np.abs(speed[inner + 1]))
-    (before, fore), (after, aft) = (_steady(speed, inner, side, STEADY * larger) for side in (-1, 1))
-    alike = np.abs(np.abs(before) - np.abs(after)) <= STEADY * larger
+    (before, steady_before), (after, steady_after) = (_steady(speed, inner, side, STEADY * larger) for side in (-1, 1))
+    as_fast = np.abs(np.abs(before) - np.abs(after)) <= STEADY * larger
     turned = np.abs(before - after)
-    other = (turned >= OTHER * larger) & (turned * gap[inner] >= SMALLEST * full_range)
+    apart = (turned >= APART * larger) & (turned * gap[inner] >= SMALLEST * full_range)
     with np.errstate(all="ignore"):
         part = (speed[inner] - after) / (before - after)
     known = gap[inner] <= LONGER * np.maximum(gap[inner - 1], gap[inner + 1])
     known &= (before * after >= 0) | (np.abs(speed[inner]) > STOOD * larger)
-    found = ((fore & aft) | ((fore | aft) & alike)) & other & known & (part > INSIDE) & (part < 1 - INSIDE)
+    steady = (steady_before & steady_after) | ((steady_before | steady_after) & as_fast)
+    found = steady & apart & known & (part > INSIDE) & (part < 1 - INSIDE)
     rows, part = inner[found], part[found]
     return rows, deflection[rows] + before[found] * part * gap[rows], time[rows] + part * gap[rows]
 

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bayesmembrane.calibration.posterior import enough_points, to_be_fixed
+from bayesmembrane.calibration.posterior import enough_points, fixed_by_data
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, available
 from bayesmembrane.diagnosis.candidates.sampled import checked
@@ -266,7 +266,7 @@ def _check_size(measurement: Measurement, question: Question) -> None:
     if not question.declared:
         asked = min(_every_energy(question).values(), key=lambda h: h.curve_size)
     enough_points(asked, measurement)
-    least = to_be_fixed(asked) + SEARCH.spare_points
+    least = fixed_by_data(asked) + SEARCH.spare_points
     if len(measurement) < least:
         what = f"{asked.label()} misses" if question.declared else "is missing"
         raise SettingsError(

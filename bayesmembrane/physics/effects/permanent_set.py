@@ -21,10 +21,10 @@ class PermanentSet(Deflection):
     """delta_film = delta - set G (1 - rejoin y) (1 / (2 y))^relieved, y = delta / m, slack below; m: largest deflection
     so far.
 
-    G is the growth law of the test (1 after a first loading to its full range), which the set follows with a delay,
-    in holds and on the way back, too. ``rejoin`` 1 comes back to the first
-    loading curve at m, 0 keeps the whole shift. What is lost may be a length (``relieved`` 0), or stay in the film as a
-    force, which moves a flat, soft film further than a taut one (1 to 2, as the slope of its curve rises).
+    G is the growth law of the test (1 after a first loading to its full range), which the set follows with a delay, in
+    holds and on the way back, too. ``rejoin`` 1 comes back to the first loading curve at m, 0 keeps the whole shift.
+    What is lost may be a length (``relieved`` 0), or stay in the film as a force, which moves a flat, soft film further
+    than a taut one (1 to 2, as the slope of its curve rises).
     """
 
     name: ClassVar[str] = "permanent_set"
