@@ -27,6 +27,7 @@ class Patience:
     behind : times the least sum of squares from which on a search that crawls is not waited for
     crawls_below : relative decrease of |r|^2 by one step below which it does
     slow_below : relative decrease of |r|^2 below which a step counts as slow
+    slow_by : decrease of |r|^2 below which it does, too
     enough : |r| below which nothing lower is asked for
     settled : relative decrease of |r|^2 below which a whole step, undamped, is not worth taking
     """
@@ -34,6 +35,7 @@ class Patience:
     behind: float = np.inf
     crawls_below: float = CRAWL
     slow_below: float = SLOW
+    slow_by: float = 0.0
     enough: float = 0.0
     settled: float = 0.0
 
@@ -98,6 +100,10 @@ class Descent:
         """(M,) |r| of the best points so far."""
         return np.sqrt(self.square)
 
+    def give_up(self) -> None:
+        """Ask for nothing more."""
+        self.asked = self.asked[:0]
+
     def told(self, r: Array, jacobian: Array) -> None:
         """Go on with r (R, N) and dr/dx (R, N, k) of what was asked."""
         if self._begun:
@@ -121,8 +127,8 @@ class Descent:
         better = new_square < square[rows]
         take, won = rows[better], square[rows] - new_square
         moved = self.asked - self.x[rows]
-        promise = square[rows] - _square(self.r[rows] + np.einsum("mnk,mk->mn", self.jacobian[rows], moved))
-        little = np.where(better, won, promise) < patience.slow_below * square[rows]
+        promise = square[rows] - _square(self.r[rows] + (self.jacobian[rows] @ moved[:, :, None])[:, :, 0])
+        little = np.where(better, won, promise) < np.maximum(patience.slow_below * square[rows], patience.slow_by)
         self.slow[rows] = np.where(little, self.slow[rows] + 1, 0)
         self.crawl[rows] = np.where(better & (won > patience.crawls_below * square[rows]), 0, self.crawl[rows] + 1)
         # A step that promised next to nothing may have won far more: the cube overflows, and is clipped.
@@ -181,10 +187,10 @@ class _Normal:
     @classmethod
     def at(cls, x: Array, r: Array, jacobian: Array, free: NDArray[np.bool_], bounds: tuple[Array, Array]) -> _Normal:
         low, high = bounds
-        gradient = np.einsum("mnk,mn->mk", jacobian, r)
+        gradient = (r[:, None, :] @ jacobian)[:, 0]
         moves = free & ~((x <= low) & (gradient > 0)) & ~((x >= high) & (gradient < 0))
         j = np.where(moves[:, None, :], jacobian, 0.0)
-        normal = np.einsum("mnk,mnl->mkl", j, j)
+        normal = np.swapaxes(j, 1, 2) @ j  # not by einsum, which does not know BLAS
         diagonal = np.einsum("mkk->mk", normal)
         diagonal = np.maximum(diagonal, 1e-12 * np.max(diagonal, axis=1, keepdims=True) + 1e-300)
         root = np.sqrt(diagonal)

@@ -143,8 +143,15 @@ class SearchThresholds:
     """A law's error from which on it may carry what its effect is to explain: a third of the prior lies above."""
     law_matters: float = 0.01
     """A law's error below which its size is no matter."""
-    slow_below: float = 3e-5
-    """Of the sum of squares: searches whose steps gain less are near enough, for the linear model knows the rest."""
+    slow_by: float = 0.05
+    """Of the sum of squares, in variances: searches whose steps gain less are near enough, for the linear model knows
+    the rest."""
+    last_falls: int = 4
+    """Steps whose falls say how far the rest of a search will lead."""
+    behind: float = 120.0
+    """In variances: a search that will not come as near the best one's sum of squares is not waited for."""
+    times_behind: float = 1.3
+    """The same, times that sum: where much is missing, factors count less."""
     settled: float = 3e-7
     """Of the sum of squares: a search to which a whole step, undamped, promises less is at its end. With 3e-5 ln Z of
     Ogden's energy, in its bent valleys, once changed by nine."""

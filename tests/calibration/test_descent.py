@@ -89,6 +89,24 @@ def test_where_a_whole_step_promises_too_little_none_is_taken() -> None:
     assert np.array_equal(search.x, start)
 
 
+def test_steps_that_gain_little_end_a_search_however_large_the_rest() -> None:
+    """Of a sum of squares of 1e6 a part of 1e-9 is 1e-3, and nobody needs that."""
+    steps = []
+
+    def far(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        steps.append(len(x))
+        r, j = rosenbrock(x)
+        return np.concatenate([r, np.full((len(x), 1), 1e3)], axis=1), np.concatenate([j, 0 * j[:, :1]], axis=1)
+
+    start, taken = np.array([[-3.0, 2.0]]), []
+    for slow_by in (0.0, 0.01):
+        steps.clear()
+        _, size = descend(far, start, (LOW, HIGH), 200, patience=Patience(slow_below=0.0, slow_by=slow_by))
+        taken.append((len(steps), size[0] ** 2))
+    assert taken[1][0] < taken[0][0]
+    assert taken[1][1] == pytest.approx(taken[0][1], abs=0.5)
+
+
 def test_a_valley_that_still_promises_is_followed_to_its_end() -> None:
     """The damped step gains little there, and the whole one much."""
     x, _ = descend(rosenbrock, np.array([[-3.0, 2.0]]), (LOW, HIGH), 200, patience=Patience(settled=1e-6))

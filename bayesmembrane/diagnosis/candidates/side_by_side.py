@@ -45,8 +45,9 @@ class Searching:
 
     def __init__(self, hypothesis: Hypothesis, axes: Standard, freeing: Freeing, starts: Array, most: int) -> None:
         self.hypothesis, self.axes, self.freeing = hypothesis, axes, freeing
-        patience = Patience(SEARCH.given_up, SEARCH.slow_below, settled=SEARCH.settled)
+        patience = Patience(SEARCH.given_up, slow_by=SEARCH.slow_by, settled=SEARCH.settled)
         self._descent = Descent(starts, axes.bounds, most, patience=patience)
+        self._falls: list[float] = []
 
     @property
     def u(self) -> Array:
@@ -65,6 +66,23 @@ class Searching:
     def done(self) -> bool:
         return not len(self._descent.asked)
 
+    @property
+    def least(self) -> float:
+        """The least sum of squares so far."""
+        return float(np.min(self._descent.square))
+
+    def hopeless(self, least: float) -> bool:
+        """True if as many steps as are left, each as long as the last few, do not lead near one that has ``least``."""
+        steps = self._falls[-SEARCH.last_falls :]
+        if len(steps) <= SEARCH.last_falls - 1:
+            return False
+        slope = (steps[0] - steps[-1]) / (len(steps) - 1)
+        return steps[-1] - slope * self._descent.left > max(least + SEARCH.behind, SEARCH.times_behind * least)
+
+    def give_up(self) -> None:
+        """Stay where it is."""
+        self._descent.give_up()
+
     def told(self, r: Array, j: Array) -> None:
         """Go on with residuals (B, N) N and their slopes (B, N, k) in x."""
         u = self._descent.asked
@@ -74,15 +92,20 @@ class Searching:
         self._descent.told(
             np.concatenate([r, pull], axis=1), np.concatenate([j * self.axes.slope(u)[:, None, :], diagonal], axis=1)
         )
+        self._falls.append(self.least)
 
 
 def run(searches: Sequence[Searching], batches: Batches) -> None:
-    """Until all of them are done."""
-    going = list(searches)
+    """Until all of them are done, or far behind the best of those that judge by the same noise and form error."""
+    going, best = list(searches), dict[Freeing, float]()
     while going:
         found = batches([s.asked for s in going])
         for search, (r, j) in zip(going, found, strict=True):
             search.told(r, j)
+            best[search.freeing] = min(best.get(search.freeing, np.inf), search.least)
+        for search in going:
+            if search.hopeless(best[search.freeing]):
+                search.give_up()
         going = [s for s in going if not s.done]
 
 

@@ -124,6 +124,8 @@ def divided(values: Array, profile: Array) -> Array:
 
 def decorrelated(values: Array, rho: float, gaps: Array) -> Array:
     """(v_i - phi_i v_(i-1)) / sqrt(1 - phi_i^2) with phi = rho^gap: AR(1) noise of unit variance becomes white."""
+    if rho <= 0:
+        return np.array(values, dtype=float)
     phi = forgotten(rho, gaps)
     phi = phi.reshape(-1, *(1,) * (values.ndim - 1))
     out = np.array(values, dtype=float)

@@ -1,12 +1,17 @@
 """Hypotheses that are searched for side by side are found where each is found alone."""
 
+from collections import Counter
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.candidates.candidate import with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.candidates.side_by_side import Searching
 from bayesmembrane.diagnosis.candidates.weighing import Sought, starts_with
+from bayesmembrane.diagnosis.thresholds import SEARCH
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.mechanics import api
@@ -68,6 +73,34 @@ def test_together_and_alone_end_at_the_same_evidence_by_fewer_solutions(measured
     for a, c in zip(polished, alone, strict=True):
         assert c is not None
         assert a.log_evidence == pytest.approx(other.polished(c).log_evidence, abs=0.02)
+
+
+def test_a_search_that_stays_far_behind_is_not_waited_for_and_the_best_ends_where_it_does_alone(
+    measured: Measurement, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A guide that sticks, and hypotheses that know of none, by a valley that they might creep along for long."""
+    rubbed = replace(measured, force=measured.force + 0.1 * np.sign(np.gradient(measured.deflection)))
+    told: Counter[str] = Counter()
+    own = Searching.told
+
+    def counted(search: Searching, r: np.ndarray, j: np.ndarray) -> None:
+        told[search.hypothesis.effects[-1].name if search.hypothesis.effects else ""] += 1
+        own(search, r, j)
+
+    monkeypatch.setattr(Searching, "told", counted)
+    (one, _), (other, _) = searching(rubbed), searching(rubbed)
+    every, again = sought(one), sought(other)
+    together = [c for c in one.fits(every) if c is not None]
+    many = Counter(told)
+    told.clear()
+    alone = [c for s in again if (c := other.fit(s.hypothesis, s.starts, s.parent)) is not None]
+    best = max(alone, key=lambda c: c.log_evidence)
+    assert best.names == ("friction",)
+    assert together[alone.index(best)].log_evidence == pytest.approx(best.log_evidence, abs=0.02)
+    others = [n for n in told if n not in ("", "friction")]
+    assert sum(many[n] for n in others) < sum(told[n] for n in others)
+    for a, b in zip(together, alone, strict=True):
+        assert b is best or a.log_evidence < best.log_evidence - SEARCH.behind / 2
 
 
 def test_where_a_search_ended_is_not_solved_again(measured: Measurement) -> None:
