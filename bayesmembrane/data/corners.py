@@ -22,6 +22,12 @@ LONGER = 1.5
 leaves out a pause."""
 STOOD = 0.003
 """Of the speed before: by no more was the disc moved in an interval with a turn in which it may have stood still."""
+MOST_READ = 10
+"""Readings on each side that say how fast the disc was there: times and deflections are rounded."""
+ROUNDED, ROUND_OFF, COARSEST = (1.0, 0.1, 0.01), 1e-6, 0.15
+"""s, to which times may be rounded, the coarsest first; and the largest part of a speed that may be for that."""
+SAME = 0.1
+"""Of a step of the deflection: so near to another turn the disc turned where its readings might be of a rest, too."""
 SMALLEST = 2e-4
 """Of the largest deflection: by so much a corner moves the disc in an interval, at least."""
 
@@ -36,7 +42,9 @@ def with_corners(measurement: Measurement) -> Measurement:
     been on the way back already. What remembers signs of the motion, largest stretches or times at rest needs to know
     it. Speeds are those that two intervals agree about; one interval is enough on one side where it is as fast as the
     other side. A turn that slows down, as of a sine wave, has no corner, and nobody says where it is in an interval
-    that is longer than those beside it, or at whose ends the disc is in one place: it may have stood still there.
+    that is longer than those beside it, or at whose ends the disc is in one place: it may have stood still there,
+    unless another turn to the same side is where it would have turned. Of times that are rounded v1 and v2 are slopes
+    of lines through up to `MOST_READ` readings.
     Without times, for stretches across, and where legs are said, the path is as it was.
     """
     path = measurement.path
@@ -57,18 +65,71 @@ def _corners(deflection: Array, time: Array, full_range: float) -> tuple[NDArray
     speed = np.diff(deflection) / gap
     inner = np.arange(1, speed.size - 1)
     larger = np.maximum(np.abs(speed[inner - 1]), np.abs(speed[inner + 1]))
-    (before, steady_before), (after, steady_after) = (_steady(speed, inner, side, STEADY * larger) for side in (-1, 1))
-    as_fast = np.abs(np.abs(before) - np.abs(after)) <= STEADY * larger
+    coarse = _coarseness(time, inner)
+    most = (STEADY + coarse) * larger
+    (before, steady_before), (after, steady_after) = (_steady(speed, inner, side, most) for side in (-1, 1))
+    as_fast = np.abs(np.abs(before) - np.abs(after)) <= most
     turned = np.abs(before - after)
     apart = (turned >= APART * larger) & (turned * gap[inner] >= SMALLEST * full_range)
-    with np.errstate(all="ignore"):
-        part = (speed[inner] - after) / (before - after)
     known = gap[inner] <= LONGER * np.maximum(gap[inner - 1], gap[inner + 1])
-    known &= (before * after >= 0) | (np.abs(speed[inner]) > STOOD * larger)
+    stood = (before * after < 0) & (np.abs(speed[inner]) <= STOOD * larger)
     steady = (steady_before & steady_after) | ((steady_before | steady_after) & as_fast)
-    found = steady & apart & known & (part > INSIDE) & (part < 1 - INSIDE)
-    rows, part = inner[found], part[found]
-    return rows, deflection[rows] + before[found] * part * gap[rows], time[rows] + part * gap[rows]
+    some = np.flatnonzero(steady & apart & known)
+    rows = inner[some]
+    with np.errstate(all="ignore"):
+        clock = time[rows] + gap[rows] * ((speed[inner] - after) / (before - after))[some]
+    way = deflection[rows] + before[some] * (clock - time[rows])
+    for k in np.flatnonzero(coarse[some] > 0):
+        clock[k], way[k] = _crossing(deflection, time, int(rows[k]), float((coarse * larger)[some][k]))
+    stood, turns = stood[some], np.sign(before - after)[some]
+    part = (clock - time[rows]) / gap[rows]
+    least = np.maximum(INSIDE, 0.5 * coarse[some])
+    found = (part > least) & (part < 1 - least)
+    sure = found & ~stood
+    for k in np.flatnonzero(found & stood):
+        near = np.abs(way[sure & (turns == turns[k])] - way[k])
+        found[k] = np.any(near <= SAME * np.abs(before[some[k]] * gap[rows[k]]))
+    # Two in a row are one, which is at the reading between them as far as the clock knows.
+    twice = np.abs(rows[:, None] - rows[found]) == 1
+    found &= ~np.any(twice, axis=1)
+    return rows[found], way[found], clock[found]
+
+
+def _coarseness(time: Array, inner: NDArray[np.intp]) -> Array:
+    """(n,) by what part two speeds in intervals beside ``inner`` (n,) may differ for the times being rounded.
+
+    No more than these intervals differ: times on an even clock are no rounded ones.
+    """
+    each = np.diff(time)
+    gap, rest = each[inner], time - time[0]
+    beside = each[np.clip(inner[:, None] + np.arange(-2, 3), 0, each.size - 1)]
+    uneven = np.max(beside, axis=1) - np.min(beside, axis=1)
+    for step in ROUNDED:
+        if np.all(np.abs(rest / step - np.round(rest / step)) < ROUND_OFF):
+            return np.minimum(np.minimum(2 * step, uneven) / gap, COARSEST)
+    return np.zeros(gap.size)
+
+
+def _crossing(deflection: Array, time: Array, row: int, most: float) -> tuple[float, float]:
+    """(s, m) where lines through the readings up to ``row`` and from the next one on cross, as far as intervals are as
+    fast as those beside them, by no more than ``most`` m/s.
+    """
+    lines = []
+    for first, side in ((row, -1), (row + 1, 1)):
+        end = first + 2 * side
+        speed = (deflection[first + side] - deflection[first]) / (time[first + side] - time[first])
+        while 0 <= end < time.size and abs(end - first) <= MOST_READ:
+            now = (deflection[end] - deflection[end - side]) / (time[end] - time[end - side])
+            if abs(now - speed) > most:
+                break
+            end += side
+        part = np.arange(first, end, side)
+        lines.append(np.polyfit(time[part] - time[row], deflection[part], 1))
+    (v1, x1), (v2, x2) = lines
+    if v1 == v2:
+        return np.nan, np.nan
+    since = float((x2 - x1) / (v1 - v2))
+    return time[row] + since, float(x1 + v1 * since)
 
 
 def _steady(speed: Array, inner: NDArray[np.intp], side: int, most: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -90,3 +90,35 @@ def test_no_corner_is_made_up() -> None:
         assert with_corners(m) is m
     timeless = Measurement(each[0].deflection, each[0].force, each[0].rig, each[0].specimen)
     assert with_corners(timeless) is timeless
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_times_that_are_rounded_do_not_hide_corners_nor_move_them_far(seed: int) -> None:
+    """Of uneven readings whose times are told to a twentieth of a step: what is close to a reading is no corner."""
+    rng = np.random.default_rng(seed)
+    time = np.cumsum(rng.uniform(0.17, 0.23, 560))
+    time = time[time < 109]
+    m = moved(np.round(time, 2), np.interp(time, CLOCK, KNOTS))
+    found = with_corners(m)
+    between = np.setdiff1d(np.arange(found.path.deflection.size), found.on_path)
+    near = [np.min(np.abs(time - c)) > 0.03 for c in CLOCK[1:-1]]
+    assert between.size >= np.count_nonzero(near)
+    for k in between:
+        nearest = int(np.argmin(np.abs(CLOCK - found.path.time[k])))
+        assert found.path.time[k] == pytest.approx(CLOCK[nearest], abs=0.01)
+        assert found.path.deflection[k] == pytest.approx(KNOTS[nearest], abs=1e-5)
+
+
+def test_a_turn_midway_between_two_readings_is_one_where_another_turn_says_so() -> None:
+    """The disc is read in one place before and after it, as if it had stood still."""
+    top, steps = 30.5, np.arange(0.0, 200.0)
+    way = 1e-3 * np.abs((steps + 0.2 * (steps > 100) + top) % (2 * top) - top)
+    way[0] = 0.0
+    assert way[30] == pytest.approx(way[31], abs=1e-12)
+    times = np.where(steps > 100, steps + 0.2, steps)
+    found = with_corners(moved(times, way))
+    between = np.setdiff1d(np.arange(found.path.deflection.size), found.on_path)
+    assert found.path.time[between[0]] == pytest.approx(30.5, abs=1e-6)
+    assert found.path.deflection[between[0]] == pytest.approx(1e-3 * top, abs=1e-9)
+    alone = moved(times[:60], way[:60])
+    assert with_corners(alone) is alone
