@@ -106,7 +106,7 @@ def _coarseness(time: Array, inner: NDArray[np.intp]) -> Array:
     uneven = np.max(beside, axis=1) - np.min(beside, axis=1)
     for step in ROUNDED:
         if np.all(np.abs(rest / step - np.round(rest / step)) < ROUND_OFF):
-            return np.minimum(np.minimum(2 * step, uneven) / gap, COARSEST)
+            return np.asarray(np.minimum(np.minimum(2 * step, uneven) / gap, COARSEST))
     return np.zeros(gap.size)
 
 
