@@ -8,19 +8,22 @@ from typing import ClassVar
 import numpy as np
 
 from bayesmembrane.data.motion import Motion
+from bayesmembrane.ground.compiling import compiled, for_kernel
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Uniform
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 
 TOE = 10.0  # times the force: a steady width is no wider
 SMALLEST = 1e-4  # of the full range: below it a negative power is without bounds
+EARLY = 1e-6  # below it the power is an exponential to the last digits
 
 
 @dataclass(frozen=True)
 class Hysteresis(Carried):
     """F = F0 + level z [(1 - steady) |F0| |delta / D|^grows + steady min(max |F0|, 10 |F0|)], a pull no less than 0.
 
-    On each leg z = z_r + s a [1 - exp(-u / (t a))], with s = +1 loading, -1 unloading, u the way since the reversal,
-    z_r the z there and a = 1 - s z_r what is left to turn. It begins as steeply after any reversal; Dahl's, over one
+    On each leg z = z_r + s a [1 - (1 + c u / (t a))^(-1 / c)], with s = +1 loading, -1 unloading, u the way since the
+    reversal, z_r the z there, a = 1 - s z_r what is left to turn and c how ``late`` it has: exponentially if c = 0, by
+    Berg's hyperbola if c = 1. It begins as steeply after any reversal; Dahl's, over one
     length whatever is left, begins twice as steeply after a whole turn. Of the way a part
     ``by_force`` is counted in force, the rest in deflection, each over its full range (`way_of`): sliders within the
     film know the one or the other. The length is t = travel (1 - similar + similar A), with A the way of the leg before
@@ -28,7 +31,8 @@ class Hysteresis(Carried):
     max |F0| is the largest so far.
 
     Berg's friction is constant in N (steady = 1); that of a filled rubber grows with the force that it carries
-    (grows = 0), or, where the film lags behind the disc by a length, with the slope of the curve (about -1).
+    (grows = 0), or, where the film lags behind the disc by a length, with the slope of the curve (about -1). Friction
+    of one stress all over a film pulls by the sine of its angle alone (-2 in the toe of a ring's curve, -1 later on).
     """
 
     name: ClassVar[str] = "hysteresis"
@@ -63,13 +67,14 @@ class Hysteresis(Carried):
             "grows",
             "-",
             "power of the deflection by which the width grows beyond its proportion to the force",
-            Normal(-0.3, 0.4),
-            (-1.6, 1.0),
+            Normal(-0.5, 0.6),
+            (-2.5, 1.4),
         ),
         EffectParameter(
             "steady", "-", "part of the width that is as large at any force", Uniform(0.0, 1.0), (0.0, 1.0)
         ),
         EffectParameter("by_force", "-", "part of the way that is counted in force", Uniform(0.0, 1.0), (0.0, 1.0)),
+        EffectParameter("late", "-", "how late it has turned, 0: exponentially", Uniform(0.0, 1.5), (0.0, 1.5)),
     )
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
@@ -78,29 +83,42 @@ class Hysteresis(Carried):
         # In the toe a steady width is no wider than the force: a slack film carries nothing, and none pushes.
         steady = np.minimum(np.fmax.accumulate(size, axis=-1), TOE * size)
         width = (1.0 - p[:, 4:5]) * size * part ** p[:, 3:4] + p[:, 4:5] * steady
-        z = turned(p[:, 1:2], p[:, 2:3], way_of(p[:, 5:6], force, state), state.path)
+        z = turned(p[:, 1:2], p[:, 2:3], p[:, 6:7], way_of(p[:, 5:6], force, state), state.path)
         out = force + p[:, :1] * z * width
         return np.asarray(np.where(force > 0, np.maximum(out, 0.0), out))
 
 
-def turned(travel: Array, similar: Array, come: Array, path: Motion) -> Array:
-    """z (B, N), -1 to 1, of the `Hysteresis` along a path, with ``travel`` and ``similar`` (B, 1).
+def turned(travel: Array, similar: Array, late: Array, come: Array, path: Motion) -> Array:
+    """z (B, N), -1 to 1, of the `Hysteresis` along a path, with ``travel``, ``similar`` and ``late`` (B, 1).
 
     ``come`` (B, N) is where the path is, 0 where it started, in parts of all there is: deflection, force, or both.
     """
     out = np.empty(come.shape)
-    before, z, start = np.ones_like(travel), np.zeros_like(travel), np.zeros_like(travel)
-    ends = np.flatnonzero(np.diff(path.leg)) + 1
-    if path.leg[0] < 0:  # a test that begins with unloading
-        start = come[:, :1]
-    for part in np.split(np.arange(path.deflection.size), ends):
-        sign = 1 if path.leg[part[0]] > 0 else -1
-        # How far the leg has come: jitter within it is no way.
-        way = np.maximum.accumulate(np.maximum(sign * (come[:, part] - start), 0.0), axis=1)
-        length, rest = travel * (1 - similar + similar * before), 1.0 - sign * z
-        out[:, part] = z - sign * rest * np.expm1(-way / np.maximum(length * rest, 1e-12))
-        before, z, start = way[:, -1:], out[:, part[-1:]], come[:, part[-1:]]
+    each = [for_kernel(np.broadcast_to(v, (len(come), 1))[:, 0]) for v in (travel, similar, late)]
+    _turned(for_kernel(come), *each, np.where(path.leg > 0, 1.0, -1.0), out)
     return out
+
+
+@compiled(error_model="numpy")
+def _turned(come, travel, similar, late, sign, out):  # type: ignore[no-untyped-def]
+    """`turned` of come (B, N), with shapes (B,) and the ``sign`` (N,) of each leg."""
+    for b in range(out.shape[0]):
+        at, way, z = 0.0, 0.0, 0.0
+        if sign[0] < 0.0:  # a test that begins with unloading
+            at = come[b, 0]
+        length = rest = 0.0
+        for n in range(out.shape[1]):
+            if n == 0 or sign[n] != sign[n - 1]:
+                before = 1.0 if n == 0 else way
+                if n > 0:
+                    at, z = come[b, n - 1], out[b, n - 1]
+                way, rest = 0.0, 1.0 - sign[n] * z
+                length = max(travel[b] * (1.0 - similar[b] + similar[b] * before) * rest, 1e-12)
+            # How far the leg has come: jitter within it is no way.
+            way = max(way, sign[n] * (come[b, n] - at))
+            power = late[b] * way / length
+            left = np.exp(-way / length) if late[b] < EARLY else np.exp(-np.log1p(power) / late[b])
+            out[b, n] = z + sign[n] * rest * (1.0 - left)
 
 
 def way_of(by_force: Array, force: Array, state: FilmState) -> Array:
