@@ -52,12 +52,14 @@ def _constrained_search(objective: Objective, start: Array) -> Array:
         r, jacobian = objective(x)
         return np.asarray(np.nan_to_num(2 * r @ jacobian / scale, posinf=0.0, neginf=0.0))
 
+    count = _margins(objective, start[None, :]).shape[1]
+
     def margins(x: Array) -> Array:
-        return np.asarray(_margins(objective, x[None, :])[0])
+        return np.asarray(_as_many(_margins(objective, x[None, :]), count)[0])
 
     def margin_slopes(x: Array) -> Array:
         h = 1e-5 * objective.spread
-        both = _margins(objective, np.concatenate([x + np.diag(h), x - np.diag(h)]))
+        both = _as_many(_margins(objective, np.concatenate([x + np.diag(h), x - np.diag(h)])), count)
         return np.asarray((both[: x.size] - both[x.size :]).T / (2 * h))
 
     done = minimize(
@@ -77,6 +79,14 @@ def _margins(objective: Objective, x: Array) -> Array:
     h = objective.hypothesis
     values = h.convexity.margins_at(objective.forward(x), h.material)
     return np.where(np.isnan(values), 1.0, np.clip(values, -1e3, 1e3))
+
+
+def _as_many(margins: Array, count: int) -> Array:
+    """(B, count) of margins (B, M) along the way: films that are lifted farther are solved at more places."""
+    if margins.shape[1] == count:
+        return margins
+    place, here = np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, margins.shape[1])
+    return np.stack([np.interp(place, here, row) for row in margins])
 
 
 def _pulled_inside(objective: Objective, x: Array, anchor: Array) -> Array:
