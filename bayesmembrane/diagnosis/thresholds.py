@@ -333,6 +333,10 @@ class GrowthThresholds:
     """Hypotheses of which that is done, at most."""
     crossed_with: int = 3
     """Others whose materials are taken for each, at most."""
+    with_best_effects: int = 2
+    """Sets that every energy is searched with once more, from the effects that the best one has."""
+    to_the_end: int = 24
+    """Hypotheses that are searched for to the end before they are checked, at most."""
     share_reach: float = 40.0
     """ln of the odds against the most probable hypothesis, beyond which one has no share in the sum."""
     worth: float = 1e-3

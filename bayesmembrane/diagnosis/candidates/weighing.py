@@ -157,26 +157,26 @@ class Weighing(ABC):
         """
         return self.all_polished([found])[0]
 
-    def all_polished(self, every: Sequence[Candidate]) -> list[Candidate]:
-        """`polished` of each, side by side."""
+    def all_polished(self, every: Sequence[Candidate], steps: int = SEARCH.last_iterations) -> list[Candidate]:
+        """`polished` of each, side by side, by so many ``steps`` at most."""
         out, todo = list(every), list(range(len(every)))
         for _ in range(SEARCH.polishings):
             if not todo:
                 break
-            ends = self._searched_on([out[i] for i in todo])
+            ends = self._searched_on([out[i] for i in todo], steps)
             for i, (end, _) in zip(todo, ends, strict=True):
                 out[i] = end
             todo = [i for i, (_, again) in zip(todo, ends, strict=True) if again]
         return out
 
-    def _searched_on(self, every: Sequence[Candidate]) -> list[tuple[Candidate, bool]]:
+    def _searched_on(self, every: Sequence[Candidate], steps: int) -> list[tuple[Candidate, bool]]:
         """Of each the most probable of where it was and where searches end, and whether a law is off by another error
         than that search knew.
         """
         asked = [(i, False) for i in range(len(every))]
         asked += [(i, True) for i, c in enumerate(every) if max(c.law_errors.values(), default=0.0) > SEARCH.poor_law]
         searches = [
-            self._search(c.hypothesis, self._freeing(c, capped), c.x[None, :], SEARCH.last_iterations)
+            self._search(c.hypothesis, self._freeing(c, capped), c.x[None, :], steps)
             for c, capped in ((every[i], capped) for i, capped in asked)
         ]
         run(searches, self.batches)

@@ -18,7 +18,7 @@ from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pa
 from bayesmembrane.diagnosis.explanation.twins import swapped
 from bayesmembrane.diagnosis.explanation.unfitted import Key
 from bayesmembrane.diagnosis.explanation.visible import all_seen
-from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED, TWINS
+from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED, SEARCH, TWINS
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.hypothesis import Hypothesis
@@ -213,6 +213,7 @@ def weigh_by_draws(out: Grown) -> None:
     One that loses by it gives its share to others, which then are checked in their turn.
     """
     out.case.tell("checking what decides by importance sampling")
+    _to_the_end(out)
     null = (out.case.null.hypothesis.material.name, frozenset(out.case.null.names))
     seen = out.seen()
     for drawing in (SAMPLED.first, SAMPLED.last):
@@ -226,6 +227,16 @@ def weigh_by_draws(out: Grown) -> None:
                 break
             del rest[key]
             out.found[key] = checked(out.search, out.found[key], drawing)
+
+
+def _to_the_end(out: Grown) -> None:
+    """What has a share in the sum, and was not checked, searched on until nothing is gained: a linear model says how
+    probable a set is from beside its end, but draws are made about where the search was.
+    """
+    shares = _shares(out, out.seen())
+    order = sorted((k for k, s in shares.items() if s > np.log(SAMPLED.first.share)), key=lambda k: -shares[k])
+    near = [out.found[key] for key in order if not out.found[key].by_draws][: GROWTH.to_the_end]
+    out.found |= {key_of(c): c for c in out.search.all_polished(near, SEARCH.iterations)}
 
 
 def _grow(out: Grown) -> bool:
@@ -311,10 +322,22 @@ def _with_crossed(out: Grown) -> None:
         others = [out.found[k].x[:size] for k in order if k[0] == key[0] and k != key][: GROWTH.crossed_with]
         if size > 1 and others:
             sought.append(Sought(c.hypothesis, [np.concatenate([m, c.x[size:]]) for m in others], c))
+    sought += _with_effects_of_the_best(out, shares)
     found = [c for c in out.search.fits(sought) if c is not None]
     near = [c for c in found if c.log_evidence > out.found[key_of(c)].log_evidence - GROWTH.less_gain]
     for c in out.search.all_polished(near):
         out.add(c)
+
+
+def _with_effects_of_the_best(out: Grown, shares: Mapping[Key, float]) -> list[Sought]:
+    """The first few sets with every other energy once more, from where the best one has their effects by now."""
+    first: dict[frozenset[str], Candidate] = {}
+    for key in sorted(shares, key=lambda k: -shares[k]):
+        if key[1] != frozenset(out.case.null.names):
+            first.setdefault(key[1], out.found[key])
+    chosen = list(first.items())[: GROWTH.with_best_effects]
+    others = [(best, c) for names, best in chosen for (_, own), c in out.found.items() if own == names]
+    return [_transplanted(best, c) for best, c in others if c is not best]
 
 
 def _most(out: Grown) -> int:
