@@ -25,7 +25,10 @@ STOOD = 0.003
 MOST_READ = 10
 """Readings on each side that say how fast the disc was there: times and deflections are rounded."""
 ROUNDED, ROUND_OFF, COARSEST = (1.0, 0.1, 0.01), 1e-6, 0.15
-"""s, to which times may be rounded, the coarsest first; and the largest part of a speed that may be for that."""
+"""s, to which times may be rounded, the coarsest first; and the largest part of a speed that may be for that: where it
+is larger, intervals are as uneven as they are told."""
+BENT = 1.5
+"""Times what rounding of the clock makes of a speed over half of those: what changes by more is no line."""
 SAME = 0.1
 """Of a step of the deflection: so near to another turn the disc turned where its readings might be of a rest, too."""
 SMALLEST = 2e-4
@@ -79,11 +82,12 @@ def _corners(deflection: Array, time: Array, full_range: float) -> tuple[NDArray
     with np.errstate(all="ignore"):
         clock = time[rows] + gap[rows] * ((speed[inner] - after) / (before - after))[some]
     way = deflection[rows] + before[some] * (clock - time[rows])
-    for k in np.flatnonzero(coarse[some] > 0):
-        clock[k], way[k] = _crossing(deflection, time, int(rows[k]), float((coarse * larger)[some][k]))
+    rounded, least_off = coarse[some], (coarse * larger)[some]
+    for k in np.flatnonzero(rounded > 0):
+        clock[k], way[k] = _crossing(deflection, time, int(rows[k]), float(least_off[k]))
     stood, turns = stood[some], np.sign(before - after)[some]
     part = (clock - time[rows]) / gap[rows]
-    least = np.maximum(INSIDE, 0.5 * coarse[some])
+    least = np.maximum(INSIDE, 0.5 * rounded)
     found = (part > least) & (part < 1 - least)
     sure = found & ~stood
     for k in np.flatnonzero(found & stood):
@@ -106,7 +110,8 @@ def _coarseness(time: Array, inner: NDArray[np.intp]) -> Array:
     uneven = np.max(beside, axis=1) - np.min(beside, axis=1)
     for step in ROUNDED:
         if np.all(np.abs(rest / step - np.round(rest / step)) < ROUND_OFF):
-            return np.asarray(np.minimum(np.minimum(2 * step, uneven) / gap, COARSEST))
+            part = np.where(uneven > 0.5 * step, np.minimum(2 * step, uneven), 0.0) / gap
+            return np.where(part <= COARSEST, part, 0.0)
     return np.zeros(gap.size)
 
 
@@ -118,18 +123,31 @@ def _crossing(deflection: Array, time: Array, row: int, most: float) -> tuple[fl
     for first, side in ((row, -1), (row + 1, 1)):
         end = first + 2 * side
         speed = (deflection[first + side] - deflection[first]) / (time[first + side] - time[first])
-        while 0 <= end < time.size and abs(end - first) <= MOST_READ:
+        while 0 <= end < time.size and abs(end - first) < MOST_READ:
             now = (deflection[end] - deflection[end - side]) / (time[end] - time[end - side])
             if abs(now - speed) > most:
                 break
             end += side
         part = np.arange(first, end, side)
+        if _bent(time[part], deflection[part], most):
+            return np.nan, np.nan
         lines.append(np.polyfit(time[part] - time[row], deflection[part], 1))
     (v1, x1), (v2, x2) = lines
     if v1 == v2:
         return np.nan, np.nan
     since = float((x2 - x1) / (v1 - v2))
     return time[row] + since, float(x1 + v1 * since)
+
+
+def _bent(time: Array, deflection: Array, most: float) -> bool:
+    """True where the speed changes from one half of (n,) readings to the other by more than times rounded so that two
+    intervals differ by ``most`` m/s can make it, or where there are too few for that to be seen.
+    """
+    half = time.size // 2
+    if half < 2 or not np.any(deflection != deflection[0]):
+        return half < 2
+    near, far = (np.polyfit(time[s], deflection[s], 1)[0] for s in (slice(half + 1), slice(half, None)))
+    return bool(abs(near - far) > BENT * most / half)
 
 
 def _steady(speed: Array, inner: NDArray[np.intp], side: int, most: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -147,7 +147,9 @@ class SearchThresholds:
     """Of the sum of squares, in variances: searches whose steps gain less are near enough, for the linear model knows
     the rest."""
     last_falls: int = 4
-    """Steps whose falls say how far the rest of a search will lead."""
+    """Points of a search, each better than the one before, that say how far the rest of it will lead."""
+    idle: int = 8
+    """Steps in a row that won nothing: a search that damps itself may have won nothing by three, and go on."""
     behind: float = 120.0
     """In variances: a search that will not come as near the best one's sum of squares is not waited for."""
     times_behind: float = 1.3

@@ -13,7 +13,8 @@ from bayesmembrane.ground.parameters import Array
 MOST_ITERATIONS, QUICK, QUICK_LOST = 40, 15, 4
 """Turns of a search, at most; of one in which what a frame remembers moves; and of one of a film without a force."""
 CLOSED = 1e-11  # of the largest deflection: so far what both give way may be from the measured one
-SHORT, STEEP = 1e-9, 5.0  # a secant over a shorter step is round-off, a steeper one no slope
+SHORT, STEEP = 1e-9, 5.0  # a secant over a shorter step is round-off, one so many times as steep as any before no slope
+FALLING = -0.7  # of the slope of the film over that of the frame: one that falls off more steeply is not followed
 LONG, TURNS = 0.1, 4
 """A step longer than this part of the force is made along the curve of the frame, which takes so many turns to find."""
 PASSES = 12
@@ -86,13 +87,14 @@ def _closed(
     held = _rigid(film(rows, measured)[0]) if start is None else start
     # Forces of the frame that were too little, since the film has none where they leave it, and that were too much.
     low, high = np.full(measured.shape, -np.inf), np.full(measured.shape, np.inf)
-    before = np.full((2, *measured.shape), np.nan)
+    before, steepest = np.full((2, *measured.shape), np.nan), np.zeros(measured.shape)
     for turn in range(MOST_ITERATIONS if known is not None else QUICK):
         peaks = _peaks_before(held, held) if known is None else known[rows]
         yielded, soft = frame(rows, held, peaks)
         at = measured[rows] - yielded
         pull, slope = film(rows, at)
-        lost, slope = np.isnan(pull), _seen(at - before[0], pull - before[1], slope, SHORT * reach)
+        lost, steepest = np.isnan(pull), np.fmax(steepest, np.abs(slope))
+        slope = _seen(at - before[0], pull - before[1], slope, STEEP * steepest, soft, SHORT * reach)
         with np.errstate(all="ignore"):
             step = (pull - held) / (1 + soft * slope)
             near = np.abs(step) * soft <= CLOSED * reach
@@ -110,7 +112,7 @@ def _closed(
         new = np.where(lost | (new <= low), between, new)
         # Where the film has no force nothing may be remembered: such rows are left to those who know what is.
         some = ~here & ~(np.any(lost, axis=1) & (turn >= QUICK_LOST) & (known is None))
-        before = np.stack([at, pull])[:, some]
+        before, steepest = np.stack([at, pull])[:, some], steepest[some]
         rows, held, low, high = rows[some], new[some], low[some], high[some]
     return delta, force, found
 
@@ -124,14 +126,14 @@ def _reach(measured: Array) -> float:
     return max(float(np.max(np.abs(measured))), 1e-12)
 
 
-def _seen(way: Array, gain: Array, slope: Array, shortest: float) -> Array:
-    """The slope of the film's force, no less than 0: that of the last step, which sees what history adds to it, where
-    it was one; all (B, N).
+def _seen(way: Array, gain: Array, slope: Array, steepest: Array, soft: Array, shortest: float) -> Array:
+    """The slope of the film's force: that of the last step, which sees what history adds to it, where it was one, or
+    the one that is known; all (B, N). A film may fall off, by less than a frame as ``soft`` follows it.
     """
     with np.errstate(all="ignore"):
         secant = gain / way
-    use = (np.abs(way) > shortest) & (secant > 0) & (secant < STEEP * slope)
-    return np.maximum(np.where(use, secant, slope), 0.0)
+        use = (np.abs(way) > shortest) & (secant * soft > FALLING) & (secant < steepest)
+        return np.where(use, secant, np.where(slope * soft > FALLING, slope, 0.0))
 
 
 def _rigid(force: Array) -> Array:

@@ -92,21 +92,38 @@ def test_no_corner_is_made_up() -> None:
     assert with_corners(timeless) is timeless
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_times_that_are_rounded_do_not_hide_corners_nor_move_them_far(seed: int) -> None:
-    """Of uneven readings whose times are told to a twentieth of a step: what is close to a reading is no corner."""
-    rng = np.random.default_rng(seed)
-    time = np.cumsum(rng.uniform(0.17, 0.23, 560))
-    time = time[time < 109]
-    m = moved(np.round(time, 2), np.interp(time, CLOCK, KNOTS))
-    found = with_corners(m)
+@pytest.mark.parametrize(("step", "gap"), [(0.1, 1.03), (0.01, 0.16)])
+def test_times_that_are_rounded_do_not_hide_corners_nor_move_them_far(step: float, gap: float) -> None:
+    """Of uneven readings of cycles whose times are rounded: what is close to a reading is no corner."""
+    rng, leg = np.random.default_rng(4), 19.37 * gap
+    time = np.cumsum(gap * rng.uniform(0.99, 1.01, 640))
+    way = 0.02 * np.abs((time / leg + 1) % 2 - 1)
+    found = with_corners(moved(np.round(time / step) * step, way))
     between = np.setdiff1d(np.arange(found.path.deflection.size), found.on_path)
-    near = [np.min(np.abs(time - c)) > 0.03 for c in CLOCK[1:-1]]
-    assert between.size >= np.count_nonzero(near)
+    turns = leg * np.arange(1, 36)
+    near = [np.min(np.abs(time - c)) > 2 * step for c in turns]
+    assert between.size >= 0.8 * np.count_nonzero(near)
     for k in between:
-        nearest = int(np.argmin(np.abs(CLOCK - found.path.time[k])))
-        assert found.path.time[k] == pytest.approx(CLOCK[nearest], abs=0.01)
-        assert found.path.deflection[k] == pytest.approx(KNOTS[nearest], abs=1e-5)
+        nearest = int(np.argmin(np.abs(turns - found.path.time[k])))
+        assert found.path.time[k] == pytest.approx(turns[nearest], abs=step)
+        assert found.path.deflection[k] == pytest.approx(0.02 * (nearest % 2 == 0), abs=0.02 * step / leg)
+
+
+@pytest.mark.parametrize("told", [0.01, 0.1, 1.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sine_wave_has_no_corners_where_clocks_are_rounded_and_readings_are_missing(told: float, seed: int) -> None:
+    """But for a few, which lie on it."""
+    rng = np.random.default_rng(seed)
+    for gap, jitter, kept in ((5.3, 0.0, 1.0), (1.0, 0.0, 0.85), (1.037, 0.0, 1.0)):
+        time = gap * (1 + jitter * rng.uniform(-1, 1, 400)) * np.arange(400)
+        time = time[rng.random(400) < kept] + 1.0
+        way = 0.01 * (1 - np.cos(2 * np.pi * time / (40 * gap)))
+        clock = np.round(time / told) * told
+        found = with_corners(moved(clock, way))
+        between = np.setdiff1d(np.arange(found.path.deflection.size), found.on_path)
+        assert between.size <= 12
+        there = 0.01 * (1 - np.cos(2 * np.pi * found.path.time[between] / (40 * gap)))
+        assert found.path.deflection[between] == pytest.approx(there, abs=4e-4)
 
 
 def test_a_turn_midway_between_two_readings_is_one_where_another_turn_says_so() -> None:

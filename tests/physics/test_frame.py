@@ -87,13 +87,16 @@ def test_a_lost_station_leaves_the_curve_after_it() -> None:
     assert np.delete(beyond[1], 9, axis=1) == pytest.approx(plain[1], rel=1e-8)  # each to 1e-11 of its largest way
 
 
-def test_no_film_near_locking_is_lost_for_a_frame_that_seats() -> None:
-    """Two cycles, the second one higher: what is found on a frame where nothing stays is found where something does."""
+@pytest.mark.parametrize("seed", range(3))
+def test_hardly_a_film_near_locking_is_lost_for_a_frame_that_seats(seed: int) -> None:
+    """Two cycles, the second one higher: of what is found on a frame where nothing stays 99 % is found where something
+    does.
+    """
     way = 0.06 * np.interp(np.linspace(0, 4, 60), range(5), [0.02, 0.6, 0.1, 1.0, 0.02])
     m = Measurement(way, np.ones(way.size), Uniaxial(), Specimen("tape", 1e-3), time=np.arange(1.0, 61.0))
     h = hypothesis("gent", ["machine_compliance"]).on(m)
     f = Forward(h, m, m.deflection)
-    limits, rng = np.geomspace(0.3, 3.0, 300), np.random.default_rng(0)
+    limits, rng = np.geomspace(0.3, 3.0, 300), np.random.default_rng(seed)
     film = np.stack([h.material.to_coordinates(np.array([20.0, limit])) for limit in limits])
     frames = np.stack(
         [
@@ -109,8 +112,26 @@ def test_no_film_near_locking_is_lost_for_a_frame_that_seats() -> None:
     plain = seats.copy()
     plain[:, h.names.index("machine_compliance.log_odds_seated")] = -20.0
     kept, lost = (np.array(f(x).ok) for x in (plain, seats))
-    assert 30 < np.count_nonzero(kept) < 300
-    assert np.array_equal(kept, lost)
+    assert 270 < np.count_nonzero(kept) < 300
+    assert np.count_nonzero(kept != lost) <= 3
+
+
+def test_a_film_that_falls_off_is_found_in_few_turns() -> None:
+    """A force that is largest on the way, as of an energy that softens, on a frame that gives way by as much."""
+    way, turns = np.linspace(0.01, 1.6, 200)[None], []
+
+    def softening(rows: np.ndarray, delta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        turns.append(rows.size)
+        return delta * (2 - delta), 2 - 2 * delta
+
+    def spring(rows: np.ndarray, force: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return 0.3 * force, np.full(force.shape, 0.3)
+
+    delta, force, found = in_series(softening, spring, way)
+    assert found.all()
+    assert delta + 0.3 * force == pytest.approx(way, abs=1e-10)
+    assert force == pytest.approx(delta * (2 - delta), abs=1e-12)
+    assert len(turns) < 10
 
 
 def test_rows_do_not_mix_and_a_start_does_not_matter() -> None:

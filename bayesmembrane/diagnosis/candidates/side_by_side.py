@@ -47,7 +47,8 @@ class Searching:
         self.hypothesis, self.axes, self.freeing = hypothesis, axes, freeing
         patience = Patience(SEARCH.given_up, slow_by=SEARCH.slow_by, settled=SEARCH.settled)
         self._descent = Descent(starts, axes.bounds, most, patience=patience)
-        self._falls: list[float] = []
+        self._won: list[list[float]] = [[] for _ in starts]
+        self._idle = np.zeros(len(starts), dtype=int)
 
     @property
     def u(self) -> Array:
@@ -72,12 +73,19 @@ class Searching:
         return float(np.min(self._descent.square))
 
     def hopeless(self, least: float) -> bool:
-        """True if as many steps as are left, each as long as the last few, do not lead near one that has ``least``."""
-        steps = self._falls[-SEARCH.last_falls :]
-        if len(steps) <= SEARCH.last_falls - 1:
-            return False
-        slope = (steps[0] - steps[-1]) / (len(steps) - 1)
-        return steps[-1] - slope * self._descent.left > max(least + SEARCH.behind, SEARCH.times_behind * least)
+        """True if none of the searches that go on would come near one that has ``least`` by the steps that are left,
+        each as long as its last few that won something; or if it has won nothing for long.
+        """
+        near = max(least + SEARCH.behind, SEARCH.times_behind * least)
+        return all(self._foretold(row) > near for row in self._descent.rows.tolist())
+
+    def _foretold(self, row: int) -> float:
+        won = self._won[row][-SEARCH.last_falls :]
+        if self._idle[row] >= SEARCH.idle:
+            return won[-1]
+        if len(won) < SEARCH.last_falls:
+            return -np.inf
+        return won[-1] - (won[0] - won[-1]) / (len(won) - 1) * self._descent.left
 
     def give_up(self) -> None:
         """Stay where it is."""
@@ -92,7 +100,10 @@ class Searching:
         self._descent.told(
             np.concatenate([r, pull], axis=1), np.concatenate([j * self.axes.slope(u)[:, None, :], diagonal], axis=1)
         )
-        self._falls.append(self.least)
+        self._idle += 1
+        for row in np.flatnonzero([not w or v < w[-1] for w, v in zip(self._won, self._descent.square, strict=True)]):
+            self._won[row].append(float(self._descent.square[row]))
+            self._idle[row] = 0
 
 
 def run(searches: Sequence[Searching], batches: Batches) -> None:

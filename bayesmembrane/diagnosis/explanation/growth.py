@@ -30,6 +30,7 @@ class Grown:
 
     starts : by energy, draws of its prior brought to their best modulus
     followed : sets of effects that larger ones were grown from
+    ended : those that were searched for until nothing was gained
     limited : True where a load cell at its limit, beside an energy without effects, leaves nothing to be explained
     """
 
@@ -38,6 +39,7 @@ class Grown:
     found: dict[Key, Candidate] = field(default_factory=dict)
     starts: dict[str, list[Array]] = field(default_factory=dict)
     followed: set[frozenset[str]] = field(default_factory=set)
+    ended: set[Key] = field(default_factory=set)
     limited: bool = False
 
     def add(self, candidate: Candidate | None) -> None:
@@ -47,6 +49,7 @@ class Grown:
         key = key_of(candidate)
         if key not in self.found or candidate.log_evidence > self.found[key].log_evidence:
             self.found[key] = candidate
+            self.ended.discard(key)
 
     @property
     def best(self) -> Candidate:
@@ -226,17 +229,25 @@ def weigh_by_draws(out: Grown) -> None:
             if key not in rest or not (first or shares[key] > np.log(drawing.share)):
                 break
             del rest[key]
+            if key not in out.ended:
+                _ended(out, [key])
             out.found[key] = checked(out.search, out.found[key], drawing)
 
 
 def _to_the_end(out: Grown) -> None:
-    """What has a share in the sum, and was not checked, searched on until nothing is gained: a linear model says how
-    probable a set is from beside its end, but draws are made about where the search was.
+    """What has a share in the sum searched on until nothing is gained, if it was not: a linear model says how probable
+    a set is from beside its end, but draws are made about where the search was.
     """
     shares = _shares(out, out.seen())
     order = sorted((k for k, s in shares.items() if s > np.log(SAMPLED.first.share)), key=lambda k: -shares[k])
-    near = [out.found[key] for key in order if not out.found[key].by_draws][: GROWTH.to_the_end]
-    out.found |= {key_of(c): c for c in out.search.all_polished(near, SEARCH.iterations)}
+    _ended(out, [k for k in order if k not in out.ended][: GROWTH.to_the_end])
+
+
+def _ended(out: Grown, keys: Sequence[Key]) -> None:
+    """Hypotheses searched on until nothing is gained."""
+    for key, c in zip(keys, out.search.all_polished([out.found[k] for k in keys], SEARCH.iterations), strict=True):
+        out.found[key] = c
+    out.ended.update(keys)
 
 
 def _grow(out: Grown) -> bool:

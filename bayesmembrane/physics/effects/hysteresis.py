@@ -19,7 +19,8 @@ EARLY = 1e-6  # below it the power is an exponential to the last digits
 
 @dataclass(frozen=True)
 class Hysteresis(Carried):
-    """F = F0 + level z [(1 - steady) |F0| |delta / D|^grows + steady min(max |F0|, 10 |F0|)], a pull no less than 0.
+    """F = F0 + level z [(1 - steady) min(|F0| |delta / D|^grows, F_m) + steady min(max |F0|, 10 |F0|)], a pull no less
+    than 0.
 
     On each leg z = z_r + s a [1 - (1 + c u / (t a))^(-1 / c)], with s = +1 loading, -1 unloading, u the way since the
     reversal, z_r the z there, a = 1 - s z_r what is left to turn and c how ``late`` it has: exponentially if c = 0, by
@@ -27,8 +28,8 @@ class Hysteresis(Carried):
     length whatever is left, begins twice as steeply after a whole turn. Of the way a part
     ``by_force`` is counted in force, the rest in deflection, each over its full range (`way_of`): sliders within the
     film know the one or the other. The length is t = travel (1 - similar + similar A), with A the way of the leg before
-    the reversal (1 for the first loading): the same in all cycles, or small in small cycles. z = 0 at the start, and
-    max |F0| is the largest so far.
+    the reversal (1 for the first loading): the same in all cycles, or small in small cycles. z = 0 at the start,
+    max |F0| is the largest so far, and F_m that of the whole test.
 
     Berg's friction is constant in N (steady = 1); that of a filled rubber grows with the force that it carries
     (grows = 0), or, where the film lags behind the disc by a length, with the slope of the curve (about -1). Friction
@@ -82,7 +83,8 @@ class Hysteresis(Carried):
         size = np.abs(force)
         # In the toe a steady width is no wider than the force: a slack film carries nothing, and none pushes.
         steady = np.minimum(np.fmax.accumulate(size, axis=-1), TOE * size)
-        width = (1.0 - p[:, 4:5]) * size * part ** p[:, 3:4] + p[:, 4:5] * steady
+        growing = np.minimum(size * part ** p[:, 3:4], np.fmax.reduce(size, axis=-1, keepdims=True))
+        width = (1.0 - p[:, 4:5]) * growing + p[:, 4:5] * steady
         z = turned(p[:, 1:2], p[:, 2:3], p[:, 6:7], way_of(p[:, 5:6], force, state), state.path)
         out = force + p[:, :1] * z * width
         return np.asarray(np.where(force > 0, np.maximum(out, 0.0), out))
@@ -115,7 +117,9 @@ def _turned(come, travel, similar, late, sign, out):  # type: ignore[no-untyped-
                 way, rest = 0.0, 1.0 - sign[n] * z
                 length = max(travel[b] * (1.0 - similar[b] + similar[b] * before) * rest, 1e-12)
             # How far the leg has come: jitter within it is no way.
-            way = max(way, sign[n] * (come[b, n] - at))
+            u = sign[n] * (come[b, n] - at)
+            if not u <= way:  # what is nan stays so: nothing is known of the rest
+                way = u
             power = late[b] * way / length
             left = np.exp(-way / length) if late[b] < EARLY else np.exp(-np.log1p(power) / late[b])
             out[b, n] = z + sign[n] * rest * (1.0 - left)

@@ -2,6 +2,8 @@
 
 from collections import Counter
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -101,6 +103,51 @@ def test_a_search_that_stays_far_behind_is_not_waited_for_and_the_best_ends_wher
     assert sum(many[n] for n in others) < sum(told[n] for n in others)
     for a, b in zip(together, alone, strict=True):
         assert b is best or a.log_evidence < best.log_evidence - SEARCH.behind / 2
+
+
+class Line:
+    """A search that is told residuals of known ``sizes`` step by step, of each row its own, whatever it asks."""
+
+    def __init__(self, *sizes: list[float]) -> None:
+        self.sizes, self.step = sizes, 0
+        axes = SimpleNamespace(
+            bounds=(np.array([-1e9]), np.array([1e9])),
+            to_x=lambda u: u,
+            pull=lambda u: (0.0 * u, np.zeros_like(u)),
+            slope=np.ones_like,
+        )
+        start = np.zeros((len(sizes), 1))
+        self.search = Searching(PLAIN, cast(Any, axes), cast(Any, lambda v: v), start, 40)
+
+    def go(self, steps: int) -> None:
+        for _ in range(steps):
+            rows = self.search._descent.rows if self.step else range(len(self.sizes))
+            r = np.array([[self.sizes[row][min(self.step, len(self.sizes[row]) - 1)], 0.0] for row in rows])
+            self.step += 1
+            self.search.told(r, np.full((len(r), 2, 1), 30.0))
+
+
+def test_a_start_that_is_good_at_first_hides_none_that_falls() -> None:
+    stuck, falling = [100.0] + 30 * [101.0], [900.0 - 20 * k for k in range(40)]
+    one, both, alone = Line(stuck), Line(stuck, falling), Line(falling)
+    for line in (one, both, alone):
+        line.go(10)
+    assert one.search.hopeless(10.0)
+    assert not both.search.hopeless(10.0)
+    assert not alone.search.hopeless(10.0)
+
+
+def test_steps_that_win_nothing_for_a_while_are_no_end() -> None:
+    """The damping rises by them, until one wins."""
+    waiting = Line([1000.0, 1001.0, 1001.0, 1001.0, 900.0, 800.0])
+    waiting.go(4)
+    assert not waiting.search.hopeless(10.0)
+    waiting.go(2)
+    assert not waiting.search.hopeless(10.0)
+    for_long = Line([1000.0] + 20 * [1001.0])
+    for_long.go(SEARCH.idle + 1)
+    assert for_long.search.hopeless(10.0)
+    assert not for_long.search.hopeless(990.0**2)
 
 
 def test_where_a_search_ended_is_not_solved_again(measured: Measurement) -> None:

@@ -24,7 +24,7 @@ from bayesmembrane.diagnosis.explanation.growth import (
     with_falls,
     with_sets,
 )
-from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED
+from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED, SEARCH
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 
@@ -200,7 +200,16 @@ def test_a_tear_is_looked_for_where_the_force_is_seen_to_fall(
 
 
 def test_of_what_leads_more_draws_are_made_than_of_what_may_decide(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The null model, all that has a share, and, with more draws, what leads by then."""
+    """The null model, all that has a share, and, with more draws, what leads by then; each is first searched for to its
+    end, and once.
+    """
+    ended: list[tuple[str, ...]] = []
+
+    def all_polished(every: list[Candidate], steps: int) -> list[Candidate]:
+        assert steps == SEARCH.iterations
+        ended.extend(c.names for c in every)
+        return every
+
     shares = {(): 1e-6, ("friction",): 0.9, ("mullins",): 0.09, ("tearing",): 0.005, ("rate",): 1e-5}
     drawn: list[tuple[tuple[str, ...], Any]] = []
     monkeypatch.setattr(growth, "checked", lambda _, c, drawing: drawn.append((c.names, drawing)) or c)
@@ -209,10 +218,14 @@ def test_of_what_leads_more_draws_are_made_than_of_what_may_decide(monkeypatch: 
     )
     monkeypatch.setattr(Grown, "seen", lambda _: {})
     case = SimpleNamespace(null=candidate(claim(), 0.0), tell=lambda _: None)
-    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, None)))
+    search = SimpleNamespace(all_polished=all_polished)
+    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
     for names in shares:
         grown.add(candidate(claim(*names), 0.0))
     weigh_by_draws(grown)
+    weigh_by_draws(grown)
+    assert sorted(ended) == [(), ("friction",), ("mullins",), ("tearing",)]
+    del drawn[len(drawn) // 2 :]
     first, last = ([names for names, d in drawn if d is each] for each in (SAMPLED.first, SAMPLED.last))
     assert first == [(), ("friction",), ("mullins",), ("tearing",)]
     assert last == [("friction",), ("mullins",)]

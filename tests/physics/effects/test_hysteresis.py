@@ -115,6 +115,23 @@ def test_what_turns_next_to_never_late_turns_exponentially() -> None:
         assert loop(d, late=late) == pytest.approx(loop(d, late=0.0), abs=1e-4)
 
 
+def test_what_is_not_known_is_not_known_later_on_its_leg_nor_beyond() -> None:
+    d = triangles(0.03, 0.0, 0.04, 0.0, points=50)
+    elastic = (d / 0.04) ** 2
+    elastic[70:75] = np.nan
+    found = carried(d, elastic, 0.05, 0.05, 0.5, 0.0, 0.3, 0.5, late=0.5)
+    assert np.all(np.isfinite(found[:70]))
+    assert np.all(np.isnan(found[70:]))
+
+
+def test_friction_within_a_film_is_no_larger_than_the_film_pulls_at_most() -> None:
+    """However small it is on the way: a power of next to nothing is without bounds."""
+    d = triangles(0.04, 0.0, 0.04, points=200)
+    for elastic in (d / 0.04, (d / 0.04) ** 3):
+        found = carried(d, elastic, 0.1, 0.02, 0.0, -2.5, 0.0, 0.0)
+        assert np.max(np.abs(found - elastic)) <= 0.1 + 1e-12
+
+
 def test_a_film_at_rest_stays_where_it_is_and_jitter_is_no_way() -> None:
     rng = np.random.default_rng(3)
     rising = np.linspace(0.001, 0.04, 100)
