@@ -69,14 +69,12 @@ def _corners(deflection: Array, time: Array, full_range: float) -> tuple[NDArray
     inner = np.arange(1, speed.size - 1)
     larger = np.maximum(np.abs(speed[inner - 1]), np.abs(speed[inner + 1]))
     coarse = _coarseness(time, inner)
-    most = (STEADY + coarse) * larger
-    (before, steady_before), (after, steady_after) = (_steady(speed, inner, side, most) for side in (-1, 1))
-    as_fast = np.abs(np.abs(before) - np.abs(after)) <= most
+    before, after, steady = _speeds(speed, inner, (STEADY + coarse) * larger)
+    strictly = _speeds(speed, inner, STEADY * larger)[2]
     turned = np.abs(before - after)
     apart = (turned >= APART * larger) & (turned * gap[inner] >= SMALLEST * full_range)
     known = gap[inner] <= LONGER * np.maximum(gap[inner - 1], gap[inner + 1])
     stood = (before * after < 0) & (np.abs(speed[inner]) <= STOOD * larger)
-    steady = (steady_before & steady_after) | ((steady_before | steady_after) & as_fast)
     some = np.flatnonzero(steady & apart & known)
     rows = inner[some]
     with np.errstate(all="ignore"):
@@ -84,19 +82,27 @@ def _corners(deflection: Array, time: Array, full_range: float) -> tuple[NDArray
     way = deflection[rows] + before[some] * (clock - time[rows])
     rounded, least_off = coarse[some], (coarse * larger)[some]
     for k in np.flatnonzero(rounded > 0):
-        clock[k], way[k] = _crossing(deflection, time, int(rows[k]), float(least_off[k]))
-    stood, turns = stood[some], np.sign(before - after)[some]
-    part = (clock - time[rows]) / gap[rows]
-    least = np.maximum(INSIDE, 0.5 * rounded)
+        crossing = _crossing(deflection, time, int(rows[k]), float(least_off[k]))
+        if np.isfinite(crossing[0]) or not strictly[some[k]]:
+            clock[k], way[k] = crossing
+    part, least = (clock - time[rows]) / gap[rows], np.maximum(INSIDE, 0.5 * rounded)
     found = (part > least) & (part < 1 - least)
-    sure = found & ~stood
-    for k in np.flatnonzero(found & stood):
-        near = np.abs(way[sure & (turns == turns[k])] - way[k])
-        found[k] = np.any(near <= SAME * np.abs(before[some[k]] * gap[rows[k]]))
+    found = _met(found, stood[some], way, np.sign(before - after)[some], SAME * np.abs(before[some] * gap[rows]))
     # Two in a row are one, which is at the reading between them as far as the clock knows.
-    twice = np.abs(rows[:, None] - rows[found]) == 1
-    found &= ~np.any(twice, axis=1)
+    found &= ~np.any(np.abs(rows[:, None] - rows[found]) == 1, axis=1)
     return rows[found], way[found], clock[found]
+
+
+def _met(
+    found: NDArray[np.bool_], stood: NDArray[np.bool_], way: Array, turns: Array, near: Array
+) -> NDArray[np.bool_]:
+    """(n,) ``found``, but where the disc may have ``stood`` only those whose place ``way`` (n,) m is as ``near`` (n,) m
+    to that of another one which ``turns`` (n,) to the same side, and is found in any case.
+    """
+    sure, out = found & ~stood, found.copy()
+    for k in np.flatnonzero(found & stood):
+        out[k] = np.any(np.abs(way[sure & (turns == turns[k])] - way[k]) <= near[k])
+    return out
 
 
 def _coarseness(time: Array, inner: NDArray[np.intp]) -> Array:
@@ -148,6 +154,15 @@ def _bent(time: Array, deflection: Array, most: float) -> bool:
         return half < 2
     near, far = (np.polyfit(time[s], deflection[s], 1)[0] for s in (slice(half + 1), slice(half, None)))
     return bool(abs(near - far) > BENT * most / half)
+
+
+def _speeds(speed: Array, inner: NDArray[np.intp], most: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """((n,) m/s before, (n,) after, (n,)): True where the speeds of both sides of ``inner`` (n,) are known, which differ
+    by no more than ``most`` (n,) from one interval to the next.
+    """
+    (before, steady_before), (after, steady_after) = (_steady(speed, inner, side, most) for side in (-1, 1))
+    as_fast = np.abs(np.abs(before) - np.abs(after)) <= most
+    return before, after, (steady_before & steady_after) | ((steady_before | steady_after) & as_fast)
 
 
 def _steady(speed: Array, inner: NDArray[np.intp], side: int, most: Array) -> tuple[Array, NDArray[np.bool_]]:
