@@ -157,7 +157,7 @@ def _bent(time: Array, deflection: Array, most: float) -> bool:
 
 
 def _speeds(speed: Array, inner: NDArray[np.intp], most: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """((n,) m/s before, (n,) after, (n,)): True where the speeds of both sides of ``inner`` (n,) are known, which differ
+    """((n,) m/s before, (n,) after, (n,)): True where the speeds beside ``inner`` (n,) are known, which differ
     by no more than ``most`` (n,) from one interval to the next.
     """
     (before, steady_before), (after, steady_after) = (_steady(speed, inner, side, most) for side in (-1, 1))
