@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from bayesmembrane.data.measurement import Measurement
+from bayesmembrane.ground.compiling import compiled, for_kernel
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Lomax, Normal
 from bayesmembrane.physics.effects.base import Compliance, EffectParameter
 
 if TYPE_CHECKING:
     from scipy.interpolate import PchipInterpolator
 
-NEWTON = 1.0  # N: the force at which the compliance is what its name says, whatever the exponent
 SMALLEST = 1e-9  # N: below it a power less than one has no slope
 Rows = NDArray[np.intp]
 REPEATED = 0.01
@@ -149,27 +149,37 @@ class MachineCompliance(Compliance):
 
     def yielding(self, p: Array, force: Array, peaks: Array) -> tuple[Array, Array]:
         if self.curve is None:
-            now, soft = _with_play(p, force)
-            so_far = np.maximum(force, peaks)
-            seated = expit(p[:, 2:3])
-            lost = (1 - seated) * now + seated * _with_play(p, so_far)[0]
-            return lost, np.where(force >= so_far, soft, (1 - seated) * soft)
+            lost, soft = np.empty(force.shape), np.empty(force.shape)
+            p = np.broadcast_to(p, (len(force), p.shape[1]))
+            _yielding(for_kernel(p), for_kernel(expit(p[:, 2])), for_kernel(force), for_kernel(peaks), lost, soft)
+            return lost, soft
         compliance = np.full((len(force), 1), self.curve.compliance) if self.held else p[:, :1]
         lost, slope = self.curve.at(force)
         return compliance * lost, compliance * slope
 
 
-def _with_play(p: Array, force: Array) -> tuple[Array, Array]:
-    """u(F) and its derivative, of parameters p (B, 5)."""
-    lost, soft = _power(p, force)
-    play, left = np.exp(p[:, 3:4]) * _power(p, p[:, 4:5])[0], np.exp(-np.abs(force) / p[:, 4:5])
-    return lost + play * np.sign(force) * (1 - left), soft + play * left / p[:, 4:5]
-
-
-def _power(p: Array, force: Array) -> tuple[Array, Array]:
-    """u(F) and its derivative, of compliances and exponents p (B, 2 or more)."""
-    secant = p[:, :1] * (np.maximum(np.abs(force), SMALLEST) / NEWTON) ** (p[:, 1:2] - 1)
-    return secant * force, p[:, 1:2] * secant
+@compiled(error_model="numpy")
+def _yielding(p, seated, force, peaks, lost, soft):  # type: ignore[no-untyped-def]
+    """`MachineCompliance.yielding` of p (B, 5), with what is ``seated`` (B,); asked for a thousand times a frame."""
+    for b in range(force.shape[0]):
+        compliance, power, take_up = p[b, 0], p[b, 1] - 1.0, p[b, 4]
+        play = np.exp(p[b, 3]) * compliance * max(take_up, SMALLEST) ** power * take_up
+        for n in range(force.shape[1]):
+            f = force[b, n]
+            secant = compliance * max(abs(f), SMALLEST) ** power
+            left = np.exp(-abs(f) / take_up)
+            lost[b, n] = secant * f + play * np.sign(f) * (1.0 - left)
+            soft[b, n] = (power + 1.0) * secant + play * left / take_up
+            if not f >= peaks[b, n]:
+                most = peaks[b, n]
+                far = compliance * max(abs(most), SMALLEST) ** power * most
+                far += play * np.sign(most) * (1.0 - np.exp(-abs(most) / take_up))
+                lost[b, n] = (1.0 - seated[b]) * lost[b, n] + seated[b] * far
+                soft[b, n] *= 1.0 - seated[b]
+            if np.isnan(f):  # which numba's `max` swallows
+                lost[b, n] = soft[b, n] = np.nan
+            elif np.isnan(peaks[b, n]):
+                lost[b, n] = np.nan
 
 
 def _measured(curve: FrameCurve) -> EffectParameter:
