@@ -13,14 +13,15 @@ from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
 
 TOE = 10.0  # times the force: a steady width is no wider
+WIDEST = 3.0  # times what is foretold of the full range: a width that grows towards no force is no wider
 SMALLEST = 1e-4  # of the full range: below it a negative power is without bounds
 EARLY = 1e-6  # below it the power is an exponential to the last digits
 
 
 @dataclass(frozen=True)
 class Hysteresis(Carried):
-    """F = F0 + level z [(1 - steady) min(|F0| |delta / D|^grows, F_m) + steady min(max |F0|, 10 |F0|)], a pull no less
-    than 0.
+    """F = F0 + level z [(1 - steady) min(|F0| |delta / D|^grows, 3 F_D) + steady min(max |F0|, 10 |F0|)], a pull no
+    less than 0.
 
     On each leg z = z_r + s a [1 - (1 + c u / (t a))^(-1 / c)], with s = +1 loading, -1 unloading, u the way since the
     reversal, z_r the z there, a = 1 - s z_r what is left to turn and c how ``late`` it has: exponentially if c = 0, by
@@ -29,7 +30,7 @@ class Hysteresis(Carried):
     ``by_force`` is counted in force, the rest in deflection, each over its full range (`way_of`): sliders within the
     film know the one or the other. The length is t = travel (1 - similar + similar A), with A the way of the leg before
     the reversal (1 for the first loading): the same in all cycles, or small in small cycles. z = 0 at the start,
-    max |F0| is the largest so far, and F_m that of the whole test.
+    max |F0| is the largest so far, and F_D what the tangent there foretells of the full range (`foretold`).
 
     Berg's friction is constant in N (steady = 1); that of a filled rubber grows with the force that it carries
     (grows = 0), or, where the film lags behind the disc by a length, with the slope of the curve (about -1). Friction
@@ -83,7 +84,7 @@ class Hysteresis(Carried):
         size = np.abs(force)
         # In the toe a steady width is no wider than the force: a slack film carries nothing, and none pushes.
         steady = np.minimum(np.fmax.accumulate(size, axis=-1), TOE * size)
-        growing = np.minimum(size * part ** p[:, 3:4], np.fmax.reduce(size, axis=-1, keepdims=True))
+        growing = np.minimum(size * part ** p[:, 3:4], WIDEST * foretold(state))
         width = (1.0 - p[:, 4:5]) * growing + p[:, 4:5] * steady
         z = turned(p[:, 1:2], p[:, 2:3], p[:, 6:7], way_of(p[:, 5:6], force, state), state.path)
         out = force + p[:, :1] * z * width
@@ -128,14 +129,18 @@ def _turned(come, travel, similar, late, sign, out):  # type: ignore[no-untyped-
 def way_of(by_force: Array, force: Array, state: FilmState) -> Array:
     """(B, N) where the path is: a part ``by_force`` (B, 1) in force, the rest in deflection, over their full ranges.
 
-    What is not reached yet is not known: each step in force is over what the tangent at the largest deflection so far
-    foretells of the full range.
+    What is not reached yet is not known: each step in force is over what is `foretold` of the full range.
     """
-    path = state.path
-    foretold = np.abs(state.force) + np.abs(state.slope) * np.maximum(path.full_range - state.deflection, 0.0)
-    number = np.arange(path.deflection.size)
-    largest = path.deflection >= np.fmax.accumulate(path.deflection)
-    foretold = foretold[:, np.maximum.accumulate(np.where(largest, number, 0))]
-    over = 0.5 * (foretold + np.concatenate([foretold[:, :1], foretold[:, :-1]], axis=1))
+    path, full = state.path, foretold(state)
+    over = 0.5 * (full + np.concatenate([full[:, :1], full[:, :-1]], axis=1))
     steps = np.diff(force, axis=1, prepend=0.0) / np.where(over > 0, over, 1.0)
     return np.asarray((1 - by_force) * path.deflection / path.full_range + by_force * np.cumsum(steps, axis=1))
+
+
+def foretold(state: FilmState) -> Array:
+    """(B, N) N: the force at the full range, as the tangent at the largest deflection so far has it."""
+    path = state.path
+    ahead = np.abs(state.force) + np.abs(state.slope) * np.maximum(path.full_range - state.deflection, 0.0)
+    number = np.arange(path.deflection.size)
+    largest = path.deflection >= np.fmax.accumulate(path.deflection)
+    return np.asarray(ahead[:, np.maximum.accumulate(np.where(largest, number, 0))])

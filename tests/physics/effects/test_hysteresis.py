@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from bayesmembrane.physics.effects.base import FilmState
-from bayesmembrane.physics.effects.hysteresis import Hysteresis, turned, way_of
+from bayesmembrane.physics.effects.hysteresis import WIDEST, Hysteresis, turned, way_of
 from tests.generator_four.loss_laws import stopped
 from tests.physics.effects.protocols import force, measured, path, staircase, two_speeds
 
@@ -124,12 +124,11 @@ def test_what_is_not_known_is_not_known_later_on_its_leg_nor_beyond() -> None:
     assert np.all(np.isnan(found[70:]))
 
 
-def test_friction_within_a_film_is_no_larger_than_the_film_pulls_at_most() -> None:
-    """However small it is on the way: a power of next to nothing is without bounds."""
+def test_friction_within_a_film_is_no_larger_than_what_is_foretold_of_its_force() -> None:
+    """However small the force is: a power of next to nothing is without bounds."""
     d = triangles(0.04, 0.0, 0.04, points=200)
-    for elastic in (d / 0.04, (d / 0.04) ** 3):
-        found = carried(d, elastic, 0.1, 0.02, 0.0, -2.5, 0.0, 0.0)
-        assert np.max(np.abs(found - elastic)) <= 0.1 + 1e-12
+    found = carried(d, d / 0.04, 0.1, 0.02, 0.0, -2.5, 0.0, 0.0)
+    assert 0.1 < np.max(np.abs(found - d / 0.04)) <= 0.1 * WIDEST * (1 + 1e-9)
 
 
 def test_a_film_at_rest_stays_where_it_is_and_jitter_is_no_way() -> None:
