@@ -317,27 +317,41 @@ def in_mm(deflection: float) -> tuple[str, str]:
 def check_order(deflection: Array, places: list[str], filed: Filed = in_mm) -> None:
     """Raise `DataError` where deflections (N,) without times cannot be the order of a test; ``places`` name the rows.
 
-    File order is then time order: the film is loaded first, no deflection is measured twice in a row, and a reversal
-    lasts at least two steps. A single step back is a line in the wrong place.
+    File order is then time order: the film is loaded first, a reversal lasts at least two steps, and no deflection is
+    measured twice in a row but where the disc turns, which ends one leg and begins the next, or where it rests at zero.
+    A single step back is a line in the wrong place.
     """
     step = np.diff(deflection)
-    same = np.flatnonzero(step == 0)
+    same = _not_at_a_turn(deflection, step)
     if same.size:
         k = int(same[0]) + 1
         fault = "the {} {} stands there twice".format(*filed(deflection[k]))
         raise DataError(fault, places[k], "remove one line or add time_s")
     name = filed(0.0)[0]
     remedy = f"sort the lines by {name}, or add time_s if the film was really moved like this"
-    if step.size and step[0] < 0:
+    if np.any(step) and step[np.flatnonzero(step)[0]] < 0:
         raise DataError(f"the {name} falls from the first line on", places[1], remedy)
-    starts = np.flatnonzero(np.diff(np.sign(step))) + 1
-    lengths = np.diff(np.append(starts, step.size))
+    moved = np.flatnonzero(step)
+    starts = np.flatnonzero(np.diff(np.sign(step[moved]))) + 1
+    lengths = np.diff(np.append(starts, moved.size))
     short = np.flatnonzero(lengths < 2)
     if short.size:
-        k = int(starts[short[0]]) + 1
+        k = int(moved[starts[short[0]]]) + 1
         here, before = (filed(deflection[i])[1] for i in (k, k - 1))
         fault = f"the {name} is not in order ({here} after {before})"
         raise DataError(fault, places[k], remedy)
+
+
+def _not_at_a_turn(deflection: Array, step: Array) -> NDArray[np.intp]:
+    """Numbers of the steps (N - 1,) that are none, although the disc goes on the same way or stands away from zero."""
+    sign = np.sign(step)
+    place = np.where(sign != 0, np.arange(step.size), -1)
+    before = np.maximum.accumulate(place) if step.size else place
+    after = step.size - 1 - np.maximum.accumulate(np.where(sign[::-1] != 0, np.arange(step.size), -1))[::-1]
+    none = np.flatnonzero(sign == 0)
+    known = (before[none] >= 0) & (after[none] < step.size)
+    turned = known & (sign[before[none]] * sign[np.minimum(after[none], step.size - 1)] < 0)
+    return np.asarray(none[~turned & (known | (deflection[none] != 0))])
 
 
 def jitter(deflection: Array) -> float:

@@ -5,7 +5,10 @@ import pytest
 
 from bayesmembrane.calibration.layout import laid_out, measurement_of
 from bayesmembrane.data.measurement import Measurement, Specimen
-from bayesmembrane.data.motion import NOMINAL_SPEED, Motion, holds
+from bayesmembrane.data.motion import NOMINAL_SPEED, Motion, check_order, holds
+from bayesmembrane.ground.errors import DataError
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.rigs.annulus import Annulus
 
 D = np.concatenate([np.linspace(1e-3, 0.02, 20), np.linspace(0.019, 1e-3, 19), np.linspace(2e-3, 0.04, 39)])
@@ -123,3 +126,44 @@ def test_the_first_leg_ends_at_the_first_turn_or_with_the_test() -> None:
     clock = np.arange(there_and_back.size, dtype=float)
     assert Motion(there_and_back, clock, 0.02).first_turn == pytest.approx(40.0)
     assert Motion(UP, clock[:41], 0.02).first_turn == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize(
+    ("mm", "told"),
+    [
+        ([0, 1, 2, 3, 3, 2, 1, 0, 0, 1, 2, 3], ""),
+        ([0, 0, 0, 1, 2, 3, 3, 3, 2, 1, 0, 0], ""),
+        ([0, 1, 2, 2, 3], "line 5: the deflection 2 mm stands there twice"),
+        ([1, 1, 2, 3], "line 3: the deflection 1 mm stands there twice"),
+        ([0, 1, 2, 2], "line 5: the deflection 2 mm stands there twice"),
+        ([0, 1, 2, 1, 1, 0], "line 6: the deflection 1 mm stands there twice"),
+        ([0, 3, 3, 2, 4], "line 5: the deflection is not in order (2 mm after 3 mm)"),
+        ([3, 3, 2, 1], "line 3: the deflection 3 mm stands there twice"),
+    ],
+)
+def test_without_times_a_deflection_stands_twice_at_a_turn_and_at_zero_alone(mm: list[float], told: str) -> None:
+    deflection = 1e-3 * np.array(mm, dtype=float)
+    places = [f"line {k + 2}" for k in range(deflection.size)]
+    if not told:
+        check_order(deflection, places)
+        return
+    with pytest.raises(DataError) as fault:
+        check_order(deflection, places)
+    assert told in str(fault.value)
+
+
+@pytest.mark.parametrize("name", ["mullins", "hysteresis", "viscoelastic", "friction", "permanent_set", "force_drift"])
+def test_a_turn_that_stands_twice_is_one_turn(name: str) -> None:
+    """Two cycles with their ends in both legs, and once: what a film remembers is the same."""
+    up = np.linspace(0.0, 0.03, 31)
+    once = np.concatenate([up, up[-2::-1], up[1:], up[-2::-1]])
+    twice = np.concatenate([up, up[::-1], up, up[::-1]])
+    rows = np.flatnonzero(np.append(True, np.diff(twice) != 0))
+    claim = hypothesis("neo_hookean", [name])
+    x = np.array([[float(p.prior.quantile(0.6)) for p in claim.parameters]])
+    forces = []
+    for way in (once, twice):
+        m = Measurement(way, 1.0 + way, Annulus(0.010, 0.035), Specimen("film", 50e-6))
+        forces.append(Forward(claim, m, m.deflection)(x, reached=False).force[0])
+    assert np.all(np.isfinite(forces[0]))
+    assert forces[1][rows] == pytest.approx(forces[0], rel=1e-9, abs=1e-12)

@@ -460,7 +460,7 @@ def test_a_zero_that_is_off_is_no_wrong_sign(files: Files) -> None:
 @pytest.mark.parametrize(
     ("kind", "curve", "said"),
     [
-        ("shear", "shear,shear_stress_MPa\n0,0\n1,0.4\n1,0.4\n0,0\n", "line 4: the shear 1 stands there twice"),
+        ("shear", "shear,shear_stress_MPa\n0,0\n1,0.4\n1,0.4\n2,0.7\n", "line 4: the shear 1 stands there twice"),
         ("uniaxial", PULLED + "1.4,0.5\n", "line 5: the stretch 1.4 stands there twice"),
         (
             "uniaxial",
