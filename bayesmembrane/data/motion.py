@@ -345,13 +345,13 @@ def check_order(deflection: Array, places: list[str], filed: Filed = in_mm) -> N
 def _not_at_a_turn(deflection: Array, step: Array) -> NDArray[np.intp]:
     """Numbers of the steps (N - 1,) that are none, although the disc goes on the same way or stands away from zero."""
     sign = np.sign(step)
-    place = np.where(sign != 0, np.arange(step.size), -1)
-    before = np.maximum.accumulate(place) if step.size else place
-    after = step.size - 1 - np.maximum.accumulate(np.where(sign[::-1] != 0, np.arange(step.size), -1))[::-1]
-    none = np.flatnonzero(sign == 0)
-    known = (before[none] >= 0) & (after[none] < step.size)
-    turned = known & (sign[before[none]] * sign[np.minimum(after[none], step.size - 1)] < 0)
-    return np.asarray(none[~turned & (known | (deflection[none] != 0))])
+    turned = _last_way(sign) * _last_way(sign[::-1])[::-1]  # from the way before to the way after; 0 where one is none
+    return np.flatnonzero((sign == 0) & (turned >= 0) & ((turned > 0) | (deflection[:-1] != 0)))
+
+
+def _last_way(sign: Array) -> Array:
+    """(N,) the last of the signs (N,) so far that is not 0; 0 where none is."""
+    return np.asarray(sign[np.maximum.accumulate(np.where(sign != 0, np.arange(sign.size), 0))])
 
 
 def jitter(deflection: Array) -> float:
