@@ -80,9 +80,9 @@ def _corners(deflection: Array, time: Array, full_range: float) -> tuple[NDArray
     with np.errstate(all="ignore"):
         clock = time[rows] + gap[rows] * ((speed[inner] - after) / (before - after))[some]
     way = deflection[rows] + before[some] * (clock - time[rows])
-    rounded, most_off = coarse[some], (coarse * larger)[some]
+    rounded, by_rounding = coarse[some], (coarse * larger)[some]
     for k in np.flatnonzero(rounded > 0):
-        crossing = _crossing(deflection, time, int(rows[k]), float(most_off[k]))
+        crossing = _crossing(deflection, time, int(rows[k]), float(by_rounding[k]))
         if np.isfinite(crossing[0]) or not strictly[some[k]]:
             clock[k], way[k] = crossing
     part, least = (clock - time[rows]) / gap[rows], np.maximum(INSIDE, 0.5 * rounded)

@@ -73,13 +73,14 @@ class Searching:
         return float(np.min(self._descent.square))
 
     def hopeless(self, least: float) -> bool:
-        """True if none of the searches that go on would come near one that has ``least`` by the steps that are left,
-        each as long as its last few that won something; or if it has won nothing for long.
-        """
+        """True if no start that goes on would come near a search that has ``least`` by the steps that are left."""
         near = max(least + SEARCH.behind, SEARCH.times_behind * least)
         return all(self._foretold(row) > near for row in self._descent.rows.tolist())
 
     def _foretold(self, row: int) -> float:
+        """Where a start would end, by steps as long as its last few that won something, or where it has won nothing for
+        long; -inf where nobody knows yet. One that is good at first says nothing of the others.
+        """
         won = self._won[row][-SEARCH.last_falls :]
         if self._idle[row] >= SEARCH.idle:
             return won[-1]

@@ -30,7 +30,7 @@ class Grown:
 
     starts : by energy, draws of its prior brought to their best modulus
     followed : sets of effects that larger ones were grown from
-    ended : those that were searched for until nothing was gained
+    ended : hypotheses that were searched on until nothing was gained, and not found anew since
     limited : True where a load cell at its limit, beside an energy without effects, leaves nothing to be explained
     """
 
@@ -244,7 +244,7 @@ def _to_the_end(out: Grown) -> None:
 
 
 def _ended(out: Grown, keys: Sequence[Key]) -> None:
-    """Hypotheses searched on until nothing is gained."""
+    """These hypotheses searched on until nothing is gained, and noted as such."""
     for key, c in zip(keys, out.search.all_polished([out.found[k] for k in keys], SEARCH.iterations), strict=True):
         out.found[key] = c
     out.ended.update(keys)
@@ -319,7 +319,8 @@ def _with_parts(out: Grown) -> None:
 
 
 def _with_crossed(out: Grown) -> None:
-    """What has a share in the sum once more, from the materials of others of its energy that have one.
+    """What has a share in the sum once more, from the materials of others of its energy that have one; and the first
+    few sets with every energy, from the effects of the best one.
 
     The valley of an energy with many parameters is bent and has several ends: to which of them a search comes hangs on
     round-off, and what was found beside other effects may lead to a better one.
