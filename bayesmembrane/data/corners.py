@@ -17,9 +17,9 @@ APART = 0.2
 """Of the same: by so much the speeds of both sides differ, at least, at a corner."""
 INSIDE = 0.03
 """Of an interval: closer to a reading no corner is told from one at it."""
-LONGER = 1.5
+LONGER, MISSED = 1.5, 3.0
 """Times as long as the longer one beside it: in a longer interval nobody knows what the disc did, as where an export
-leaves out a pause."""
+leaves out a pause; but up to the second number a turn in it has missed a reading or two, as elsewhere in the file."""
 STOOD = 0.003
 """Of the speed before: by no more was the disc moved in an interval with a turn in which it may have stood still."""
 MOST_READ = 10
@@ -45,15 +45,15 @@ def with_corners(measurement: Measurement) -> Measurement:
     been on the way back already. What remembers signs of the motion, largest stretches or times at rest needs to know
     it. Speeds are those that two intervals agree about; one interval is enough on one side where it is as fast as the
     other side. A turn that slows down, as of a sine wave, has no corner, and nobody says where it is in an interval
-    that is longer than those beside it, or at whose ends the disc is in one place: it may have stood still there,
-    unless another turn to the same side is where it would have turned. Of times that are rounded v1 and v2 are slopes
-    of lines through up to `MOST_READ` readings.
+    that is longer than those beside it and than others in which the disc went on, or at whose ends it is in one place:
+    it may have stood still there, unless another turn to the same side is where it would have turned. Of times that are
+    rounded v1 and v2 are slopes of lines through up to `MOST_READ` readings.
     Without times, for stretches across, and where legs are said, the path is as it was.
     """
     path = measurement.path
     if path.time is None or path.across is not None or path.said:
         return measurement
-    rows, at, clock = _corners(path.deflection, path.time, measurement.full_range)
+    rows, at, clock = _corners(path.deflection, path.time, measurement.full_range, bool(path.rests.any()))
     if not rows.size:
         return measurement
     way = without_round_off(np.insert(path.deflection, rows + 1, at))
@@ -62,8 +62,10 @@ def with_corners(measurement: Measurement) -> Measurement:
     return replace(measurement, motion=motion, places=places)
 
 
-def _corners(deflection: Array, time: Array, full_range: float) -> tuple[NDArray[np.intp], Array, Array]:
-    """(n,) numbers of the readings before corners, (n,) m, and (n,) s on the clock of the (N,) readings."""
+def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> tuple[NDArray[np.intp], Array, Array]:
+    """(n,) numbers of the readings before corners, (n,) m, and (n,) s on the clock of the (N,) readings; where the disc
+    ``rests`` anywhere, it may have done so in any interval that is longer than those beside it.
+    """
     gap = np.diff(time)
     speed = np.diff(deflection) / gap
     inner = np.arange(1, speed.size - 1)
@@ -73,9 +75,14 @@ def _corners(deflection: Array, time: Array, full_range: float) -> tuple[NDArray
     strictly = _speeds(speed, inner, STEADY * larger)[2]
     turned = np.abs(before - after)
     apart = (turned >= APART * larger) & (turned * gap[inner] >= SMALLEST * full_range)
-    known = gap[inner] <= LONGER * np.maximum(gap[inner - 1], gap[inner + 1])
-    stood = (before * after < 0) & (np.abs(speed[inner]) <= STOOD * larger)
-    some = np.flatnonzero(steady & apart & known)
+    beside = np.maximum(gap[inner - 1], gap[inner + 1])
+    turns, longer = before * after < 0, gap[inner] > LONGER * beside
+    went_on = (turned < APART * larger) & (np.abs(speed[inner] - before) < APART * larger)
+    missed = 0.0 if rests else np.max(gap[inner[went_on]], initial=0.0)
+    unsure = turns & (
+        (np.abs(speed[inner]) <= STOOD * larger) | longer & (gap[inner] > np.minimum(missed, MISSED * beside))
+    )
+    some = np.flatnonzero(steady & apart & (turns | ~longer))
     rows = inner[some]
     with np.errstate(all="ignore"):
         clock = time[rows] + gap[rows] * ((speed[inner] - after) / (before - after))[some]
@@ -87,20 +94,20 @@ def _corners(deflection: Array, time: Array, full_range: float) -> tuple[NDArray
             clock[k], way[k] = crossing
     part, least = (clock - time[rows]) / gap[rows], np.maximum(INSIDE, 0.5 * rounded)
     found = (part > least) & (part < 1 - least)
-    found = _met(found, stood[some], way, np.sign(before - after)[some], SAME * np.abs(before[some] * gap[rows]))
+    found = _met(found, unsure[some], way, np.sign(before - after)[some], SAME * np.abs(before * beside)[some])
     # Two in a row are one, which is at the reading between them as far as the clock knows.
     found &= ~np.any(np.abs(rows[:, None] - rows[found]) == 1, axis=1)
     return rows[found], way[found], clock[found]
 
 
 def _met(
-    found: NDArray[np.bool_], stood: NDArray[np.bool_], way: Array, turns: Array, near: Array
+    found: NDArray[np.bool_], unsure: NDArray[np.bool_], way: Array, turns: Array, near: Array
 ) -> NDArray[np.bool_]:
-    """(n,) ``found``, but where the disc may have ``stood`` only those whose place ``way`` (n,) m is as ``near`` (n,) m
-    to that of another one which ``turns`` (n,) to the same side, and is found in any case.
+    """(n,) ``found``, but where the disc may have stood still (``unsure``) only those whose place ``way`` (n,) m is as
+    ``near`` (n,) m to that of another one which ``turns`` (n,) to the same side, and is found in any case.
     """
-    sure, out = found & ~stood, found.copy()
-    for k in np.flatnonzero(found & stood):
+    sure, out = found & ~unsure, found.copy()
+    for k in np.flatnonzero(found & unsure):
         out[k] = np.any(np.abs(way[sure & (turns == turns[k])] - way[k]) <= near[k])
     return out
 

@@ -126,6 +126,22 @@ def test_a_sine_wave_has_no_corners_where_clocks_are_rounded_and_readings_are_mi
         assert found.path.deflection[between] == pytest.approx(there, abs=4e-4)
 
 
+def test_a_turn_whose_reading_is_missing_is_one_where_readings_are_missing_elsewhere() -> None:
+    """Else the disc may have stood there while nobody read it, unless another turn is where it would have turned."""
+    top, steps = 30.3, np.arange(0.0, 121.0)
+    way = 1e-3 * np.abs((steps + top) % (2 * top) - top)
+    at_turn, mid_leg, other_turn = 30, 12, 91
+    kept = np.setdiff1d(np.arange(121), [at_turn, mid_leg, other_turn])
+    found = with_corners(moved(steps[kept], way[kept]))
+    between = np.setdiff1d(np.arange(found.path.deflection.size), found.on_path)
+    assert found.path.time[between] == pytest.approx(top * np.arange(1, 4), abs=1e-6)
+    assert found.path.deflection[between] == pytest.approx(1e-3 * top * np.array([1, 0, 1]), abs=1e-9)
+    for missing, count in (([at_turn], 3), ([at_turn, other_turn], 1)):
+        kept = np.setdiff1d(np.arange(121), missing)
+        found = with_corners(moved(steps[kept], way[kept]))
+        assert found.path.deflection.size - len(found) == count
+
+
 def test_a_turn_midway_between_two_readings_is_one_where_another_turn_says_so() -> None:
     """The disc is read in one place before and after it, as if it had stood still."""
     top, steps = 30.5, np.arange(0.0, 200.0)
