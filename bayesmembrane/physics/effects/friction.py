@@ -35,6 +35,7 @@ class Friction(Sensor):
         "A force up on loading and down on unloading: jumps at each reversal, also at small deflections and at any "
         "speed, the same at large forces or larger, and somewhat larger or less where the disc moves slower."
     )
+    twins_one_way: ClassVar[tuple[str, ...]] = ("force_offset",)  # both add a force, which only one turns with the disc
     rank: ClassVar[int] = -1  # the guide has the film's force, before the load cell adds to it
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("level", "N", "sliding friction without a force", HalfNormal(0.03), (0.0, 2.0), 0.0),

@@ -149,6 +149,8 @@ def test_what_only_the_way_back_tells_apart_are_twins_where_there_is_none(way: n
     found = set(twins_one_way(effects, curve(way, None)))
     assert found == (set() if way is LEG else {frozenset(("tearing", "clamp_slip"))})
     assert not twins_one_way(effects[:1], curve(way, None))  # the other one cannot be at work
+    guide = [components("effects")[n]() for n in ("friction", "force_offset")]
+    assert bool(twins_one_way(guide, curve(way, None))) is (way is not LEG)
 
 
 def test_twins_by_nature_are_twins_in_joint_answers_where_both_are_at_work() -> None:
