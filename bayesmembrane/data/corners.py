@@ -24,7 +24,7 @@ STOOD = 0.003
 """Of the speed before: by no more was the disc moved in an interval with a turn in which it may have stood still."""
 MOST_READ = 10
 """Readings on each side that say how fast the disc was there: times and deflections are rounded."""
-ROUNDED, ROUND_OFF, COARSEST = (1.0, 0.1, 0.01), 1e-6, 0.15
+ROUNDED, ROUND_OFF, COARSEST = (1.0, 0.1, 0.01), 1e-6, 0.2
 """s, to which times may be rounded, the coarsest first; and the largest part of a speed that may be for that: where it
 is larger, intervals are as uneven as they are told."""
 BENT = 1.5
@@ -87,12 +87,14 @@ def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> 
     with np.errstate(all="ignore"):
         clock = time[rows] + gap[rows] * ((speed[inner] - after) / (before - after))[some]
     way = deflection[rows] + before[some] * (clock - time[rows])
-    rounded, by_rounding = coarse[some], (coarse * larger)[some]
-    for k in np.flatnonzero(rounded > 0):
+    least, by_rounding = np.maximum(INSIDE, 0.5 * coarse[some]), (coarse * larger)[some]
+    for k in np.flatnonzero(by_rounding > 0):
         crossing = _crossing(deflection, time, int(rows[k]), float(by_rounding[k]))
-        if np.isfinite(crossing[0]) or not strictly[some[k]]:
-            clock[k], way[k] = crossing
-    part, least = (clock - time[rows]) / gap[rows], np.maximum(INSIDE, 0.5 * rounded)
+        if np.isfinite(crossing[0]):
+            (clock[k], way[k]), least[k] = crossing, INSIDE
+        elif not strictly[some[k]]:
+            clock[k] = np.nan
+    part = (clock - time[rows]) / gap[rows]
     found = (part > least) & (part < 1 - least)
     found = _met(found, unsure[some], way, np.sign(before - after)[some], SAME * np.abs(before * beside)[some])
     # Two in a row are one, which is at the reading between them as far as the clock knows.
@@ -123,7 +125,9 @@ def _coarseness(time: Array, inner: NDArray[np.intp]) -> Array:
     uneven = np.max(beside, axis=1) - np.min(beside, axis=1)
     for step in ROUNDED:
         if np.all(np.abs(rest / step - np.round(rest / step)) < ROUND_OFF):
-            part = np.where(uneven > 0.5 * step, np.minimum(2 * step, uneven), 0.0) / gap
+            part = np.where(uneven > 0.5 * step, np.minimum(2 * step, uneven), 0.0) / np.minimum(
+                gap, np.min(beside, axis=1)
+            )
             return np.where(part <= COARSEST, part, 0.0)
     return np.zeros(gap.size)
 

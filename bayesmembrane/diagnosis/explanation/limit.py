@@ -17,9 +17,9 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import weighed
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.saturation import Saturated, saturated
+from bayesmembrane.diagnosis.explanation.saturation import Saturated, fitted_below, saturated
 from bayesmembrane.diagnosis.left.shape import plateau_of
-from bayesmembrane.diagnosis.thresholds import FOREIGN
+from bayesmembrane.diagnosis.thresholds import FOREIGN, SATURATION
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.form_error import unsteady
 
@@ -81,12 +81,18 @@ def _limit_of(search: Search, base: Candidate, before: Limit | None) -> Limit | 
 
 
 def log_evidence_alone(search: Search, base: Candidate) -> float:
-    """ln Z of a limit beside ``base`` that leaves noise alone; -inf if there is none, or more is left."""
+    """ln Z of a limit beside ``base`` that leaves noise alone; -inf if there is none, or more is left.
+
+    What a film leaves of readings far below the largest one no limit takes away.
+    """
+    noise = len(search.measurement) + FOREIGN.settled_sd * float(np.sqrt(2 * len(search.measurement)))
+    below = fitted_below(search, base, min(SATURATION.lower))
+    if below is not None and below.squares > noise:
+        return -np.inf
     found = limit_of(search, base)
     if found is None:
         return -np.inf
     white = search.noise.white(base.residual - found.trace)
-    noise = white.size + FOREIGN.settled_sd * float(np.sqrt(2 * white.size))
     return base.log_evidence + found.gain if float(white @ white) < noise else -np.inf
 
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,17 +114,35 @@ def _again(search: Search, before: Saturated) -> Iterator[tuple[Candidate, Satur
 
 def _starts(search: Search, base: Candidate) -> Iterator[tuple[Candidate, Saturation]]:
     """Films that are fitted to the lower readings, each with a limit at the highest ones."""
-    force = search.measurement.force
-    limit = float(np.mean(np.sort(force)[-SATURATION.highest :]))
+    limit = float(np.mean(np.sort(search.measurement.force)[-SATURATION.highest :]))
     for share in SATURATION.lower:
-        lower = force <= share * float(np.max(force))
-        if np.count_nonzero(lower) < base.x.size + SATURATION.spare:
-            continue
-        part = search.measurement.select(lower)
-        fitted = Search(part, search.noise.part(part, lower), search.seed, search.solve).fit(base.hypothesis, [base.x])
-        film = None if fitted is None else search.unweighed(base.hypothesis, fitted.x)
+        fitted = fitted_below(search, base, share)
+        film = None if fitted is None else search.unweighed(base.hypothesis, fitted.film.x)
         if film is not None and limit > 0:
             yield film, Saturation(limit, SATURATION.sharpness)
+
+
+class Below(NamedTuple):
+    """A film that is fitted to the lower readings.
+
+    film : of these readings
+    squares : it leaves of them, in those of the noise
+    """
+
+    film: Candidate
+    squares: float
+
+
+def fitted_below(search: Search, base: Candidate, share: float) -> Below | None:
+    """The film of ``base`` fitted to the readings up to that ``share`` of the largest one; None if they are too few."""
+    m = search.measurement
+    lower = m.force <= share * float(np.max(m.force))
+    if np.count_nonzero(lower) < base.x.size + SATURATION.spare:
+        return None
+    part = m.select(lower)
+    noise = search.noise.part(part, lower)
+    film = Search(part, noise, search.seed, search.solve).fit(base.hypothesis, [base.x])
+    return None if film is None else Below(film, float(np.sum(noise.white(film.residual) ** 2)))
 
 
 @dataclass(frozen=True, eq=False)
