@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +14,16 @@ from bayesmembrane.ground.parameters import Array
 MOST_ITERATIONS, QUICK, QUICK_LOST = 40, 15, 4
 """Turns of a search, at most; of one in which what a frame remembers moves; and of one of a film without a force."""
 CLOSED = 1e-11  # of the largest deflection: so far what both give way may be from the measured one
-SHORT, STEEP = 1e-9, 5.0  # a secant over a shorter step is round-off, one so many times as steep as any before no slope
+SHORT, STEEP = (
+    1e-10,
+    5.0,
+)  # a secant over a shorter step is round-off, one so many times as steep as any before no slope
 FALLING = -0.7  # of the slope of the film over that of the frame: one that falls off more steeply is not followed
-LONG, TURNS = 0.1, 4
+LONG, TURNS = 0.1, 8
 """A step longer than this part of the force is made along the curve of the frame, which takes so many turns to find."""
 PASSES = 12
 """At most, of a frame that remembers: a film without memory of time needs two."""
+LEAST = 1e-3  # of a force at which the film is slack: the one that is tried beside none at all
 MORE, PATIENT = 2.0, 12
 """So many times the force of the frame is tried where the film has none, and so often before a row is left so."""
 
@@ -87,14 +92,17 @@ def _closed(
     held = _rigid(film(rows, measured)[0]) if start is None else start
     # Forces of the frame that were too little, since the film has none where they leave it, and that were too much.
     low, high = np.full(measured.shape, -np.inf), np.full(measured.shape, np.inf)
-    before, steepest = np.full((2, *measured.shape), np.nan), np.zeros(measured.shape)
+    # And those beside which the film pulls more, and at which it is slack.
+    little, much = np.array(low), np.array(high)
+    before, steepest = _Step(*np.full((3, *measured.shape), np.nan)), np.zeros(measured.shape)
     for turn in range(MOST_ITERATIONS if known is not None else QUICK):
         peaks = _peaks_before(held, held) if known is None else known[rows]
         yielded, soft = frame(rows, held, peaks)
         at = measured[rows] - yielded
         pull, slope = film(rows, at)
         lost, steepest = np.isnan(pull), np.fmax(steepest, np.abs(slope))
-        slope = _seen(at - before[0], pull - before[1], slope, STEEP * steepest, soft, SHORT * reach)
+        slack = (pull <= 0) & (held > 0)
+        slope = np.where(slack, 0.0, _seen(_Step(at, pull, slope), before, STEEP * steepest, soft, SHORT * reach))
         with np.errstate(all="ignore"):
             step = (pull - held) / (1 + soft * slope)
             near = np.abs(step) * soft <= CLOSED * reach
@@ -110,10 +118,14 @@ def _closed(
         with np.errstate(invalid="ignore"):
             between = np.where(np.isinf(high), MORE * np.abs(held), 0.5 * (low + high))
         new = np.where(lost | (new <= low), between, new)
+        little, much = np.where(pull > held, np.fmax(held, little), little), np.where(slack, np.fmin(held, much), much)
+        beyond = (slack | (new >= much)) & (little >= 0)
+        new[beyond] = np.sqrt(np.fmax(little, LEAST * much)[beyond] * much[beyond])
         # Where the film has no force nothing may be remembered: such rows are left to those who know what is.
         some = ~here & ~(np.any(lost, axis=1) & (turn >= QUICK_LOST) & (known is None))
-        before, steepest = np.stack([at, pull])[:, some], steepest[some]
-        rows, held, low, high = rows[some], new[some], low[some], high[some]
+        # No chord from where the film is slack says how steep it is.
+        before, steepest = _Step(np.where(slack, np.nan, at)[some], pull[some], slope[some]), steepest[some]
+        rows, held, low, high, little, much = (v[some] for v in (rows, new, low, high, little, much))
     return delta, force, found
 
 
@@ -126,14 +138,24 @@ def _reach(measured: Array) -> float:
     return max(float(np.max(np.abs(measured))), 1e-12)
 
 
-def _seen(way: Array, gain: Array, slope: Array, steepest: Array, soft: Array, shortest: float) -> Array:
+class _Step(NamedTuple):
+    """Where a search is, or was: deflection m and force N of the film, and the slope N/m that it goes on with."""
+
+    at: Array
+    pull: Array
+    slope: Array
+
+
+def _seen(here: _Step, before: _Step, steepest: Array, soft: Array, shortest: float) -> Array:
     """The slope of the film's force: that of the last step, which sees what history adds to it, where it was one, or
-    the one that is known; all (B, N). A film may fall off, by less than a frame as ``soft`` follows it.
+    what that step went on with where it was a short one, or the one that is known; all (B, N). A film may fall off, by
+    less than a frame as ``soft`` follows it.
     """
     with np.errstate(all="ignore"):
-        secant = gain / way
-        use = (np.abs(way) > shortest) & (secant * soft > FALLING) & (secant < steepest)
-        return np.where(use, secant, np.where(slope * soft > FALLING, slope, 0.0))
+        way = here.at - before.at
+        secant = np.where(np.abs(way) > shortest, (here.pull - before.pull) / way, before.slope)
+        use = np.isfinite(way) & (secant * soft > FALLING) & (secant < steepest)
+        return np.where(use, secant, np.where(here.slope * soft > FALLING, here.slope, 0.0))
 
 
 def _rigid(force: Array) -> Array:

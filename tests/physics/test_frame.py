@@ -112,7 +112,7 @@ def test_hardly_a_film_near_locking_is_lost_for_a_frame_that_seats(seed: int) ->
     plain = seats.copy()
     plain[:, h.names.index("machine_compliance.log_odds_seated")] = -20.0
     kept, lost = (np.array(f(x).ok) for x in (plain, seats))
-    assert 270 < np.count_nonzero(kept) < 300
+    assert np.count_nonzero(kept) > 270
     assert np.count_nonzero(kept != lost) <= 3
 
 

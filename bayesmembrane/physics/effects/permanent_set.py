@@ -24,7 +24,9 @@ class PermanentSet(Deflection):
     G is the growth law of the test (1 after a first loading to its full range), which the set follows with a delay, in
     holds and on the way back, too. ``rejoin`` 1 comes back to the first loading curve at m, 0 keeps the whole shift.
     What is lost may be a length (``relieved`` 0), or stay in the film as a force, which moves a flat, soft film further
-    than a taut one (1 to 2, as the slope of its curve rises).
+    than a taut one (1 to 2, as the slope of its curve rises), or a stretch: a strip all of which is longer by a part e
+    than it was is shifted by e (L + delta), so that ``rejoin`` is -m / L, and a film that was stretched most where it
+    pulls most is shifted nearly in proportion to how far it is lifted (``relieved`` -1).
     """
 
     name: ClassVar[str] = "permanent_set"
@@ -50,9 +52,9 @@ class PermanentSet(Deflection):
         EffectParameter(
             "rejoin",
             "-",
-            "part of the set that is gone when the previous maximum is reached again",
-            Uniform(0.0, 1.0),
-            (0.0, 1.0),
+            "part of the set that is gone when the previous maximum is reached again; below 0: that has come there",
+            Uniform(-1.5, 1.0),
+            (-1.5, 1.0),
         ),
         REPEATED,
         SATURATION,
@@ -67,9 +69,9 @@ class PermanentSet(Deflection):
         EffectParameter(
             "relieved",
             "-",
-            "power by which the shift is larger the less the film is lifted",
-            HalfNormal(1.0),
-            (0.0, 4.0),
+            "power by which the shift is larger the less the film is lifted; below 0: the more",
+            Normal(0.3, 0.8),
+            (-2.2, 4.0),
         ),
     )
 
