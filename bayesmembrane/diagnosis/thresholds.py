@@ -483,9 +483,10 @@ class VerdictThresholds:
     """From which an answer is given; sets of an ambiguous one hold as much together."""
     least_member: float = 0.01
     """Of a set that stands beside one which has next to all by the laws of the library, and is not told to be sure."""
-    nearly_certain: float = 0.9
+    nearly_certain: float = 0.88
     """Of an effect, whatever else is at work, from which it is in all that is probable, as far as can be said beside
-    what is told of sets next to those of the sum (`Beliefs.elsewhere`)."""
+    what is told of sets next to those of the sum (`Beliefs.elsewhere`, `elsewhere_beside_structure`): an effect that
+    has all by the laws and leaves more than noise has 0.9, less what is told of sets two steps away."""
     doubted: float = 0.8
     """Of no effect, and of nothing foreign, where no test sees a misfit: if both are more probable, the answer is that
     nothing is missing; if one is less by traces to first order, all are weighed. It was 0.85 while none had four in ten

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -18,6 +18,7 @@ from bayesmembrane.diagnosis.explanation.neighbours import NEGLIGIBLE, spread
 from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
 from bayesmembrane.diagnosis.explanation.unfitted import Key, unfitted
+from bayesmembrane.diagnosis.left.remaining import more_than_noise
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
 
@@ -187,8 +188,10 @@ def summed(grown: Grown) -> Total:
             joint[name, NOTHING] -= moved
             joint[name, ANOTHER_LAW] += moved
             p[i] -= moved
-    flat = _flattened(joint)
-    both = _with_unlisted(_with_neighbours(flat, [e.name for e in case.visible if e.name not in given]))
+    vague = _vague(grown, every, told, joint)
+    flat = _flattened(joint, vague)
+    near = _with_neighbours(flat, [e.name for e in case.visible if e.name not in given], vague)
+    both = _with_unlisted(near)
     judged = []
     for (c, kind, _), q in zip(terms, p[: len(terms)].tolist(), strict=True):
         if kind == NOTHING:
@@ -220,8 +223,29 @@ def _described(grown: Grown, c: Candidate, given: Sequence[str]) -> bool:
     return set_name(c, given) == NOTHING and (grown.case.sees_nothing or grown.case.tested(c).adequate)
 
 
-def _flattened(joint: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], float]:
+def _vague(
+    grown: Grown, every: Sequence[Candidate], told: Sequence[Foreign], joint: Mapping[tuple[str, str], float]
+) -> frozenset[str]:
+    """Kinds of what is foreign beside which the most probable set of effects leaves more than noise: whatever is behind
+    the curve, laws of the library do not follow it.
+    """
+    given, search, out = grown.case.null.names, grown.search, set[str]()
+    for kind in {kind for _, kind in joint}:
+        first = max((name for name, k in joint if k == kind), key=lambda name: joint[name, kind])
+        if kind == NOTHING:
+            fits = [(c, search.squares(c)) for c in every if set_name(c, given) == first]
+        else:
+            same = (f for f in told if f.key == kind and set_name(f.base, given) == first)
+            fits = [(f.base, search.squares(f.base, f.trace)) for f in same]
+        dof = {id(c): max(c.residual.size - c.x.size, 1) for c, _ in fits}
+        if first != NOTHING and fits and all(more_than_noise(s / dof[id(c)], dof[id(c)]) for c, s in fits):
+            out.add(kind)
+    return frozenset(out)
+
+
+def _flattened(joint: Mapping[tuple[str, str], float], vague: Collection[str]) -> dict[tuple[str, str], float]:
     """`Beliefs.flattened` over the sets of effects beside each kind of what is foreign; together one, and falling.
+    Beside kinds that are ``vague`` none stands out.
 
     No effect keeps what it has, for it is of laws that too much is said: of a hundred sets that are next to nothing
     each, flattened with it, all together would come to more than it.
@@ -233,20 +257,24 @@ def _flattened(joint: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], 
         else:
             kinds[kind][name] = q
     for kind, sets in kinds.items():
-        out |= {(name, kind): q for name, q in BELIEFS.flattened(sets, kind != ANOTHER_LAW).items()}
+        by_known_laws = kind != ANOTHER_LAW and kind not in vague
+        out |= {(name, kind): q for name, q in BELIEFS.flattened(sets, by_known_laws).items()}
     whole = sum(joint.values())
     return _falling({key: q / whole for key, q in out.items()})
 
 
-def _with_neighbours(joint: Mapping[tuple[str, str], float], visible: Sequence[str]) -> dict[tuple[str, str], float]:
+def _with_neighbours(
+    joint: Mapping[tuple[str, str], float], visible: Sequence[str], vague: Collection[str]
+) -> dict[tuple[str, str], float]:
     """With a part of what sets have beside each kind of what is foreign told of those next to them, as far as none
-    stands out by known laws.
+    stands out by known laws; a larger one beside kinds that are ``vague``.
     """
     kinds, out = defaultdict[str, dict[frozenset[str], float]](dict), dict[tuple[str, str], float]()
     for (name, kind), q in joint.items():
         kinds[kind][frozenset() if name == NOTHING else frozenset(name.split("+"))] = q
     for kind, sets in kinds.items():
         doubted = BELIEFS.elsewhere * (1 - BELIEFS.standing_out(sets.values()))
+        doubted = BELIEFS.elsewhere_beside_structure if kind in vague else doubted
         share = BELIEFS.elsewhere_by_another_law if kind == ANOTHER_LAW else doubted
         near = spread(sets, visible, BELIEFS.most, share, BELIEFS.farther)
         out |= {(_joined(names), kind): q for names, q in near.items()}

@@ -49,9 +49,8 @@ class Remaining:
     @property
     def strange(self) -> bool:
         """True if it is more than noise, and more than a small error of the forms that carries it."""
-        by_chance = VERDICT.chance * float(np.sqrt(2.0 / self.dof))
         forms = self.carried >= VERDICT.form_carries and all(e <= VERDICT.law_small for e in self.law_errors.values())
-        return self.reduced_chi2 >= max(VERDICT.noise_chi2, 1.0 + by_chance) and not forms
+        return more_than_noise(self.reduced_chi2, self.dof) and not forms
 
     @property
     def trifling(self) -> bool:
@@ -61,6 +60,11 @@ class Remaining:
     def firm(self, names: Iterable[str]) -> list[str]:
         """Those of these effects that explain clearly more by themselves than what is left."""
         return [name for name in names if self.own.get(name, 0.0) > VERDICT.firm * self.excess]
+
+
+def more_than_noise(reduced_chi2: float, dof: int) -> bool:
+    """True if neither chance nor an error of the noise accounts for what is left."""
+    return reduced_chi2 >= max(VERDICT.noise_chi2, 1.0 + VERDICT.chance * float(np.sqrt(2.0 / dof)))
 
 
 def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining:

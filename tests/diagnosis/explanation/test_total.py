@@ -52,13 +52,15 @@ def summed_up(
     adequate: bool = False,
     elsewhere: float = 0.0,
     unlisted: float = 0.0,
+    left: float = 0.0,
 ) -> total.Total:
     """The sum where friction explains the curve, and Mullins beside it has a ``gain`` in ln Z.
 
     That changes by ``seen`` where what could not be seen counts as absent. Of four effects that can be seen some may be
     ``untried``, where traces of those that were not fitted have a ``promised`` ln of the Bayes factor. Beside the first
     set there is a ``step``, if there is one. ``flatter`` : the power of `Beliefs.flattened`;
-    ``elsewhere`` : told of sets that are next to those of the sum; ``unlisted`` : of a fault of no known kind.
+    ``elsewhere`` : told of sets that are next to those of the sum; ``unlisted`` : of a fault of no known kind;
+    ``left`` : squares that each model leaves.
     """
     monkeypatch.setattr(total, "BELIEFS", told(flatter, elsewhere, unlisted))
     takes = {
@@ -87,6 +89,7 @@ def summed_up(
         excess=lambda c: squares[frozenset(c.names)],
         expected_sizes=lambda e: np.array([e.size.scale]),
         log_tempered=lambda c, counts: counts * c.log_evidence,
+        squares=lambda c, trace=None: left,
     )
     plain = candidate(log_evidence=-60.0)
     case = SimpleNamespace(
@@ -114,8 +117,12 @@ def told(flatter: float = 1.0, elsewhere: float = 0.0, unlisted: float = 0.0) ->
     """With another power of `Beliefs.flattened`, and so much told of sets next to those of the sum, and of what is not
     listed.
     """
-    by_law = 2 * elsewhere
-    return replace(BELIEFS, flatter=flatter, elsewhere=elsewhere, elsewhere_by_another_law=by_law, unlisted=unlisted)
+    shares = {
+        "elsewhere": elsewhere,
+        "elsewhere_by_another_law": 2 * elsewhere,
+        "elsewhere_beside_structure": elsewhere,
+    }
+    return replace(BELIEFS, flatter=flatter, unlisted=unlisted, **shares)
 
 
 def by_likelihood_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -131,6 +138,7 @@ def grown_of(case: Any) -> Grown:
         excess=lambda c: LEFT,
         expected_sizes=lambda e: np.array([e.size.scale]),
         log_tempered=lambda c, counts: counts * c.log_evidence,
+        squares=lambda c, trace=None: 0.0,
     )
     return Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
 
@@ -159,11 +167,26 @@ def test_sets_are_told_flattened_and_what_is_foreign_is_not(monkeypatch: pytest.
 def test_no_effect_keeps_what_it_has_where_sets_are_flattened() -> None:
     """A hundred sets that are next to nothing each would else come to more than it."""
     sets = {"friction": 0.2, **{f"set {i}": 0.003 for i in range(100)}}
-    flat = total._flattened({(NOTHING, NOTHING): 0.5, **{(name, NOTHING): p for name, p in sets.items()}})
+    flat = total._flattened({(NOTHING, NOTHING): 0.5, **{(name, NOTHING): p for name, p in sets.items()}}, ())
     assert flat[NOTHING, NOTHING] == pytest.approx(0.5)
     assert {name: p for (name, _), p in flat.items() if name != NOTHING} == pytest.approx(BELIEFS.flattened(sets))
     assert flat["friction", NOTHING] < 0.1
     assert list(flat.values()) == sorted(flat.values(), reverse=True)
+
+
+def test_no_set_stands_out_that_leaves_more_than_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Next to all by known laws, and no law of the library follows the curve."""
+    said = {
+        left: summed_up(monkeypatch, seen=0.0, gain=30.0, flatter=0.5, elsewhere=0.4, unlisted=0.1, left=left)
+        for left in (1.0, 20.0)
+    }
+    noise, more = (total.probabilities for total in said.values())
+    assert noise.effects["friction+mullins"] > 0.99
+    assert noise.foreign.get(UNLISTED, 0.0) < 1e-6
+    assert more.effects["friction+mullins"] == pytest.approx(0.66, abs=0.01)  # one step back of two is home
+    assert more.foreign[UNLISTED] == pytest.approx(0.1, abs=0.01)
+    assert more.effects["friction"] > 1e-2
+    assert sum(more.effects.values()) == pytest.approx(1.0)
 
 
 def test_probabilities_add_up_to_one(monkeypatch: pytest.MonkeyPatch) -> None:
