@@ -17,9 +17,10 @@ APART = 0.2
 """Of the same: by so much the speeds of both sides differ, at least, at a corner."""
 INSIDE = 0.03
 """Of an interval: closer to a reading no corner is told from one at it."""
-LONGER, MISSED = 1.5, 3.0
+LONGER, MISSED, AS_LONG = 1.5, 3.0, 1.1
 """Times as long as the longer one beside it: in a longer interval nobody knows what the disc did, as where an export
-leaves out a pause; but up to the second number a turn in it has missed a reading or two, as elsewhere in the file."""
+leaves out a pause; but up to the second number a turn in it has missed a reading or two, where two intervals in which
+the disc went on are as long, each beside its own, or nearly (the third number)."""
 STOOD = 0.003
 """Of the speed before: by no more was the disc moved in an interval with a turn in which it may have stood still."""
 MOST_READ = 10
@@ -45,8 +46,8 @@ def with_corners(measurement: Measurement) -> Measurement:
     been on the way back already. What remembers signs of the motion, largest stretches or times at rest needs to know
     it. Speeds are those that two intervals agree about; one interval is enough on one side where it is as fast as the
     other side. A turn that slows down, as of a sine wave, has no corner, and nobody says where it is in an interval
-    that is longer than those beside it and than others in which the disc went on, or at whose ends it is in one place:
-    it may have stood still there, unless another turn to the same side is where it would have turned. Of times that are
+    in which the disc may have stood still (`_in_doubt`), unless another turn to the same side is where it would have
+    turned; nor in a long one, where it would have gone on a little farther than at such a turn. Of times that are
     rounded v1 and v2 are slopes of lines through up to `MOST_READ` readings.
     Without times, for stretches across, and where legs are said, the path is as it was.
     """
@@ -73,16 +74,11 @@ def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> 
     coarse = _coarseness(time, inner)
     before, after, steady = _speeds(speed, inner, (STEADY + coarse) * larger)
     strictly = _speeds(speed, inner, STEADY * larger)[2]
-    turned = np.abs(before - after)
+    turned, beside = np.abs(before - after), np.maximum(gap[inner - 1], gap[inner + 1])
+    length = gap[inner] / beside
     apart = (turned >= APART * larger) & (turned * gap[inner] >= SMALLEST * full_range)
-    beside = np.maximum(gap[inner - 1], gap[inner + 1])
-    turns, longer = before * after < 0, gap[inner] > LONGER * beside
-    went_on = (turned < APART * larger) & (np.abs(speed[inner] - before) < APART * larger)
-    missed = 0.0 if rests else np.max(gap[inner[went_on]], initial=0.0)
-    unsure = turns & (
-        (np.abs(speed[inner]) <= STOOD * larger) | longer & (gap[inner] > np.minimum(missed, MISSED * beside))
-    )
-    some = np.flatnonzero(steady & apart & (turns | ~longer))
+    some = np.flatnonzero(steady & apart & ((before * after < 0) | (length <= LONGER)))
+    doubt = _in_doubt(speed[inner], before, after, length, rests)[some]
     rows = inner[some]
     with np.errstate(all="ignore"):
         clock = time[rows] + gap[rows] * ((speed[inner] - after) / (before - after))[some]
@@ -93,24 +89,59 @@ def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> 
         if np.isfinite(crossing[0]):
             (clock[k], way[k]), least[k] = crossing, INSIDE
         elif not strictly[some[k]]:
-            clock[k] = np.nan
+            clock[k], way[k] = np.nan, np.nan
     part = (clock - time[rows]) / gap[rows]
     found = (part > least) & (part < 1 - least)
-    found = _met(found, unsure[some], way, np.sign(before - after)[some], SAME * np.abs(before * beside)[some])
+    turns = np.sign(before - after)[some]
+    found = _met(found, doubt, way, turns, SAME * np.abs(before * beside)[some])
+    farther = np.where(length[some] > LONGER, 0.5 * np.abs(before[some] * gap[rows]), 0.0)
+    found &= ~_refuted(found, rows, way, turns, farther, deflection)
     # Two in a row are one, which is at the reading between them as far as the clock knows.
     found &= ~np.any(np.abs(rows[:, None] - rows[found]) == 1, axis=1)
     return rows[found], way[found], clock[found]
 
 
+def _in_doubt(speed: Array, before: Array, after: Array, length: Array, rests: bool) -> NDArray[np.bool_]:
+    """(n,) True where the disc turned in an interval in which it may have stood still: its ends are in one place, or it
+    is longer than those beside it by the factor ``length`` (n,), which two others in which the disc went on are not, or
+    the disc ``rests`` elsewhere. ``speed`` (n,) m/s there, ``before`` and ``after`` it.
+    """
+    larger = np.maximum(np.abs(before), np.abs(after))
+    went_on = (np.abs(before - after) < APART * larger) & (np.abs(speed - before) < APART * larger)
+    others = np.sort(length[went_on])[-2:]
+    missed = min(AS_LONG * float(others[0]), MISSED) if others.size == 2 and not rests else 0.0
+    longer = (length > LONGER) & (length > missed)
+    return np.asarray((before * after < 0) & ((np.abs(speed) <= STOOD * larger) | longer))
+
+
 def _met(
-    found: NDArray[np.bool_], unsure: NDArray[np.bool_], way: Array, turns: Array, near: Array
+    found: NDArray[np.bool_], doubt: NDArray[np.bool_], way: Array, turns: Array, near: Array
 ) -> NDArray[np.bool_]:
-    """(n,) ``found``, but where the disc may have stood still (``unsure``) only those whose place ``way`` (n,) m is as
+    """(n,) ``found``, but where the disc may have stood still (``doubt``) only those whose place ``way`` (n,) m is as
     ``near`` (n,) m to that of another one which ``turns`` (n,) to the same side, and is found in any case.
     """
-    sure, out = found & ~unsure, found.copy()
-    for k in np.flatnonzero(found & unsure):
+    sure, out = found & ~doubt, found.copy()
+    for k in np.flatnonzero(found & doubt):
         out[k] = np.any(np.abs(way[sure & (turns == turns[k])] - way[k]) <= near[k])
+    return out
+
+
+def _refuted(
+    found: NDArray[np.bool_], rows: NDArray[np.intp], way: Array, turns: Array, farther: Array, deflection: Array
+) -> NDArray[np.bool_]:
+    """(n,) True for a turn ``found`` in a long interval, ``farther`` > 0 m, where another one to the same side, at a
+    reading or in a short interval, is less than that before it: a disc that stood there leaves as much.
+    """
+    step = np.sign(np.diff(deflection))
+    at = 1 + np.flatnonzero(step[:-1] * step[1:] < 0)
+    at = at[~np.isin(at, [*rows[found], *(rows[found] + 1)])]
+    out, short = np.zeros(found.size, np.bool_), found & (farther == 0)
+    for k in np.flatnonzero(found & (farther > 0)):
+        others = np.concatenate([way[short & (turns == turns[k])], deflection[at[step[at - 1] == turns[k]]]])
+        before = turns[k] * (way[k] - others)
+        out[k] = np.any((before > SAME * farther[k]) & (before < farther[k])) and not np.any(
+            np.abs(before) <= SAME * farther[k]
+        )
     return out
 
 

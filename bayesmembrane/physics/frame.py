@@ -14,16 +14,16 @@ from bayesmembrane.ground.parameters import Array
 MOST_ITERATIONS, QUICK, QUICK_LOST = 40, 15, 4
 """Turns of a search, at most; of one in which what a frame remembers moves; and of one of a film without a force."""
 CLOSED = 1e-11  # of the largest deflection: so far what both give way may be from the measured one
-SHORT, STEEP = (
-    1e-10,
-    5.0,
-)  # a secant over a shorter step is round-off, one so many times as steep as any before no slope
+SHORT, STEEP = 1e-10, 5.0
+"""A secant over a shorter step is round-off, one so many times as steep as any before is no slope."""
 FALLING = -0.7  # of the slope of the film over that of the frame: one that falls off more steeply is not followed
 LONG, TURNS = 0.1, 8
 """A step longer than this part of the force is made along the curve of the frame, which takes so many turns to find."""
 PASSES = 12
 """At most, of a frame that remembers: a film without memory of time needs two."""
-LEAST = 1e-3  # of a force at which the film is slack: the one that is tried beside none at all
+LEAST, FORGOTTEN = 1e-3, 8
+"""Of a force at which the film is slack: the one that is tried beside none at all. And after so many turns brackets are
+forgotten: where a film is slack hangs on what it remembers of other points, which are moving, too."""
 MORE, PATIENT = 2.0, 12
 """So many times the force of the frame is tried where the film has none, and so often before a row is left so."""
 
@@ -92,8 +92,7 @@ def _closed(
     held = _rigid(film(rows, measured)[0]) if start is None else start
     # Forces of the frame that were too little, since the film has none where they leave it, and that were too much.
     low, high = np.full(measured.shape, -np.inf), np.full(measured.shape, np.inf)
-    # And those beside which the film pulls more, and at which it is slack.
-    little, much = np.array(low), np.array(high)
+    bracket = _Bracket.of(measured.shape)
     before, steepest = _Step(*np.full((3, *measured.shape), np.nan)), np.zeros(measured.shape)
     for turn in range(MOST_ITERATIONS if known is not None else QUICK):
         peaks = _peaks_before(held, held) if known is None else known[rows]
@@ -118,14 +117,13 @@ def _closed(
         with np.errstate(invalid="ignore"):
             between = np.where(np.isinf(high), MORE * np.abs(held), 0.5 * (low + high))
         new = np.where(lost | (new <= low), between, new)
-        little, much = np.where(pull > held, np.fmax(held, little), little), np.where(slack, np.fmin(held, much), much)
-        beyond = (slack | (new >= much)) & (little >= 0)
-        new[beyond] = np.sqrt(np.fmax(little, LEAST * much)[beyond] * much[beyond])
+        bracket = _Bracket.of(held.shape) if turn % FORGOTTEN == FORGOTTEN - 1 else bracket.narrowed(held, pull, slack)
+        new = bracket.within(new, slack)
         # Where the film has no force nothing may be remembered: such rows are left to those who know what is.
         some = ~here & ~(np.any(lost, axis=1) & (turn >= QUICK_LOST) & (known is None))
         # No chord from where the film is slack says how steep it is.
         before, steepest = _Step(np.where(slack, np.nan, at)[some], pull[some], slope[some]), steepest[some]
-        rows, held, low, high, little, much = (v[some] for v in (rows, new, low, high, little, much))
+        rows, held, low, high, bracket = rows[some], new[some], low[some], high[some], bracket.at(some)
     return delta, force, found
 
 
@@ -136,6 +134,32 @@ def _of(function: Callable[..., tuple[Array, Array]], rows: Rows, some: Rows, *v
 
 def _reach(measured: Array) -> float:
     return max(float(np.max(np.abs(measured))), 1e-12)
+
+
+class _Bracket(NamedTuple):
+    """Forces (B, N) N of the frame: the largest at which the film pulls more, and the least at which it is slack."""
+
+    little: Array
+    much: Array
+
+    @classmethod
+    def of(cls, shape: tuple[int, ...]) -> _Bracket:
+        """Of none that is known."""
+        return cls(np.full(shape, -np.inf), np.full(shape, np.inf))
+
+    def narrowed(self, held: Array, pull: Array, slack: NDArray[np.bool_]) -> _Bracket:
+        """By what the film does at the forces ``held``."""
+        little = np.where(pull > held, np.fmax(held, self.little), self.little)
+        return _Bracket(little, np.where(slack, np.fmin(held, self.much), self.much))
+
+    def within(self, new: Array, slack: NDArray[np.bool_]) -> Array:
+        """``new`` forces, but where the film is or was ``slack`` at them one between."""
+        beyond = (slack | (new >= self.much)) & (self.little >= 0)
+        with np.errstate(invalid="ignore"):
+            return np.where(beyond, np.sqrt(np.fmax(self.little, LEAST * self.much) * self.much), new)
+
+    def at(self, rows: NDArray[np.bool_]) -> _Bracket:
+        return _Bracket(self.little[rows], self.much[rows])
 
 
 class _Step(NamedTuple):

@@ -126,20 +126,40 @@ def test_a_sine_wave_has_no_corners_where_clocks_are_rounded_and_readings_are_mi
         assert found.path.deflection[between] == pytest.approx(there, abs=4e-4)
 
 
-def test_a_turn_whose_reading_is_missing_is_one_where_readings_are_missing_elsewhere() -> None:
-    """Else the disc may have stood there while nobody read it, unless another turn is where it would have turned."""
+@pytest.mark.parametrize(("step", "start"), [(1.0, 0.0), (0.1, 0.3), (0.1, 0.7)])
+def test_a_turn_whose_reading_is_missing_is_one_where_readings_are_missing_elsewhere(step: float, start: float) -> None:
+    """Twice on the way; else the disc may have stood there while nobody read it, unless another turn is where it would
+    have turned.
+    """
     top, steps = 30.3, np.arange(0.0, 121.0)
     way = 1e-3 * np.abs((steps + top) % (2 * top) - top)
-    at_turn, mid_leg, other_turn = 30, 12, 91
-    kept = np.setdiff1d(np.arange(121), [at_turn, mid_leg, other_turn])
-    found = with_corners(moved(steps[kept], way[kept]))
-    between = np.setdiff1d(np.arange(found.path.deflection.size), found.on_path)
-    assert found.path.time[between] == pytest.approx(top * np.arange(1, 4), abs=1e-6)
-    assert found.path.deflection[between] == pytest.approx(1e-3 * top * np.array([1, 0, 1]), abs=1e-9)
-    for missing, count in (([at_turn], 3), ([at_turn, other_turn], 1)):
+    at_turn, on_the_way, other_turn = 30, (12, 75), 91
+
+    def corners_without(missing: list[int]) -> tuple[np.ndarray, np.ndarray]:
         kept = np.setdiff1d(np.arange(121), missing)
-        found = with_corners(moved(steps[kept], way[kept]))
-        assert found.path.deflection.size - len(found) == count
+        found = with_corners(moved(start + step * steps[kept], way[kept]))
+        between = np.setdiff1d(np.arange(found.path.deflection.size), found.on_path)
+        return found.path.time[between], found.path.deflection[between]
+
+    when, where = corners_without([at_turn, *on_the_way, other_turn])
+    assert when == pytest.approx(start + step * top * np.arange(1, 4), abs=1e-6)
+    assert where == pytest.approx(1e-3 * top * np.array([1, 0, 1]), abs=1e-9)
+    assert corners_without([at_turn])[0].size == 3
+    assert corners_without([at_turn, on_the_way[0], other_turn])[0].size == 1
+
+
+def test_a_stop_that_nobody_read_moves_no_turn_where_readings_are_missing_elsewhere() -> None:
+    """Ten tops are read, and at one of them the disc stood for a while; or it was read seldom while it was slow."""
+    cycle = np.concatenate([np.arange(0.0, 31.0), np.arange(29.0, 0.0, -1.0)])
+    way, gaps = np.tile(cycle, 10), np.ones(600)
+    gaps[31] = 2.0
+    kept = np.setdiff1d(np.arange(600), [200, 340])
+    m = moved(np.cumsum(gaps)[kept], 1e-3 * way[kept])
+    assert with_corners(m) is m
+    slow = np.concatenate([np.full(61, 0.2), np.full(60, 1.0)])
+    slow[31] = 0.5
+    m = moved(np.cumsum(slow), 1e-3 * np.append(np.tile(cycle, 2), 0.0))
+    assert with_corners(m) is m
 
 
 def test_a_turn_midway_between_two_readings_is_one_where_another_turn_says_so() -> None:
