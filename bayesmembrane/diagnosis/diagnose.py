@@ -68,7 +68,7 @@ def _concluded(case: OpenCase, search: Search, found: Verdict) -> Diagnosis:
     answer = found.members[0].candidate if found.members else _nearest(found, null)
     left = remaining(search, answer, null)
     firm = _firm(search, found, left)
-    found = _finished(search, found, left, set(answer.names) - set(null.names) <= set(firm))
+    found = _finished(search, found, left)
     known = found.verdict in ("named", "ambiguous", "material")
     found = replace(found, members=_adapted(search, found.members), ranking=_adapted(search, found.ranking))
     null = _null(case, found)
@@ -139,20 +139,18 @@ def _firm(search: Search, found: Verdict, left: Remaining) -> tuple[str, ...]:
         return ()
     p = found.probabilities
     names = sorted(left.firm(p.nearly_certain()), key=p.of_effect, reverse=True)
-    while names and p.of_effect(*names) < VERDICT.nearly_certain:
+    while names and not p.in_all(*names):
         names.pop()
     return tuple(sorted(names))
 
 
-def _finished(search: Search, found: Verdict, left: Remaining, firm: bool) -> Verdict:
-    """An effect that leaves structure, which no small error of the forms carries, is not the whole of it: no name,
-    unless laws are usually off by as much and all of the name is ``firm``. Nor has one that comes where the test
-    turns, beside a law of loops, or at its last turn, whatever is beside it.
+def _finished(search: Search, found: Verdict, left: Remaining) -> Verdict:
+    """An effect that leaves structure, which no small error of the forms carries, is not the whole of it: no name. Nor
+    has one that comes where the test turns, beside a law of loops, or at its last turn, whatever is beside it.
     """
     if found.verdict != "named":
         return found
-    strange = left.strange and not (left.trifling and firm)
-    doubtful = strange or at_a_turn(found.members[0].candidate, search.measurement) is not None
+    doubtful = left.strange or at_a_turn(found.members[0].candidate, search.measurement) is not None
     return replace(found, verdict="unknown") if doubtful else found
 
 

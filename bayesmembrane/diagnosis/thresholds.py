@@ -483,10 +483,9 @@ class VerdictThresholds:
     """From which an answer is given; sets of an ambiguous one hold as much together."""
     least_member: float = 0.01
     """Of a set that stands beside one which has next to all by the laws of the library, and is not told to be sure."""
-    nearly_certain: float = 0.88
-    """Of an effect, whatever else is at work, from which it is in all that is probable, as far as can be said beside
-    what is told of sets next to those of the sum (`Beliefs.elsewhere`, `elsewhere_beside_structure`): an effect that
-    has all by the laws and leaves more than noise has 0.9, less what is told of sets two steps away."""
+    nearly_certain: float = 0.95
+    """Of an effect, whatever else is at work, from which it is in all that is probable by the laws of the library,
+    before some of it is told of sets next to those of the sum (`Beliefs.elsewhere`). With that it was 0.9."""
     doubted: float = 0.8
     """Of no effect, and of nothing foreign, where no test sees a misfit: if both are more probable, the answer is that
     nothing is missing; if one is less by traces to first order, all are weighed. It was 0.85 while none had four in ten
@@ -532,11 +531,6 @@ class VerdictThresholds:
     chance: float = 3.0
     """Standard deviations of reduced chi-square above 1 from which what a name leaves is no chance. Of 53 names on 260
     synthetic cases, 2 left more than that and `noise_chi2`; both were wrong, and 3 of the others."""
-    trifle: float = 0.0025
-    """Share of the misfit up to which what a name leaves is told, and does not take the name away from effects that are
-    `firm`, be it ten times the noise. Laws are expected to be 5 % off (`form_error.LAW`), and this is the square of
-    that: beside the noise of a sound machine, a thousandth of what hysteresis does, no law of a real rubber would get a
-    name."""
     firm: float = 1.5
     """Times what a model leaves beyond noise, that an effect must explain by itself to be more than what other laws
     leave. On two strips of silicone, each stretched twice to the double, whose load cell had an offset and whose first

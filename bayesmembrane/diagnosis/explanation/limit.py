@@ -17,7 +17,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.evidence import weighed
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
-from bayesmembrane.diagnosis.explanation.saturation import Saturated, fitted_below, saturated
+from bayesmembrane.diagnosis.explanation.saturation import Saturated, fitted_below, promises, saturated
 from bayesmembrane.diagnosis.left.shape import plateau_of
 from bayesmembrane.diagnosis.thresholds import FOREIGN, SATURATION
 from bayesmembrane.ground.parameters import Array
@@ -83,12 +83,14 @@ def _limit_of(search: Search, base: Candidate, before: Limit | None) -> Limit | 
 def log_evidence_alone(search: Search, base: Candidate) -> float:
     """ln Z of a limit beside ``base`` that leaves noise alone; -inf if there is none, or more is left.
 
-    What a film leaves of readings far below the largest one no limit takes away.
+    What a film that is fitted to them leaves of readings far below the largest one is not for a limit, which is only
+    looked for where it leaves noise.
     """
     noise = len(search.measurement) + FOREIGN.settled_sd * float(np.sqrt(2 * len(search.measurement)))
-    below = fitted_below(search, base, min(SATURATION.lower))
-    if below is not None and below.squares > noise:
-        return -np.inf
+    if promises(search, base):
+        below = fitted_below(search, base, min(SATURATION.lower))
+        if below is not None and below.squares > noise:
+            return -np.inf
     found = limit_of(search, base)
     if found is None:
         return -np.inf

@@ -84,14 +84,14 @@ def saturated(search: Search, base: Candidate, before: Saturated | None = None) 
 
     From films fitted to the lower readings, or from where one was found ``before``, under another noise.
     """
-    if not _promises(search, base):
+    if not promises(search, base):
         return None
     starts = _starts(search, base) if before is None else _again(search, before)
     found = [_settled(_Point(search, film, law)) for film, law in starts]
     return max(found, key=lambda s: s.log_evidence, default=None)
 
 
-def _promises(search: Search, base: Candidate) -> bool:
+def promises(search: Search, base: Candidate) -> bool:
     """True if some limit near the largest reading, beside the fit without one, would take enough away."""
     m = search.measurement
     force, top = m.force - base.residual, float(np.max(m.force))

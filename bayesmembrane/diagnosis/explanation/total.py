@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
@@ -18,7 +18,7 @@ from bayesmembrane.diagnosis.explanation.neighbours import NEGLIGIBLE, spread
 from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
 from bayesmembrane.diagnosis.explanation.unfitted import Key, unfitted
-from bayesmembrane.diagnosis.left.remaining import more_than_noise
+from bayesmembrane.diagnosis.left.remaining import over_noise
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
 
@@ -72,19 +72,29 @@ class Probabilities:
     effects : by set of effects beyond the given ones, their names joined by "+"; `NOTHING` among them
     energies : by energy
     foreign : by kind; `NOTHING` among them
+    by_laws : as ``effects``, before some of it is told of sets next to those of the sum; empty where none is
     """
 
     effects: Mapping[str, float]
     energies: Mapping[str, float]
     foreign: Mapping[str, float]
+    by_laws: Mapping[str, float] = field(default_factory=dict)
 
     def of_effect(self, *names: str) -> float:
         """Of an effect, or of several together, whatever else is at work."""
         return float(sum(p for key, p in self.effects.items() if set(names) <= set(key.split("+"))))
 
+    def in_all(self, *names: str) -> bool:
+        """True of effects that are together in all that is probable by the laws of the library: what is known even
+        where the whole set is not.
+        """
+        laws = self.by_laws or self.effects
+        together = sum(p for key, p in laws.items() if set(names) <= set(key.split("+")))
+        return together >= VERDICT.nearly_certain
+
     def nearly_certain(self) -> list[str]:
-        """Effects that are in all that is probable, by name: what is known even where the whole set is not."""
-        return self.likely(VERDICT.nearly_certain)
+        """Effects that are in all that is probable (`in_all`), by name."""
+        return [name for name in self.likely(0.0) if self.in_all(name)]
 
     def likely(self, least: float = 0.5) -> list[str]:
         """Effects whose probability is ``least`` or more, by name."""
@@ -109,14 +119,12 @@ class Total:
     ranking : every hypothesis, the most probable first
     probabilities : summed
     joint : by (set of effects, kind of what is foreign), the most probable first
-    by_laws : of sets of effects, before some of it is told of those next to them
     foreign : what was found of each kind beside the models where it was looked for, the most probable first
     """
 
     ranking: tuple[Judged, ...]
     probabilities: Probabilities
     joint: Mapping[tuple[str, str], float]
-    by_laws: Mapping[str, float]
     foreign: tuple[Foreign, ...]
 
 
@@ -199,8 +207,9 @@ def summed(grown: Grown) -> Total:
             of_set = q / joint[key] if q > 0 else 0.0
             judged.append(_judged(grown, c, of_set * both[key], worse[id(c)]))
     judged.sort(key=lambda j: -j.probability)
-    marginal = Probabilities(_summed_out(both, 0), _falling(BELIEFS.energies_flattened(energies)), _summed_out(both, 1))
-    return Total(tuple(judged), marginal, both, _summed_out(flat, 0), tuple(found))
+    told_energies = _falling(BELIEFS.energies_flattened(energies))
+    marginal = Probabilities(_summed_out(both, 0), told_energies, _summed_out(both, 1), _summed_out(flat, 0))
+    return Total(tuple(judged), marginal, both, tuple(found))
 
 
 def _worse(grown: Grown, c: Candidate) -> bool:
@@ -225,11 +234,11 @@ def _described(grown: Grown, c: Candidate, given: Sequence[str]) -> bool:
 
 def _vague(
     grown: Grown, every: Sequence[Candidate], told: Sequence[Foreign], joint: Mapping[tuple[str, str], float]
-) -> frozenset[str]:
-    """Kinds of what is foreign beside which the most probable set of effects leaves more than noise: whatever is behind
-    the curve, laws of the library do not follow it.
+) -> dict[str, float]:
+    """From 0 to 1, by kind of what is foreign, how far the most probable set of effects beside it leaves more than
+    noise (`BELIEFS.blurred`): whatever is behind the curve, laws of the library do not follow it.
     """
-    given, search, out = grown.case.null.names, grown.search, set[str]()
+    given, search, out = grown.case.null.names, grown.search, dict[str, float]()
     for kind in {kind for _, kind in joint}:
         first = max((name for name, k in joint if k == kind), key=lambda name: joint[name, kind])
         if kind == NOTHING:
@@ -237,15 +246,16 @@ def _vague(
         else:
             same = (f for f in told if f.key == kind and set_name(f.base, given) == first)
             fits = [(f.base, search.squares(f.base, f.trace)) for f in same]
-        dof = {id(c): max(c.residual.size - c.x.size, 1) for c, _ in fits}
-        if first != NOTHING and fits and all(more_than_noise(s / dof[id(c)], dof[id(c)]) for c, s in fits):
-            out.add(kind)
-    return frozenset(out)
+        if first != NOTHING and fits:
+            dof = [max(c.residual.size - c.x.size, 1) for c, _ in fits]
+            over = min(over_noise(squares / n, n) for (_, squares), n in zip(fits, dof, strict=True))
+            out[kind] = min(max(over / BELIEFS.blurred, 0.0), 1.0)
+    return out
 
 
-def _flattened(joint: Mapping[tuple[str, str], float], vague: Collection[str]) -> dict[tuple[str, str], float]:
+def _flattened(joint: Mapping[tuple[str, str], float], vague: Mapping[str, float]) -> dict[tuple[str, str], float]:
     """`Beliefs.flattened` over the sets of effects beside each kind of what is foreign; together one, and falling.
-    Beside kinds that are ``vague`` none stands out.
+    As far as a kind is ``vague`` none stands out beside it.
 
     No effect keeps what it has, for it is of laws that too much is said: of a hundred sets that are next to nothing
     each, flattened with it, all together would come to more than it.
@@ -257,24 +267,24 @@ def _flattened(joint: Mapping[tuple[str, str], float], vague: Collection[str]) -
         else:
             kinds[kind][name] = q
     for kind, sets in kinds.items():
-        by_known_laws = kind != ANOTHER_LAW and kind not in vague
+        by_known_laws = 0.0 if kind == ANOTHER_LAW else 1.0 - vague.get(kind, 0.0)
         out |= {(name, kind): q for name, q in BELIEFS.flattened(sets, by_known_laws).items()}
     whole = sum(joint.values())
     return _falling({key: q / whole for key, q in out.items()})
 
 
 def _with_neighbours(
-    joint: Mapping[tuple[str, str], float], visible: Sequence[str], vague: Collection[str]
+    joint: Mapping[tuple[str, str], float], visible: Sequence[str], vague: Mapping[str, float]
 ) -> dict[tuple[str, str], float]:
     """With a part of what sets have beside each kind of what is foreign told of those next to them, as far as none
-    stands out by known laws; a larger one beside kinds that are ``vague``.
+    stands out by known laws; a larger one as far as a kind is ``vague``.
     """
     kinds, out = defaultdict[str, dict[frozenset[str], float]](dict), dict[tuple[str, str], float]()
     for (name, kind), q in joint.items():
         kinds[kind][frozenset() if name == NOTHING else frozenset(name.split("+"))] = q
     for kind, sets in kinds.items():
-        doubted = BELIEFS.elsewhere * (1 - BELIEFS.standing_out(sets.values()))
-        doubted = BELIEFS.elsewhere_beside_structure if kind in vague else doubted
+        doubted, degree = BELIEFS.elsewhere * (1 - BELIEFS.standing_out(sets.values())), vague.get(kind, 0.0)
+        doubted += degree * (BELIEFS.elsewhere_beside_structure - doubted)
         share = BELIEFS.elsewhere_by_another_law if kind == ANOTHER_LAW else doubted
         near = spread(sets, visible, BELIEFS.most, share, BELIEFS.farther)
         out |= {(_joined(names), kind): q for names, q in near.items()}

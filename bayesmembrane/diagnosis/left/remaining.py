@@ -25,8 +25,7 @@ class Remaining:
     rms : N, root mean square of the form error
     energy_error : relative error of the energy's form
     law_errors : by effect, relative error of its law
-    excess, changed : squares, freed of noise: what is left beyond noise; what the laws of the effects of the model,
-        given ones among them, change of the force that its energy could not
+    excess : squares, freed of noise, that are left beyond noise
     own : by effect, the same of its own trace, less what energy and other effects could take of that
     """
 
@@ -38,7 +37,6 @@ class Remaining:
     law_errors: Mapping[str, float]
     dof: int
     excess: float = 0.0
-    changed: float = 0.0
     own: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -50,21 +48,16 @@ class Remaining:
     def strange(self) -> bool:
         """True if it is more than noise, and more than a small error of the forms that carries it."""
         forms = self.carried >= VERDICT.form_carries and all(e <= VERDICT.law_small for e in self.law_errors.values())
-        return more_than_noise(self.reduced_chi2, self.dof) and not forms
-
-    @property
-    def trifling(self) -> bool:
-        """True if laws are usually off by as much."""
-        return 0.0 < self.share < VERDICT.trifle or self.excess < VERDICT.trifle * self.changed
+        return over_noise(self.reduced_chi2, self.dof) >= 0.0 and not forms
 
     def firm(self, names: Iterable[str]) -> list[str]:
         """Those of these effects that explain clearly more by themselves than what is left."""
         return [name for name in names if self.own.get(name, 0.0) > VERDICT.firm * self.excess]
 
 
-def more_than_noise(reduced_chi2: float, dof: int) -> bool:
-    """True if neither chance nor an error of the noise accounts for what is left."""
-    return reduced_chi2 >= max(VERDICT.noise_chi2, 1.0 + VERDICT.chance * float(np.sqrt(2.0 / dof)))
+def over_noise(reduced_chi2: float, dof: int) -> float:
+    """By what part what is left is more than chance and an error of the noise account for; below 0 where it is less."""
+    return reduced_chi2 / max(VERDICT.noise_chi2, 1.0 + VERDICT.chance * float(np.sqrt(2.0 / dof))) - 1.0
 
 
 def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining:
@@ -73,8 +66,7 @@ def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining
     left, before = search.excess(model), search.excess(plain)
     rest = beyond_noise(search.noise.white(model.residual - model.form), model)
     beyond = before > VERDICT.chance * float(np.sqrt(2.0 * dof))
-    white, material = search.noise.white(model.slopes), model.hypothesis.material_size
-    trace = search.noise.white(np.sum(model.traces, axis=0))
+    white = search.noise.white(model.slopes)
     return Remaining(
         share=float(np.clip(left / before, 0.0, 1.0)) if beyond else 0.0,
         reduced_chi2=float(np.sum(search.noise.white(search.adapted(model)) ** 2)) / dof,
@@ -84,7 +76,6 @@ def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining
         law_errors=model.law_errors,
         dof=dof,
         excess=max(float(left), 0.0),
-        changed=float(np.sum(free_of(white[:, :material], trace) ** 2)),
         own=dict(_own_traces(model, white)),
     )
 

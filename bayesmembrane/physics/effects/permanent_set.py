@@ -13,7 +13,7 @@ from bayesmembrane.physics.effects._history import CREEPS, EXPONENT, REPEATED, S
 from bayesmembrane.physics.effects.base import Deflection, EffectParameter, running_max
 
 FLAT = 1e-3
-"""Of the largest deflection so far: below it the shift grows no more, for its power is without bounds at zero."""
+"""Of the largest deflection so far: below it the shift changes no more, for a power is without bounds at zero."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class PermanentSet(Deflection):
     title: ClassVar[str] = "permanent set"
     reference: ClassVar[str] = "A. Dorfmann, R. W. Ogden, Int. J. Solids Struct. 41 (2004) 1855"
     signature: ClassVar[str] = (
-        "After each new maximum the film comes back slack: unloading reaches zero force before zero deflection, "
-        "reloading starts there, and the shift grows with the largest deflection."
+        "After each new maximum the film comes back longer: mostly slack, so that unloading reaches zero force before "
+        "zero deflection and reloading starts there, or softer at large deflections; more so after larger maxima."
     )
     rank: ClassVar[int] = 1
     of_the_material = True
@@ -43,7 +43,7 @@ class PermanentSet(Deflection):
         EffectParameter(
             "set",
             "m",
-            "shift at half of the largest deflection; of a lost length that at which the film is slack after the test",
+            "shift at half of the largest deflection where nothing rejoins; of a lost length all of it",
             HalfNormal(1e-3),
             (0.0, 2e-2),
             0.0,

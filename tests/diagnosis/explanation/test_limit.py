@@ -8,7 +8,9 @@ import pytest
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.explanation import limit as module
 from bayesmembrane.diagnosis.explanation.limit import limit_of, log_evidence_alone
+from bayesmembrane.diagnosis.explanation.saturation import promises
 from bayesmembrane.diagnosis.left.shape import plateau_of
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.forward import Forward
@@ -82,6 +84,18 @@ def test_one_that_leaves_more_does_not() -> None:
     assert log_evidence_alone(moved, again) == -np.inf
     plain, film, _ = fitted(2.0, True, 4110)
     assert log_evidence_alone(plain, film) == -np.inf
+
+
+def test_a_limit_is_not_looked_for_where_more_than_noise_is_left_far_below_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    search, base, _ = fitted(SHARE, True, 4123)
+    wave = 5 * SD * np.sin(np.arange(240) / 3) * (search.measurement.force < 0.7 * np.max(search.measurement.force))
+    m = replace(search.measurement, force=search.measurement.force + wave)
+    moved = Search(m, white_noise(m), 0, api.solve)
+    again = moved.fit(CLAIM, [base.x])
+    assert again is not None
+    assert promises(moved, again)
+    monkeypatch.setattr(module, "limit_of", lambda *_: pytest.fail("looked for"))
+    assert log_evidence_alone(moved, again) == -np.inf
 
 
 @pytest.mark.parametrize("step", [1.5, 3.0])

@@ -167,7 +167,7 @@ def test_sets_are_told_flattened_and_what_is_foreign_is_not(monkeypatch: pytest.
 def test_no_effect_keeps_what_it_has_where_sets_are_flattened() -> None:
     """A hundred sets that are next to nothing each would else come to more than it."""
     sets = {"friction": 0.2, **{f"set {i}": 0.003 for i in range(100)}}
-    flat = total._flattened({(NOTHING, NOTHING): 0.5, **{(name, NOTHING): p for name, p in sets.items()}}, ())
+    flat = total._flattened({(NOTHING, NOTHING): 0.5, **{(name, NOTHING): p for name, p in sets.items()}}, {})
     assert flat[NOTHING, NOTHING] == pytest.approx(0.5)
     assert {name: p for (name, _), p in flat.items() if name != NOTHING} == pytest.approx(BELIEFS.flattened(sets))
     assert flat["friction", NOTHING] < 0.1
@@ -178,14 +178,16 @@ def test_no_set_stands_out_that_leaves_more_than_noise(monkeypatch: pytest.Monke
     """Next to all by known laws, and no law of the library follows the curve."""
     said = {
         left: summed_up(monkeypatch, seen=0.0, gain=30.0, flatter=0.5, elsewhere=0.4, unlisted=0.1, left=left)
-        for left in (1.0, 20.0)
+        for left in (1.0, 5.5, 20.0)
     }
-    noise, more = (total.probabilities for total in said.values())
+    noise, some, more = (total.probabilities for total in said.values())
     assert noise.effects["friction+mullins"] > 0.99
     assert noise.foreign.get(UNLISTED, 0.0) < 1e-6
     assert more.effects["friction+mullins"] == pytest.approx(0.66, abs=0.01)  # one step back of two is home
     assert more.foreign[UNLISTED] == pytest.approx(0.1, abs=0.01)
     assert more.effects["friction"] > 1e-2
+    assert more.effects["friction+mullins"] + 0.05 < some.effects["friction+mullins"] < 0.95
+    assert all(p.nearly_certain() == ["friction", "mullins"] for p in (noise, some, more))
     assert sum(more.effects.values()) == pytest.approx(1.0)
 
 
@@ -377,8 +379,8 @@ def test_a_part_is_told_of_sets_next_to_those_of_the_sum(monkeypatch: pytest.Mon
     plain, near = (summed_up(monkeypatch, **said, elsewhere=e) for e in (0.0, 0.2))
     before, after = (dict(t.probabilities.effects) for t in (plain, near))
     assert max(before.values()) < 0.9
-    assert near.by_laws == pytest.approx(plain.by_laws)
-    assert plain.by_laws == pytest.approx(before)
+    assert near.probabilities.by_laws == pytest.approx(plain.probabilities.by_laws)
+    assert plain.probabilities.by_laws == pytest.approx(before)
     assert sum(after.values()) == pytest.approx(1.0)
     assert after[NOTHING] >= before[NOTHING] * (1 - 1e-9)
     for name in ("tearing", "mullins", "friction+tearing", "mullins+tearing"):
