@@ -199,7 +199,7 @@ def summed(grown: Grown) -> Total:
     vague = _vague(grown, every, told, joint)
     flat = _flattened(joint, vague)
     near = _with_neighbours(flat, [e.name for e in case.visible if e.name not in given], vague)
-    both = _with_unlisted(near)
+    both = _with_unlisted(near, vague.get(NOTHING, 0.0))
     judged = []
     for (c, kind, _), q in zip(terms, p[: len(terms)].tolist(), strict=True):
         if kind == NOTHING:
@@ -291,12 +291,13 @@ def _with_neighbours(
     return _falling(out)
 
 
-def _with_unlisted(joint: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], float]:
+def _with_unlisted(joint: Mapping[tuple[str, str], float], vague: float) -> dict[tuple[str, str], float]:
     """With a part of what effects have, and nothing foreign, told of `UNLISTED` beside them, as far as no set stands
-    out.
+    out; a larger one as far as they are ``vague``.
     """
     known = {name: q for (name, kind), q in joint.items() if kind == NOTHING}
-    part = BELIEFS.unlisted * (1 - BELIEFS.standing_out(known.values()))
+    share = BELIEFS.unlisted + vague * (BELIEFS.unlisted_beside_structure - BELIEFS.unlisted)
+    part = share * (1 - BELIEFS.standing_out(known.values()))
     moved = {(name, UNLISTED): part * q for name, q in known.items() if name != NOTHING and part * q > 0}
     return _falling(
         {(n, k): q - moved.get((n, UNLISTED), 0.0) if k == NOTHING else q for (n, k), q in joint.items()} | moved

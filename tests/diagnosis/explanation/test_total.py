@@ -122,7 +122,8 @@ def told(flatter: float = 1.0, elsewhere: float = 0.0, unlisted: float = 0.0) ->
         "elsewhere_by_another_law": 2 * elsewhere,
         "elsewhere_beside_structure": elsewhere,
     }
-    return replace(BELIEFS, flatter=flatter, unlisted=unlisted, **shares)
+    faults = {"unlisted": unlisted, "unlisted_beside_structure": unlisted}
+    return replace(BELIEFS, flatter=flatter, **shares, **faults)
 
 
 def by_likelihood_alone(monkeypatch: pytest.MonkeyPatch) -> None:
