@@ -93,9 +93,11 @@ def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> 
     part = (clock - time[rows]) / gap[rows]
     found = (part > least) & (part < 1 - least)
     turns = np.sign(before - after)[some]
-    found = _met(found, doubt, way, turns, SAME * np.abs(before * beside)[some])
+    near = SAME * np.abs(before * beside)[some]
+    found = _met(found, doubt, way, turns, near)
     farther = np.where(length[some] > LONGER, 0.5 * np.abs(before[some] * gap[rows]), 0.0)
-    found &= ~_refuted(found, rows, way, turns, farther, deflection)
+    seen = _turns_at_readings(deflection, rows[found])
+    found &= ~_refuted(found, way, turns, np.stack([near, farther]), seen)
     # Two in a row are one, which is at the reading between them as far as the clock knows.
     found &= ~np.any(np.abs(rows[:, None] - rows[found]) == 1, axis=1)
     return rows[found], way[found], clock[found]
@@ -126,22 +128,28 @@ def _met(
     return out
 
 
-def _refuted(
-    found: NDArray[np.bool_], rows: NDArray[np.intp], way: Array, turns: Array, farther: Array, deflection: Array
-) -> NDArray[np.bool_]:
-    """(n,) True for a turn ``found`` in a long interval, ``farther`` > 0 m, where another one to the same side, at a
-    reading or in a short interval, is less than that before it: a disc that stood there leaves as much.
-    """
+def _turns_at_readings(deflection: Array, rows: NDArray[np.intp]) -> tuple[Array, Array]:
+    """((t,) m, (t,)): where readings (N,) m turn, and to which side, but for those beside corners after ``rows``."""
     step = np.sign(np.diff(deflection))
     at = 1 + np.flatnonzero(step[:-1] * step[1:] < 0)
-    at = at[~np.isin(at, [*rows[found], *(rows[found] + 1)])]
-    out, short = np.zeros(found.size, np.bool_), found & (farther == 0)
+    at = at[~np.isin(at, [*rows, *(rows + 1)])]
+    return deflection[at], step[at - 1]
+
+
+def _refuted(
+    found: NDArray[np.bool_], way: Array, turns: Array, reach: Array, seen: tuple[Array, Array]
+) -> NDArray[np.bool_]:
+    """(n,) True for a turn ``found`` in a long interval, where it would be at ``way`` (n,) m and another one to the
+    same side, in a short interval or ``seen`` at a reading, is not near, but a little before it: a disc that stood there
+    leaves as much. ``reach`` : (2, n) m, how near, and how far before; 0 in a short interval.
+    """
+    (near, farther), out = reach, np.zeros(found.size, np.bool_)
+    short = found & (farther == 0)
     for k in np.flatnonzero(found & (farther > 0)):
-        others = np.concatenate([way[short & (turns == turns[k])], deflection[at[step[at - 1] == turns[k]]]])
+        others = np.concatenate([way[short & (turns == turns[k])], seen[0][seen[1] == turns[k]]])
         before = turns[k] * (way[k] - others)
-        out[k] = np.any((before > SAME * farther[k]) & (before < farther[k])) and not np.any(
-            np.abs(before) <= SAME * farther[k]
-        )
+        stood = np.any((before > near[k]) & (before < farther[k]))
+        out[k] = stood and not np.any(np.abs(before) <= near[k])
     return out
 
 
@@ -156,9 +164,8 @@ def _coarseness(time: Array, inner: NDArray[np.intp]) -> Array:
     uneven = np.max(beside, axis=1) - np.min(beside, axis=1)
     for step in ROUNDED:
         if np.all(np.abs(rest / step - np.round(rest / step)) < ROUND_OFF):
-            part = np.where(uneven > 0.5 * step, np.minimum(2 * step, uneven), 0.0) / np.minimum(
-                gap, np.min(beside, axis=1)
-            )
+            shortest = np.minimum(gap, np.min(beside, axis=1))
+            part = np.where(uneven > 0.5 * step, np.minimum(2 * step, uneven), 0.0) / shortest
             return np.where(part <= COARSEST, part, 0.0)
     return np.zeros(gap.size)
 

@@ -139,11 +139,8 @@ def _told(total: Total, fitted: Collection[str]) -> list[str]:
 
     That one alone is left of several of which others were never fitted does not make it sure.
     """
-    p = total.probabilities.effects
-    names, count = (
-        [name for name in p if name in fitted],
-        sum(name in fitted for name in _smallest(total.probabilities.by_laws)),
-    )
+    p, laws = total.probabilities.effects, total.probabilities.by_laws
+    names, count = [name for name in p if name in fitted], sum(name in fitted for name in _smallest(laws))
     if count <= 1 and names and p[names[0]] < VERDICT.sure:
         return [name for name in names[:2] if p[name] >= VERDICT.least_member]
     return names[: max(count, 1)]
