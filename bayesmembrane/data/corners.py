@@ -140,8 +140,8 @@ def _refuted(
     found: NDArray[np.bool_], way: Array, turns: Array, reach: Array, seen: tuple[Array, Array]
 ) -> NDArray[np.bool_]:
     """(n,) True for a turn ``found`` in a long interval, where it would be at ``way`` (n,) m and another one to the
-    same side, in a short interval or ``seen`` at a reading, is not near, but a little before it: a disc that stood there
-    leaves as much. ``reach`` : (2, n) m, how near, and how far before; 0 in a short interval.
+    same side, in a short interval or ``seen`` at a reading, is not near, but a little before it: a disc that stood
+    there leaves as much. ``reach`` : (2, n) m, how near, and how far before; 0 in a short interval.
     """
     (near, farther), out = reach, np.zeros(found.size, np.bool_)
     short = found & (farther == 0)
