@@ -85,7 +85,8 @@ def _closed(
     Newton's method for the force, from ``start`` (B, N) N or from a frame that is rigid. A frame that yields like a
     power of the force less than one is without bounds soft at no force, where a tangent leads astray: long steps are
     made along the film's tangent and the frame's own curve. Slopes are at first those of a film without memory, then
-    secants. Where the film is slack, one between a force that was too little and this one is tried. Rows that are found rest; those with ``found`` False are not, and have no force.
+    secants. Where the film is slack, one between a force that was too little and this one is tried. Rows that are found
+    rest; those with ``found`` False are not, and have no force.
     """
     rows, reach = np.arange(len(measured)), _reach(measured)
     delta, force, found = np.array(measured), np.full(measured.shape, np.nan), np.zeros(len(measured), np.bool_)
@@ -155,7 +156,7 @@ class _Bracket(NamedTuple):
     def within(self, new: Array, slack: NDArray[np.bool_]) -> Array:
         """``new`` forces, but where the film is or was ``slack`` at them one between."""
         beyond = (slack | (new >= self.much)) & (self.little >= 0)
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             return np.where(beyond, np.sqrt(np.fmax(self.little, LEAST * self.much) * self.much), new)
 
     def at(self, rows: NDArray[np.bool_]) -> _Bracket:
