@@ -17,8 +17,9 @@ CLOSED = 1e-11  # of the largest deflection: so far what both give way may be fr
 SHORT, STEEP = 1e-10, 5.0
 """A secant over a shorter step is round-off, one so many times as steep as any before is no slope."""
 FALLING = -0.7  # of the slope of the film over that of the frame: one that falls off more steeply is not followed
-LONG, TURNS = 0.1, 8
-"""A step longer than this part of the force is made along the curve of the frame, which takes so many turns to find."""
+LONG, TURNS, NEAR = 0.1, 8, 1e-6
+"""A step longer than this part of the force is made along the curve of the frame, which takes so many turns to find, or
+until one changes the force by no more than the last number."""
 PASSES = 12
 """At most, of a frame that remembers: a film without memory of time needs two."""
 LEAST, FORGOTTEN = 1e-3, 8
@@ -205,10 +206,13 @@ def _along(
     """
     rest = yielding(np.zeros((len(pull), 1)), peaks[:, None])[0][:, 0]  # what has seated has no part in the logarithm
     pull = pull - slope * rest
-    force = np.where(start * pull > 0, start, pull)
+    force, moving = np.where(start * pull > 0, start, pull), np.ones(len(pull), np.bool_)
     with np.errstate(all="ignore"):
         for _ in range(TURNS):
             yielded, soft = (v[:, 0] for v in yielding(force[:, None], peaks[:, None]))
             whole = force + slope * (yielded - rest)
-            force = force * np.exp(np.log(pull / whole) * whole / (force * (1 + slope * soft)))
+            change = np.log(pull / whole) * whole / (force * (1 + slope * soft))
+            force, moving = np.where(moving, force * np.exp(change), force), moving & (np.abs(change) > NEAR)
+            if not np.any(moving):
+                break
     return np.where((pull == 0) | ~np.isfinite(force), 0.0, force)
