@@ -139,7 +139,7 @@ def _firm(search: Search, found: Verdict, left: Remaining) -> tuple[str, ...]:
         return ()
     p = found.probabilities
     names = sorted(left.firm(p.nearly_certain()), key=p.of_effect, reverse=True)
-    while names and not p.in_all(*names):
+    while names and p.of_effect(*names) < VERDICT.nearly_certain:
         names.pop()
     return tuple(sorted(names))
 

@@ -483,9 +483,11 @@ class VerdictThresholds:
     """From which an answer is given; sets of an ambiguous one hold as much together."""
     least_member: float = 0.01
     """Of a set that stands beside one which has next to all by the laws of the library, and is not told to be sure."""
-    nearly_certain: float = 0.95
-    """Of an effect, whatever else is at work, from which it is in all that is probable by the laws of the library,
-    before some of it is told of sets next to those of the sum (`Beliefs.elsewhere`). With that it was 0.9."""
+    nearly_certain: float = 0.9
+    """Of an effect, whatever else is at work, from which it is in all that is probable, as far as can be said beside
+    what is told of sets next to those of the sum (`Beliefs.elsewhere`). On 256 films of four generators by other hands
+    47 of 57 answers without a name whose firm effects had as much were right; with 0.95 before a part is told of other
+    sets, so that two or three may be firm beside structure, 10 of 16 on 37 fresh ones."""
     doubted: float = 0.8
     """Of no effect, and of nothing foreign, where no test sees a misfit: if both are more probable, the answer is that
     nothing is missing; if one is less by traces to first order, all are weighed. It was 0.85 while none had four in ten

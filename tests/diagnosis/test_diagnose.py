@@ -235,8 +235,9 @@ def test_points_as_few_as_a_model_with_an_effect_has_coordinates_are_diagnosed()
         ({"friction+mullins": 0.97, "friction": 0.03}, (), ()),
         ({"friction": 0.5, "friction+mullins": 0.46, "mullins": 0.04}, ("friction", "mullins"), ("friction",)),
         ({"friction": 0.5, "mullins": 0.5}, ("friction", "mullins"), ()),
-        ({"friction": 0.6, "friction+mullins": 0.36, "rate": 0.04}, ("friction",), ("friction",)),
-        ({"friction": 0.6, "friction+mullins": 0.34, "rate": 0.06}, ("friction",), ()),
+        # Nine in ten are enough, for a part is told of other sets whatever is seen; less are not.
+        ({"friction": 0.6, "friction+mullins": 0.31, "rate": 0.09}, ("friction",), ("friction",)),
+        ({"friction": 0.6, "friction+mullins": 0.29, "rate": 0.11}, ("friction",), ()),
     ],
 )
 @pytest.mark.parametrize("strange", [True, False])
@@ -247,12 +248,10 @@ def test_what_is_in_all_that_is_probable_and_explains_more_than_is_left_is_firm_
     firm: tuple[str, ...],
     strange: bool,
 ) -> None:
-    """By the laws of the library, however much of it is told of other sets."""
     left: Any = SimpleNamespace(strange=strange, firm=lambda names: [n for n in names if n in clear])
     monkeypatch.setattr(module, "at_a_turn", lambda *models: None)
     first: Any = SimpleNamespace(candidate=SimpleNamespace(names=("friction", "mullins")))
-    told = {name: 0.8 * p for name, p in sets.items()} | {"tearing": 0.2}
-    found = Verdict("named", (first,), (), Probabilities(told, {}, {"none": 1.0}, sets))
+    found = Verdict("named", (first,), (), Probabilities(sets, {}, {"none": 1.0}))
     search: Any = SimpleNamespace(measurement=None)
     assert module._firm(search, found, left) == firm
     assert module._finished(search, found, left).verdict == ("unknown" if strange else "named")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -72,29 +72,19 @@ class Probabilities:
     effects : by set of effects beyond the given ones, their names joined by "+"; `NOTHING` among them
     energies : by energy
     foreign : by kind; `NOTHING` among them
-    by_laws : as ``effects``, before some of it is told of sets next to those of the sum; empty where none is
     """
 
     effects: Mapping[str, float]
     energies: Mapping[str, float]
     foreign: Mapping[str, float]
-    by_laws: Mapping[str, float] = field(default_factory=dict)
 
     def of_effect(self, *names: str) -> float:
         """Of an effect, or of several together, whatever else is at work."""
         return float(sum(p for key, p in self.effects.items() if set(names) <= set(key.split("+"))))
 
-    def in_all(self, *names: str) -> bool:
-        """True of effects that are together in all that is probable by the laws of the library: what is known even
-        where the whole set is not.
-        """
-        laws = self.by_laws or self.effects
-        together = sum(p for key, p in laws.items() if set(names) <= set(key.split("+")))
-        return together >= VERDICT.nearly_certain
-
     def nearly_certain(self) -> list[str]:
-        """Effects that are in all that is probable (`in_all`), by name."""
-        return [name for name in self.likely(0.0) if self.in_all(name)]
+        """Effects that are in all that is probable, by name: what is known even where the whole set is not."""
+        return self.likely(VERDICT.nearly_certain)
 
     def likely(self, least: float = 0.5) -> list[str]:
         """Effects whose probability is ``least`` or more, by name."""
@@ -119,12 +109,14 @@ class Total:
     ranking : every hypothesis, the most probable first
     probabilities : summed
     joint : by (set of effects, kind of what is foreign), the most probable first
+    by_laws : of sets of effects, before some of it is told of those next to them
     foreign : what was found of each kind beside the models where it was looked for, the most probable first
     """
 
     ranking: tuple[Judged, ...]
     probabilities: Probabilities
     joint: Mapping[tuple[str, str], float]
+    by_laws: Mapping[str, float]
     foreign: tuple[Foreign, ...]
 
 
@@ -207,9 +199,8 @@ def summed(grown: Grown) -> Total:
             of_set = q / joint[key] if q > 0 else 0.0
             judged.append(_judged(grown, c, of_set * both[key], worse[id(c)]))
     judged.sort(key=lambda j: -j.probability)
-    told_energies = _falling(BELIEFS.energies_flattened(energies))
-    marginal = Probabilities(_summed_out(both, 0), told_energies, _summed_out(both, 1), _summed_out(flat, 0))
-    return Total(tuple(judged), marginal, both, tuple(found))
+    marginal = Probabilities(_summed_out(both, 0), _falling(BELIEFS.energies_flattened(energies)), _summed_out(both, 1))
+    return Total(tuple(judged), marginal, both, _summed_out(flat, 0), tuple(found))
 
 
 def _worse(grown: Grown, c: Candidate) -> bool:

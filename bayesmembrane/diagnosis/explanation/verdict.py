@@ -98,7 +98,7 @@ def _falls(total: Total) -> list[Foreign]:
 def _unfitted_rivals(total: Total, given: Sequence[str]) -> list[frozenset[str]]:
     """Sets, the effects ``given`` among them, that were never fitted and share an answer with one set alone."""
     fitted = {set_name(j.candidate, given) for j in total.ranking}
-    told = _smallest(total.probabilities.by_laws)
+    told = _smallest(total.by_laws)
     rest = [name for name in told if name not in fitted]
     return [frozenset((*name.split("+"), *given)) for name in rest] if len(told) - len(rest) == 1 else []
 
@@ -139,8 +139,8 @@ def _told(total: Total, fitted: Collection[str]) -> list[str]:
 
     That one alone is left of several of which others were never fitted does not make it sure.
     """
-    p, laws = total.probabilities.effects, total.probabilities.by_laws
-    names, count = [name for name in p if name in fitted], sum(name in fitted for name in _smallest(laws))
+    p = total.probabilities.effects
+    names, count = [name for name in p if name in fitted], sum(name in fitted for name in _smallest(total.by_laws))
     if count <= 1 and names and p[names[0]] < VERDICT.sure:
         return [name for name in names[:2] if p[name] >= VERDICT.least_member]
     return names[: max(count, 1)]
@@ -149,7 +149,7 @@ def _told(total: Total, fitted: Collection[str]) -> list[str]:
 def _worth_telling(total: Total) -> bool:
     """True if an effect or none leads, or a few sets do by known laws, however many share the rest."""
     p, (few, together) = total.probabilities, VERDICT.few
-    first = sum(list(total.probabilities.by_laws.values())[:few])
+    first = sum(list(total.by_laws.values())[:few])
     return bool(p.likely(VERDICT.leads)) or p.effects.get(NOTHING, 0.0) >= VERDICT.leads or first >= together
 
 

@@ -50,8 +50,9 @@ def total(
     foreign = Foreign(SUDDEN, chosen[first], 30.0, size=0.1, place=5, share=takes)
     return Total(
         ranking,
-        Probabilities(sets, {"gent": 1.0}, dict(sorted(kinds.items(), key=lambda i: -i[1])), by_laws or sets),
+        Probabilities(sets, {"gent": 1.0}, dict(sorted(kinds.items(), key=lambda i: -i[1]))),
         dict(sorted(joint.items(), key=lambda i: -i[1])),
+        sets if by_laws is None else by_laws,
         (foreign,) if strange else (),
     )
 

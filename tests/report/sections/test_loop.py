@@ -119,8 +119,7 @@ def test_what_is_firm_of_an_ambiguous_answer_is_added_and_told(going_on: Loop) -
 
 def test_what_explains_no_more_than_what_is_left_is_told_apart_from_what_is_firm(going_on: Loop) -> None:
     d = going_on.rounds[0].diagnosis
-    sets = {"friction+mullins": 0.99, "friction": 0.01}
-    p = replace(d.probabilities, effects=sets, foreign={"none": 1.0}, by_laws=sets)
+    p = replace(d.probabilities, effects={"friction+mullins": 0.99, "friction": 0.01}, foreign={"none": 1.0})
     some = replace(d, verdict="unknown", effects=(), probabilities=p)
     apart = "which explains hardly more than what is left and may stand in for something else"
     start = "friction in the guide is at work in all that is probable, and so is Mullins softening"
