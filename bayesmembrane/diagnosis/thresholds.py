@@ -249,6 +249,8 @@ class SampledThresholds:
     last: Drawing = Drawing(enough=100.0, early=0, enough_later=100.0, most_rounds=40, share=0.03)
     """Of what then leads: two runs of one hypothesis of which few draws count are 0.4 apart in ln Z in the mean, and
     0.9 by the first ones; docs/studies/few_draws.md."""
+    vague: Drawing = Drawing(enough=60.0, early=2, enough_later=8.0, most_rounds=8, share=0.03)
+    """Instead of both, where what leads leaves more than noise."""
     freedom: float = 6.0
     """Of the t-distribution: tails that no posterior of this kind has more of."""
     kept: float = 0.1

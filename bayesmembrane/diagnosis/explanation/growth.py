@@ -18,6 +18,7 @@ from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pa
 from bayesmembrane.diagnosis.explanation.twins import swapped
 from bayesmembrane.diagnosis.explanation.unfitted import Key
 from bayesmembrane.diagnosis.explanation.visible import all_seen
+from bayesmembrane.diagnosis.left.remaining import over_noise
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED, SEARCH, TWINS
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
@@ -213,18 +214,20 @@ def weigh_by_draws(out: Grown) -> None:
     """Importance sampling of all that decides: of the null model, and of every hypothesis that has a share in the sum;
     more of it of those that lead then.
 
-    One that loses by it gives its share to others, which then are checked in their turn.
+    One that loses by it gives its share to others, which then are checked in their turn. Where what leads leaves more
+    than noise nothing will stand out (`BELIEFS.blurred`): fewer are checked then, and none with more draws.
     """
     out.case.tell("checking what decides by importance sampling")
     _to_the_end(out)
     null = (out.case.null.hypothesis.material.name, frozenset(out.case.null.names))
     seen = out.seen()
-    for drawing in (SAMPLED.first, SAMPLED.last):
+    drawings = (SAMPLED.vague,) if _leaves_structure(out, _shares(out, seen)) else (SAMPLED.first, SAMPLED.last)
+    for drawing in drawings:
         again = drawing is SAMPLED.last
         rest = dict.fromkeys(key for key, c in out.found.items() if again or not c.by_draws or key == null)
         for _ in range(SAMPLED.most):
             shares = _shares(out, seen)
-            first = drawing is SAMPLED.first and null in rest
+            first = not again and null in rest
             key = null if first else max(rest, key=shares.__getitem__, default=null)
             if key not in rest or not (first or shares[key] > np.log(drawing.share)):
                 break
@@ -232,6 +235,13 @@ def weigh_by_draws(out: Grown) -> None:
             if key not in out.ended:
                 _ended(out, [key])
             out.found[key] = checked(out.search, out.found[key], drawing)
+
+
+def _leaves_structure(out: Grown, shares: Mapping[Key, float]) -> bool:
+    """True if the hypothesis with the largest of the ``shares`` has effects and leaves more than noise all the same."""
+    first = out.found[max(shares, key=shares.__getitem__)]
+    dof = max(first.residual.size - first.x.size, 1)
+    return bool(_own(out, first)) and over_noise(out.search.squares(first) / dof, dof) >= BELIEFS.blurred
 
 
 def _to_the_end(out: Grown) -> None:

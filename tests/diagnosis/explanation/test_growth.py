@@ -10,6 +10,7 @@ import pytest
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
 from bayesmembrane.diagnosis.explanation import growth
+from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, Foreign
 from bayesmembrane.diagnosis.explanation.growth import (
@@ -24,7 +25,7 @@ from bayesmembrane.diagnosis.explanation.growth import (
     with_falls,
     with_sets,
 )
-from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED, SEARCH
+from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED, SEARCH, VERDICT
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
 
@@ -199,9 +200,12 @@ def test_a_tear_is_looked_for_where_the_force_is_seen_to_fall(
     assert [e.name for _, e in grew] == (["friction"] if better else [])
 
 
-def test_of_what_leads_more_draws_are_made_than_of_what_may_decide(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("structure", [False, True])
+def test_of_what_leads_more_draws_are_made_than_of_what_may_decide(
+    monkeypatch: pytest.MonkeyPatch, structure: bool
+) -> None:
     """The null model, all that has a share, and, with more draws, what leads by then; each is first searched for to its
-    end, and once.
+    end, and once. Beside what leaves structure only what leads is checked, and once.
     """
     ended: list[tuple[str, ...]] = []
 
@@ -218,7 +222,11 @@ def test_of_what_leads_more_draws_are_made_than_of_what_may_decide(monkeypatch: 
     )
     monkeypatch.setattr(Grown, "seen", lambda _: {})
     case = SimpleNamespace(null=candidate(claim(), 0.0), tell=lambda _: None)
-    search = SimpleNamespace(all_polished=all_polished)
+    over = 1.0 + BELIEFS.blurred + (0.01 if structure else -0.01)  # of what counts as noise, few points being left
+    points = candidate(claim("friction"), 0.0)
+    noise = 1.0 + VERDICT.chance * float(np.sqrt(2.0 / max(points.residual.size - points.x.size, 1)))
+    squares = over * max(VERDICT.noise_chi2, noise) * max(points.residual.size - points.x.size, 1)
+    search = SimpleNamespace(all_polished=all_polished, squares=lambda _: squares)
     grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
     for names in shares:
         grown.add(candidate(claim(*names), 0.0))
@@ -226,9 +234,11 @@ def test_of_what_leads_more_draws_are_made_than_of_what_may_decide(monkeypatch: 
     weigh_by_draws(grown)
     assert sorted(ended) == [(), ("friction",), ("mullins",), ("tearing",)]
     del drawn[len(drawn) // 2 :]
-    first, last = ([names for names, d in drawn if d is each] for each in (SAMPLED.first, SAMPLED.last))
-    assert first == [(), ("friction",), ("mullins",), ("tearing",)]
-    assert last == [("friction",), ("mullins",)]
+    kinds = (SAMPLED.first, SAMPLED.last, SAMPLED.vague)
+    first, last, vague = ([names for names, d in drawn if d is each] for each in kinds)
+    assert first == ([] if structure else [(), ("friction",), ("mullins",), ("tearing",)])
+    assert last == ([] if structure else [("friction",), ("mullins",)])
+    assert vague == ([(), ("friction",), ("mullins",)] if structure else [])
 
 
 def test_what_decides_is_searched_for_from_the_materials_of_others(monkeypatch: pytest.MonkeyPatch) -> None:
