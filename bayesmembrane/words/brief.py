@@ -12,7 +12,8 @@ import numpy as np
 from bayesmembrane.calibration.run import Run
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.explanation.foreign import Foreign
-from bayesmembrane.diagnosis.explanation.total import NOTHING, set_name
+from bayesmembrane.diagnosis.explanation.telling import NOTHING
+from bayesmembrane.diagnosis.explanation.total import set_name
 from bayesmembrane.diagnosis.left.shape import ResidualShape, residual_shape
 from bayesmembrane.diagnosis.loop import Loop, Stage
 from bayesmembrane.diagnosis.result import Diagnosis

@@ -11,7 +11,8 @@ import numpy as np
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.standard import expected_size
-from bayesmembrane.diagnosis.explanation.total import ANOTHER_LAW, NOTHING, UNLISTED, Judged, Probabilities, set_name
+from bayesmembrane.diagnosis.explanation.telling import ANOTHER_LAW, NOTHING, UNLISTED
+from bayesmembrane.diagnosis.explanation.total import Judged, Probabilities, set_name
 from bayesmembrane.diagnosis.left.heldout import HeldOut
 from bayesmembrane.diagnosis.left.shape import resolution_of
 from bayesmembrane.diagnosis.left.turning import at_a_turn

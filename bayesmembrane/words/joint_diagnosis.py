@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from bayesmembrane.diagnosis.explanation.total import NOTHING
+from bayesmembrane.diagnosis.explanation.telling import NOTHING
 from bayesmembrane.diagnosis.joint.diagnose import DiagnosedTest, JointDiagnosis, JointMember
 from bayesmembrane.diagnosis.thresholds import VERDICT, WORDS
 from bayesmembrane.ground.registry import components

@@ -18,7 +18,7 @@ from pathlib import Path
 from bayesmembrane.data.measurement import Measurement
 from bayesmembrane.diagnosis.diagnose import diagnose
 from bayesmembrane.diagnosis.explanation.case import Question
-from bayesmembrane.diagnosis.explanation.total import NOTHING
+from bayesmembrane.diagnosis.explanation.telling import NOTHING
 from bayesmembrane.ground.registry import ordinary_materials
 from bayesmembrane.physics.hypothesis import hypothesis
 from tests.studies.cycles_page import page

@@ -8,7 +8,8 @@ import pytest
 
 from bayesmembrane.data.measurement import Measurement, Specimen
 from bayesmembrane.diagnosis.candidates.candidate import Candidate
-from bayesmembrane.diagnosis.explanation.total import NOTHING, Probabilities
+from bayesmembrane.diagnosis.explanation.telling import NOTHING
+from bayesmembrane.diagnosis.explanation.total import Probabilities
 from bayesmembrane.diagnosis.left.shape import residual_shape
 from bayesmembrane.diagnosis.reference.noise import OwnNoise
 from bayesmembrane.diagnosis.result import Diagnosis, Thinned, thinning

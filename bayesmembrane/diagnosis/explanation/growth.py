@@ -18,7 +18,7 @@ from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pa
 from bayesmembrane.diagnosis.explanation.twins import swapped
 from bayesmembrane.diagnosis.explanation.unfitted import Key
 from bayesmembrane.diagnosis.explanation.visible import all_seen
-from bayesmembrane.diagnosis.left.remaining import over_noise
+from bayesmembrane.diagnosis.left.remaining import structure
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED, SEARCH, TWINS
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
@@ -240,8 +240,7 @@ def weigh_by_draws(out: Grown) -> None:
 def _leaves_structure(out: Grown, shares: Mapping[Key, float]) -> bool:
     """True if the hypothesis with the largest of the ``shares`` has effects and leaves more than noise all the same."""
     first = out.found[max(shares, key=shares.__getitem__)]
-    dof = max(first.residual.size - first.x.size, 1)
-    return bool(_own(out, first)) and over_noise(out.search.squares(first) / dof, dof) >= BELIEFS.blurred
+    return bool(_own(out, first)) and structure(out.search, first) >= BELIEFS.blurred
 
 
 def _to_the_end(out: Grown) -> None:

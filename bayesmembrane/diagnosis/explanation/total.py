@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
@@ -14,24 +13,17 @@ from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import Grown, key_of
-from bayesmembrane.diagnosis.explanation.neighbours import NEGLIGIBLE, spread
+from bayesmembrane.diagnosis.explanation.neighbours import NEGLIGIBLE
 from bayesmembrane.diagnosis.explanation.promise import promised
+from bayesmembrane.diagnosis.explanation.telling import ANOTHER_LAW, NOTHING, UNLISTED, falling, joined, told
 from bayesmembrane.diagnosis.explanation.twins import Stands, levelled
 from bayesmembrane.diagnosis.explanation.unfitted import Key, unfitted
-from bayesmembrane.diagnosis.left.remaining import over_noise
+from bayesmembrane.diagnosis.left.remaining import structure
 from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, TWINS, VERDICT
 from bayesmembrane.ground.parameters import Array
 
-Named = TypeVar("Named")
-
-NOTHING = "none"
-"""No effect; nothing foreign."""
 OF_A_FALL = 3
 """Parameters: how far the force falls, when, and how soon."""
-ANOTHER_LAW = "another_law"
-"""A kind of what is foreign: what no law, or no energy, of the library follows."""
-UNLISTED = "unlisted"
-"""A kind of what is foreign: a fault of no known kind, or one that was not seen, which effects follow instead."""
 CONCLUDED = (ANOTHER_LAW, UNLISTED)
 """Kinds that nothing in the curve shows by itself."""
 
@@ -122,7 +114,7 @@ class Total:
 
 def set_name(candidate: Candidate, given: Sequence[str]) -> str:
     """The effects of a candidate beyond those given, in alphabetical order, joined by "+"."""
-    return _joined(frozenset(candidate.names) - set(given))
+    return joined(frozenset(candidate.names) - set(given))
 
 
 def carried(candidate: Candidate, given: Sequence[str]) -> bool:
@@ -138,41 +130,23 @@ def summed(grown: Grown) -> Total:
 
     Of what holds only with laws or an energy that are far off, most is told to be something foreign.
     """
-    case = grown.case
-    given = case.null.names
-    every, counts = list(grown.found.values()), grown.counts
-    weights, seen = grown.weights(), grown.seen()
-
-    def own(c: Candidate) -> float:
-        return weights[key_of(c)] + seen[key_of(c)]
-
+    case, given = grown.case, grown.case.null.names
+    seen = grown.seen()
     others = _other_energies(grown, seen)
-    raised = _raised(grown, {id(c): own(c) for c in every}, others)
-
-    def weight(c: Candidate) -> float:
-        return own(c) + raised[frozenset(c.names)]
-
-    every.sort(key=weight, reverse=True)
+    weights = _Weights.of(grown, seen, others)
+    every = sorted(grown.found.values(), key=weights, reverse=True)
     found = _foreign(grown, every, given)
+    shown = [f for f in found if f.counted(grown.counts) > BELIEFS.supported]  # what the data speak for
     kinds = kinds_of(found)
     nothing = BELIEFS.log_foreign(0) if kinds else 0.0
-    # What the data do not speak for is neither seen nor excluded.
-    told = [f for f in found if f.counted(counts) > BELIEFS.supported]
-    strange = [own(f.base) - counts * _undone(f) + f.counted(counts) + BELIEFS.log_foreign(kinds) for f in told]
-    tears = [_tears(f, every, grown.search) for f in told]
-    least = [_like_a_tear(f, some, weight, grown.search) for f, some in zip(told, tears, strict=True)]
-    for w, some in zip(strange, tears, strict=True):
-        for names in {frozenset(c.names) for c in some}:
-            # Of the set, whatever its energy: of one that tears worse in this energy another one may be ahead.
-            best = max(weight(c) for c in every if frozenset(c.names) == names)
-            raised[names] += max(w - float(np.log(BELIEFS.apart)) - best - nothing, 0.0)
-    every.sort(key=weight, reverse=True)
-    terms = [(c, NOTHING, weight(c) + nothing) for c in every]
-    terms += [(f.base, f.key, max(w, low)) for f, w, low in zip(told, strange, least, strict=True)]
-    guessed = [(key, w + raised[key[1]] + nothing) for key, w in others.items()]
+    strange = _beside_tears(grown, every, weights, shown, (BELIEFS.log_foreign(kinds), nothing))
+    every.sort(key=weights, reverse=True)
+    terms = [(c, NOTHING, weights(c) + nothing) for c in every]
+    terms += [(f.base, f.key, w) for f, w in zip(shown, strange, strict=True)]
+    guessed = [(key, w + weights.raised[key[1]] + nothing) for key, w in others.items()]
     p = _normalised(np.array([*(w for _, _, w in terms), *(w for _, w in guessed)]))
     parts = [(c.hypothesis.material.name, set_name(c, given), kind) for c, kind, _ in terms]
-    parts += [(energy, _joined(names - set(given)), NOTHING) for (energy, names), _ in guessed]
+    parts += [(energy, joined(names - set(given)), NOTHING) for (energy, names), _ in guessed]
     joint, energies = defaultdict[tuple[str, str], float](float), defaultdict[str, float](float)
     for (energy, name, kind), q in zip(parts, p.tolist(), strict=True):
         joint[name, kind] += q
@@ -188,10 +162,8 @@ def summed(grown: Grown) -> Total:
             joint[name, NOTHING] -= moved
             joint[name, ANOTHER_LAW] += moved
             p[i] -= moved
-    vague = _vague(grown, every, told, joint)
-    flat = _flattened(joint, vague)
-    near = _with_neighbours(flat, [e.name for e in case.visible if e.name not in given], vague)
-    both = _with_unlisted(near, vague.get(NOTHING, 0.0))
+    vague = _vague(grown, every, shown, joint)
+    flat, both = told(joint, [e.name for e in case.visible if e.name not in given], vague)
     judged = []
     for (c, kind, _), q in zip(terms, p[: len(terms)].tolist(), strict=True):
         if kind == NOTHING:
@@ -199,8 +171,47 @@ def summed(grown: Grown) -> Total:
             of_set = q / joint[key] if q > 0 else 0.0
             judged.append(_judged(grown, c, of_set * both[key], worse[id(c)]))
     judged.sort(key=lambda j: -j.probability)
-    marginal = Probabilities(_summed_out(both, 0), _falling(BELIEFS.energies_flattened(energies)), _summed_out(both, 1))
+    marginal = Probabilities(_summed_out(both, 0), falling(BELIEFS.energies_flattened(energies)), _summed_out(both, 1))
     return Total(tuple(judged), marginal, both, _summed_out(flat, 0), tuple(found))
+
+
+@dataclass(frozen=True, eq=False)
+class _Weights:
+    """ln of the weight of a candidate in the sum: its ``own``, and by what its set of effects is ``raised``."""
+
+    own: Mapping[Key, float]
+    raised: dict[frozenset[str], float]
+
+    @classmethod
+    def of(cls, grown: Grown, seen: Mapping[Key, float], others: Mapping[Key, float]) -> _Weights:
+        """Of all that was grown, with what was ``seen`` of its effects; ``others``: ln weights of what was not."""
+        own = {key: w + seen[key] for key, w in grown.weights().items()}
+        return cls(own, _raised(grown, own, others))
+
+    def __call__(self, c: Candidate) -> float:
+        return self.own[key_of(c)] + self.raised[frozenset(c.names)]
+
+
+def _beside_tears(
+    grown: Grown,
+    every: Sequence[Candidate],
+    weights: _Weights,
+    shown: Sequence[Foreign],
+    log_prior: tuple[float, float],
+) -> list[float]:
+    """ln of the weight of what is foreign and ``shown``, no less than what leaves the same trace allows; and sets are
+    raised in ``weights`` by what it has that a tear of theirs leaves, too. ``log_prior``: of a kind, and of none.
+    """
+    counts, (of_kind, of_none) = grown.counts, log_prior
+    strange = [weights.own[key_of(f.base)] - counts * _undone(f) + f.counted(counts) + of_kind for f in shown]
+    tears = [_tears(f, every, grown.search) for f in shown]
+    least = [_like_a_tear(f, some, weights, grown.search) for f, some in zip(shown, tears, strict=True)]
+    for w, some in zip(strange, tears, strict=True):
+        for names in {frozenset(c.names) for c in some}:
+            # Of the set, whatever its energy: of one that tears worse in this energy another one may be ahead.
+            best = max(weights(c) for c in every if frozenset(c.names) == names)
+            weights.raised[names] += max(w - float(np.log(BELIEFS.apart)) - best - of_none, 0.0)
+    return [max(w, low) for w, low in zip(strange, least, strict=True)]
 
 
 def _worse(grown: Grown, c: Candidate) -> bool:
@@ -224,7 +235,7 @@ def _described(grown: Grown, c: Candidate, given: Sequence[str]) -> bool:
 
 
 def _vague(
-    grown: Grown, every: Sequence[Candidate], told: Sequence[Foreign], joint: Mapping[tuple[str, str], float]
+    grown: Grown, every: Sequence[Candidate], shown: Sequence[Foreign], joint: Mapping[tuple[str, str], float]
 ) -> dict[str, float]:
     """From 0 to 1, by kind of what is foreign, how far the most probable set of effects beside it leaves more than
     noise (`BELIEFS.blurred`): whatever is behind the curve, laws of the library do not follow it.
@@ -233,66 +244,13 @@ def _vague(
     for kind in {kind for _, kind in joint}:
         first = max((name for name, k in joint if k == kind), key=lambda name: joint[name, kind])
         if kind == NOTHING:
-            fits = [(c, search.squares(c)) for c in every if set_name(c, given) == first]
+            left = [structure(search, c) for c in every if set_name(c, given) == first]
         else:
-            same = (f for f in told if f.key == kind and set_name(f.base, given) == first)
-            fits = [(f.base, search.squares(f.base, f.trace)) for f in same]
-        if first != NOTHING and fits:
-            dof = [max(c.residual.size - c.x.size, 1) for c, _ in fits]
-            over = min(over_noise(squares / n, n) for (_, squares), n in zip(fits, dof, strict=True))
-            out[kind] = min(max(over / BELIEFS.blurred, 0.0), 1.0)
+            same = (f for f in shown if f.key == kind and set_name(f.base, given) == first)
+            left = [structure(search, f.base, f.trace) for f in same]
+        if first != NOTHING and left:
+            out[kind] = min(max(min(left) / BELIEFS.blurred, 0.0), 1.0)
     return out
-
-
-def _flattened(joint: Mapping[tuple[str, str], float], vague: Mapping[str, float]) -> dict[tuple[str, str], float]:
-    """`Beliefs.flattened` over the sets of effects beside each kind of what is foreign; together one, and falling.
-    As far as a kind is ``vague`` none stands out beside it.
-
-    No effect keeps what it has, for it is of laws that too much is said: of a hundred sets that are next to nothing
-    each, flattened with it, all together would come to more than it.
-    """
-    kinds, out = defaultdict[str, dict[str, float]](dict), dict[tuple[str, str], float]()
-    for (name, kind), q in joint.items():
-        if name == NOTHING:
-            out[name, kind] = q
-        else:
-            kinds[kind][name] = q
-    for kind, sets in kinds.items():
-        by_known_laws = 0.0 if kind == ANOTHER_LAW else 1.0 - vague.get(kind, 0.0)
-        out |= {(name, kind): q for name, q in BELIEFS.flattened(sets, by_known_laws).items()}
-    whole = sum(joint.values())
-    return _falling({key: q / whole for key, q in out.items()})
-
-
-def _with_neighbours(
-    joint: Mapping[tuple[str, str], float], visible: Sequence[str], vague: Mapping[str, float]
-) -> dict[tuple[str, str], float]:
-    """With a part of what sets have beside each kind of what is foreign told of those next to them, as far as none
-    stands out by known laws; a larger one as far as a kind is ``vague``.
-    """
-    kinds, out = defaultdict[str, dict[frozenset[str], float]](dict), dict[tuple[str, str], float]()
-    for (name, kind), q in joint.items():
-        kinds[kind][frozenset() if name == NOTHING else frozenset(name.split("+"))] = q
-    for kind, sets in kinds.items():
-        doubted, degree = BELIEFS.elsewhere * (1 - BELIEFS.standing_out(sets.values())), vague.get(kind, 0.0)
-        doubted += degree * (BELIEFS.elsewhere_beside_structure - doubted)
-        share = BELIEFS.elsewhere_by_another_law if kind == ANOTHER_LAW else doubted
-        near = spread(sets, visible, BELIEFS.most, share, BELIEFS.farther)
-        out |= {(_joined(names), kind): q for names, q in near.items()}
-    return _falling(out)
-
-
-def _with_unlisted(joint: Mapping[tuple[str, str], float], vague: float) -> dict[tuple[str, str], float]:
-    """With a part of what effects have, and nothing foreign, told of `UNLISTED` beside them, as far as no set stands
-    out; a larger one as far as they are ``vague``.
-    """
-    known = {name: q for (name, kind), q in joint.items() if kind == NOTHING}
-    share = BELIEFS.unlisted + vague * (BELIEFS.unlisted_beside_structure - BELIEFS.unlisted)
-    part = share * (1 - BELIEFS.standing_out(known.values()))
-    moved = {(name, UNLISTED): part * q for name, q in known.items() if name != NOTHING and part * q > 0}
-    return _falling(
-        {(n, k): q - moved.get((n, UNLISTED), 0.0) if k == NOTHING else q for (n, k), q in joint.items()} | moved
-    )
 
 
 def _like_a_tear(
@@ -351,7 +309,7 @@ def _untried(grown: Grown, every: Sequence[Candidate], joint: Mapping[tuple[str,
             gain = min(promised(grown.search, base, e, grown.counts), BELIEFS.supported)
             q = BELIEFS.untried * joint[own, NOTHING] * float(np.exp(prior + gain))
             if q > 0:
-                name = _joined(names - given)
+                name = joined(names - given)
                 out[name] = max(out[name], q)
     return out
 
@@ -376,18 +334,18 @@ def _other_energies(grown: Grown, seen: Mapping[Key, float]) -> dict[Key, float]
     }
 
 
-def _raised(grown: Grown, weights: Mapping[int, float], others: Mapping[Key, float]) -> dict[frozenset[str], float]:
+def _raised(grown: Grown, weights: Mapping[Key, float], others: Mapping[Key, float]) -> dict[frozenset[str], float]:
     """By set of effects, by how much its ln weight rises where twins of it have more than they can be sure of.
 
-    ``weights`` : ln weight by the identity of a candidate; ``others`` : of what was not fitted.
+    ``weights`` : ln weight of what was fitted; ``others`` : of what was not.
     """
     before = max(grown.search.excess(_null(grown)), 1e-300)
     total, stands = {}, {}
     for names in {names for _, names in grown.found}:
         same = [c for (_, own), c in grown.found.items() if own == names]
         rest = [w for (_, own), w in others.items() if own == names]
-        total[names] = float(np.logaddexp.reduce([*(weights[id(c)] for c in same), *rest]))
-        best = max(same, key=lambda c: weights[id(c)])
+        total[names] = float(np.logaddexp.reduce([*(weights[key_of(c)] for c in same), *rest]))
+        best = max(same, key=lambda c: weights[key_of(c)])
         left = grown.search.excess(best) / before
         stands[names] = Stands(left, best.log_evidence, _plausible(best, grown.search))
     return levelled(total, stands, grown.case.twins())
@@ -426,20 +384,12 @@ def _normalised(log_weights: Array) -> Array:
     return np.asarray(p / np.sum(p))
 
 
-def _falling(p: Mapping[Named, float]) -> dict[Named, float]:
-    return dict(sorted(p.items(), key=lambda i: -i[1]))
-
-
 def _summed_out(joint: Mapping[tuple[str, str], float], kept: int) -> dict[str, float]:
     """The probabilities of one part of a pair, summed over the other."""
     out = defaultdict[str, float](float)
     for key, q in joint.items():
         out[key[kept]] += q
-    return _falling(out)
-
-
-def _joined(names: frozenset[str]) -> str:
-    return "+".join(sorted(names)) or NOTHING
+    return falling(out)
 
 
 def _judged(grown: Grown, c: Candidate, probability: float, worse: bool) -> Judged:

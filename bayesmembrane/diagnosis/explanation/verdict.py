@@ -13,16 +13,8 @@ from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
 from bayesmembrane.diagnosis.explanation.growth import grown, with_falls, with_sets
 from bayesmembrane.diagnosis.explanation.promise import promised
-from bayesmembrane.diagnosis.explanation.total import (
-    ANOTHER_LAW,
-    CONCLUDED,
-    NOTHING,
-    Judged,
-    Probabilities,
-    Total,
-    set_name,
-    summed,
-)
+from bayesmembrane.diagnosis.explanation.telling import ANOTHER_LAW, NOTHING
+from bayesmembrane.diagnosis.explanation.total import CONCLUDED, Judged, Probabilities, Total, set_name, summed
 from bayesmembrane.diagnosis.thresholds import GROWTH, VERDICT
 
 

@@ -13,7 +13,8 @@ from bayesmembrane.diagnosis.detection.detect import Detection
 from bayesmembrane.diagnosis.detection.scores import confounded
 from bayesmembrane.diagnosis.explanation.case import Question, Tell, opened
 from bayesmembrane.diagnosis.explanation.foreign import Foreign
-from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities
+from bayesmembrane.diagnosis.explanation.telling import NOTHING
+from bayesmembrane.diagnosis.explanation.total import Judged, Probabilities
 from bayesmembrane.diagnosis.explanation.verdict import Verdict, adequate, explained, undoubted
 from bayesmembrane.diagnosis.joint.case import JointCase, opened_jointly
 from bayesmembrane.diagnosis.joint.search import JointSearch

@@ -60,6 +60,12 @@ def over_noise(reduced_chi2: float, dof: int) -> float:
     return reduced_chi2 / max(VERDICT.noise_chi2, 1.0 + VERDICT.chance * float(np.sqrt(2.0 / dof))) - 1.0
 
 
+def structure(search: Weighing, model: Candidate, trace: Array | None = None) -> float:
+    """`over_noise` of what ``model`` leaves at its best, or that and the ``trace`` (N,) N of something foreign."""
+    dof = max(model.residual.size - model.x.size, 1)
+    return over_noise(search.squares(model, trace) / dof, dof)
+
+
 def remaining(search: Weighing, model: Candidate, plain: Candidate) -> Remaining:
     """What ``model`` leaves, beside what the ``plain`` one does; both as they were fitted, with their form error."""
     dof = max(model.residual.size - model.x.size, 1)

@@ -226,7 +226,7 @@ def test_of_what_leads_more_draws_are_made_than_of_what_may_decide(
     points = candidate(claim("friction"), 0.0)
     noise = 1.0 + VERDICT.chance * float(np.sqrt(2.0 / max(points.residual.size - points.x.size, 1)))
     squares = over * max(VERDICT.noise_chi2, noise) * max(points.residual.size - points.x.size, 1)
-    search = SimpleNamespace(all_polished=all_polished, squares=lambda _: squares)
+    search = SimpleNamespace(all_polished=all_polished, squares=lambda *_: squares)
     grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
     for names in shares:
         grown.add(candidate(claim(*names), 0.0))

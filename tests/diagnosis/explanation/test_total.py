@@ -10,13 +10,13 @@ import pytest
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
-from bayesmembrane.diagnosis.explanation import total
+from bayesmembrane.diagnosis.explanation import telling, total
 from bayesmembrane.diagnosis.explanation import visible as visible_module
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS, Beliefs
 from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.explanation.foreign import LOST, SUDDEN, UNNAMED, Foreign
 from bayesmembrane.diagnosis.explanation.growth import Grown
-from bayesmembrane.diagnosis.explanation.total import ANOTHER_LAW, NOTHING, UNLISTED
+from bayesmembrane.diagnosis.explanation.telling import ANOTHER_LAW, NOTHING, UNLISTED
 from bayesmembrane.diagnosis.thresholds import TWINS
 from bayesmembrane.ground.registry import components
 from bayesmembrane.physics.effects.base import Effect
@@ -62,7 +62,8 @@ def summed_up(
     ``elsewhere`` : told of sets that are next to those of the sum; ``unlisted`` : of a fault of no known kind;
     ``left`` : squares that each model leaves.
     """
-    monkeypatch.setattr(total, "BELIEFS", told(flatter, elsewhere, unlisted))
+    for module in (total, telling):
+        monkeypatch.setattr(module, "BELIEFS", told(flatter, elsewhere, unlisted))
     takes = {
         frozenset({"friction"}): {"friction": LEFT - 20.0},
         frozenset({"friction", "mullins"}): {"mullins": 3.0},
@@ -165,16 +166,6 @@ def test_sets_are_told_flattened_and_what_is_foreign_is_not(monkeypatch: pytest.
     assert [j.probability for j in flat.ranking] == sorted((j.probability for j in flat.ranking), reverse=True)
 
 
-def test_no_effect_keeps_what_it_has_where_sets_are_flattened() -> None:
-    """A hundred sets that are next to nothing each would else come to more than it."""
-    sets = {"friction": 0.2, **{f"set {i}": 0.003 for i in range(100)}}
-    flat = total._flattened({(NOTHING, NOTHING): 0.5, **{(name, NOTHING): p for name, p in sets.items()}}, {})
-    assert flat[NOTHING, NOTHING] == pytest.approx(0.5)
-    assert {name: p for (name, _), p in flat.items() if name != NOTHING} == pytest.approx(BELIEFS.flattened(sets))
-    assert flat["friction", NOTHING] < 0.1
-    assert list(flat.values()) == sorted(flat.values(), reverse=True)
-
-
 def test_no_set_stands_out_that_leaves_more_than_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     """Next to all by known laws, and no law of the library follows the curve."""
     said = {
@@ -248,7 +239,8 @@ def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_li
 ) -> None:
     """Nor more, for being ``ahead`` with another energy than that beside which it was compared."""
     by_likelihood_alone(monkeypatch)
-    monkeypatch.setattr(total, "BELIEFS", told())
+    for module in (total, telling):
+        monkeypatch.setattr(module, "BELIEFS", told())
     base = candidate("friction", log_evidence=-60.0)
     torn = candidate("friction", "tearing", log_evidence=-60.0)
     other = candidate("friction", "tearing", log_evidence=-60.0 + ahead, energy="yeoh")
@@ -297,7 +289,8 @@ def test_a_set_is_not_less_probable_for_having_been_fitted_with_one_energy(monke
     # Energies are told flatter than they are summed, whether one stands out or not.
     grown.add(candidate("friction", log_evidence=-7.0, energy="gent"))
     told = total.summed(grown).probabilities
-    monkeypatch.setattr(total, "BELIEFS", replace(BELIEFS, energies_flatter=1.0))
+    for module in (total, telling):
+        monkeypatch.setattr(module, "BELIEFS", replace(BELIEFS, energies_flatter=1.0))
     summed = total.summed(grown).probabilities
     assert summed.energies["gent"] > 1.2 * summed.energies["yeoh"]
     assert told.energies == pytest.approx(BELIEFS.energies_flattened(summed.energies))
@@ -419,7 +412,8 @@ def test_a_set_that_leaves_more_than_no_effect_does_is_mostly_something_foreign(
 ) -> None:
     """It is errors of its laws that explain the curve, then: they are parts of traces larger than the misfit."""
     by_likelihood_alone(monkeypatch)
-    monkeypatch.setattr(total, "BELIEFS", told())
+    for module in (total, telling):
+        monkeypatch.setattr(module, "BELIEFS", told())
     slid = candidate("friction", log_evidence=-20.0)
     case = SimpleNamespace(
         null=candidate(log_evidence=-90.0),

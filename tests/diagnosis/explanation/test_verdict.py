@@ -12,7 +12,8 @@ from bayesmembrane.diagnosis.explanation import verdict as verdicts
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, Foreign
-from bayesmembrane.diagnosis.explanation.total import NOTHING, Judged, Probabilities, Total
+from bayesmembrane.diagnosis.explanation.telling import NOTHING
+from bayesmembrane.diagnosis.explanation.total import Judged, Probabilities, Total
 from bayesmembrane.diagnosis.explanation.verdict import decided
 from bayesmembrane.diagnosis.thresholds import VERDICT
 from bayesmembrane.ground.registry import components
