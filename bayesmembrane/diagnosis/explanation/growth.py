@@ -3,119 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects, without_effect
-from bayesmembrane.diagnosis.candidates.sampled import checked
-from bayesmembrane.diagnosis.candidates.weighing import Sought, Weighing, starts_with
+from bayesmembrane.diagnosis.candidates.weighing import Sought, starts_with
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
+from bayesmembrane.diagnosis.explanation.checking import weigh_by_draws
 from bayesmembrane.diagnosis.explanation.events import with_second_events
-from bayesmembrane.diagnosis.explanation.foreign import Foreign
+from bayesmembrane.diagnosis.explanation.grown import Grown, key_of
 from bayesmembrane.diagnosis.explanation.promise import first_order, gains_of_pairs
 from bayesmembrane.diagnosis.explanation.twins import swapped
 from bayesmembrane.diagnosis.explanation.unfitted import Key
-from bayesmembrane.diagnosis.explanation.visible import all_seen
-from bayesmembrane.diagnosis.left.remaining import structure
-from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED, SEARCH, TWINS
+from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED, TWINS
 from bayesmembrane.ground.parameters import Array
 from bayesmembrane.physics.effects.base import Effect
 from bayesmembrane.physics.hypothesis import Hypothesis
-
-
-@dataclass(eq=False)
-class Grown:
-    """Every hypothesis that was fitted, by energy and effects; the search under whose noise they were weighed.
-
-    starts : by energy, draws of its prior brought to their best modulus
-    followed : sets of effects that larger ones were grown from
-    ended : hypotheses that were searched on until nothing was gained, and not found anew since
-    limited : True where a load cell at its limit, beside an energy without effects, leaves nothing to be explained
-    """
-
-    case: DiagnosisCase
-    search: Weighing
-    found: dict[Key, Candidate] = field(default_factory=dict)
-    starts: dict[str, list[Array]] = field(default_factory=dict)
-    followed: set[frozenset[str]] = field(default_factory=set)
-    ended: set[Key] = field(default_factory=set)
-    limited: bool = False
-
-    def add(self, candidate: Candidate | None) -> None:
-        """Keep the better of two fits of one hypothesis."""
-        if candidate is None:
-            return
-        key = key_of(candidate)
-        if key not in self.found or candidate.log_evidence > self.found[key].log_evidence:
-            self.found[key] = candidate
-            self.ended.discard(key)
-
-    @property
-    def best(self) -> Candidate:
-        """The most probable by the data alone."""
-        return max(self.found.values(), key=lambda c: c.log_evidence)
-
-    @property
-    def counts(self) -> float:
-        """What part of every likelihood counts, with the gain of the best so far."""
-        best = max(c.log_evidence for c in self.found.values())
-        return BELIEFS.counts(best - self.of_size(0)[0].log_evidence)
-
-    def believed(self, candidate: Candidate, energy: str | None = None) -> float:
-        """ln of the probability of a hypothesis before the data; with another ``energy`` if that is given."""
-        own = [e.odds for e in candidate.hypothesis.effects if e.name not in self.case.null.names]
-        of_set = BELIEFS.log_set(own, [e.odds for e in self.case.visible])
-        of = energy or candidate.hypothesis.material.name
-        return of_set + BELIEFS.log_energy(of, self.case.question.energy, len(self.case.plain))
-
-    def log_tempered(self) -> dict[Key, float]:
-        """ln Z of each as far as likelihoods count (`Weighing.log_tempered`)."""
-        counts, best = self.counts, self.best
-        first = self.search.log_tempered(best, counts)
-        out = {key: first + counts * (c.log_evidence - best.log_evidence) for key, c in self.found.items()}
-        near = {key: c for key, c in self.found.items() if first - out[key] < GROWTH.share_reach}
-        return out | {key: self.search.log_tempered(c, counts) for key, c in near.items()}
-
-    def weights(self) -> dict[Key, float]:
-        """ln of the weight of each in the sum, but for what `seen` adds."""
-        return {key: z + self.believed(self.found[key]) for key, z in self.log_tempered().items()}
-
-    def seen(self) -> dict[Key, float]:
-        """What the weight of each gains where effects below what can be seen count as absent."""
-        return all_seen(self.search, self.found, self.weights(), self.case.null.names, self.counts)
-
-    def of_size(self, size: int) -> list[Candidate]:
-        """Those with so many effects beyond the given ones, the most probable first."""
-        given = len(self.case.null.names)
-        return sorted(
-            (c for (_, names), c in self.found.items() if len(names) - given == size), key=lambda c: -c.log_evidence
-        )
-
-    def best_of_each_set(self, size: int) -> list[Candidate]:
-        """Of every set of so many effects the most probable energy; the most probable set first."""
-        best: dict[frozenset[str], Candidate] = {}
-        for c in self.of_size(size):
-            best.setdefault(frozenset(c.names), c)
-        return list(best.values())
-
-    def polish(self, size: int) -> None:
-        """The best of each set of this size searched on with its own form error: all that may matter."""
-        every = self.best_of_each_set(size)[: GROWTH.polished]
-        near = [c for c in every if every[0].log_evidence - c.log_evidence < GROWTH.polish_reach]
-        self.found |= {key_of(c): c for c in self.search.all_polished(near)}
-
-    def renew(self) -> None:
-        """Noise from the best candidate, and all of them weighed under it."""
-        best = self.best
-        self.search = self.case.renewed(self.search, best)
-        self.found = {key: self.search.weighed_anew(c) for key, c in self.found.items()}
-
-
-def key_of(candidate: Candidate) -> Key:
-    """Its energy, and all its effects."""
-    return candidate.hypothesis.material.name, frozenset(candidate.names)
 
 
 def grown(case: DiagnosisCase) -> Grown:
@@ -140,131 +45,12 @@ def grown(case: DiagnosisCase) -> Grown:
     return out
 
 
-def with_sets(out: Grown, sets: Sequence[frozenset[str]]) -> None:
-    """Sets that promised nothing, from each of their parts; searched on and checked as what grew."""
-    before = out.best
-    _kept(out, _fitted(out, [step for names in sets for step in _last_steps(out, names)]))
-    _settle(out, before)
-
-
-def with_falls(out: Grown, falls: Sequence[Foreign]) -> bool:
-    """Effects that begin at some moment, or do so again, from those at which the force falls beside a set; True if any
-    got better.
-
-    One is found from nearby only, and a search for a fall looks at every reading. What is best by that is grown from
-    once more, and says what noise is.
-    """
-    sought = []
-    for f in (f for f in falls if len(_own(out, f.base)) < _most(out)):
-        for effect in out.case.visible:
-            shapes = effect.come_at(f.on_clock)
-            if shapes and effect.name not in f.base.names and f.shares_test_with(effect):
-                starts = starts_with([f.base.x], effect, out.search.expected_sizes(effect), shapes)
-                sought.append(Sought(with_effects(f.base.hypothesis, [effect]), starts, f.base))
-    sought += [s for f in falls if (s := _begun_again(f)) is not None]
-    before, better = out.best, _kept(out, [c for c in out.search.fits(sought) if c is not None])
-    first = max(better, key=lambda c: c.log_evidence, default=None)
-    if first is not None and len(_own(out, first)) < _most(out):
-        rest = [e for e in out.case.visible if e.name not in first.names]
-        rest.sort(key=lambda e: -first_order(out.search, first, e))
-        _kept(out, _fitted(out, [(first, e) for e in rest[: GROWTH.refits]]))
-    if better:
-        _settle(out, before)
-    return bool(better)
-
-
-def _settle(out: Grown, before: Candidate) -> None:
-    """After what was found late: noise from what leads now, if that is not what led ``before``, and draws of what
-    decides.
-    """
-    if out.best is not before:
-        out.renew()
-    weigh_by_draws(out)
-
-
-def _begun_again(f: Foreign) -> Sought | None:
-    """The base of a fall with a second event of one of its effects at that moment; None if none begins so, or all have
-    one.
-    """
-    names, x = list(f.base.hypothesis.names), f.base.x.copy()
-    for e in f.base.hypothesis.effects:
-        if e.second is not None and e.begins == e.second[1] and f.shares_test_with(e):
-            part, _, place = (names.index(f"{e.name}.{own}") for own in e.second)
-            if x[part] < GROWTH.no_event:
-                x[part], x[place] = GROWTH.second_part, f.on_clock
-                return Sought(f.base.hypothesis, [x], f.base)
-    return None
-
-
-def _kept(out: Grown, fits: Sequence[Candidate]) -> list[Candidate]:
-    """Those that are better than what is known of their hypotheses, searched on and checked.
-
-    What is known may have been checked: linear evidences are compared, for only those are of one kind.
-    """
-    better = []
-    for c in out.search.all_polished(fits):
-        known = out.found.get(key_of(c))
-        if known is None or c.log_evidence > known.log_evidence - known.by_draws:
-            out.found[key_of(c)] = checked(out.search, c)
-            better.append(out.found[key_of(c)])
-    return better
-
-
-def weigh_by_draws(out: Grown) -> None:
-    """Importance sampling of all that decides: of the null model, and of every hypothesis that has a share in the sum;
-    more of it of those that lead then.
-
-    One that loses by it gives its share to others, which then are checked in their turn. Where what leads leaves more
-    than noise nothing will stand out (`BELIEFS.blurred`): fewer are checked then, and none with more draws.
-    """
-    out.case.tell("checking what decides by importance sampling")
-    _to_the_end(out)
-    null = (out.case.null.hypothesis.material.name, frozenset(out.case.null.names))
-    seen = out.seen()
-    drawings = (SAMPLED.vague,) if _leaves_structure(out, _shares(out, seen)) else (SAMPLED.first, SAMPLED.last)
-    for drawing in drawings:
-        again = drawing is SAMPLED.last
-        rest = dict.fromkeys(key for key, c in out.found.items() if again or not c.by_draws or key == null)
-        for _ in range(SAMPLED.most):
-            shares = _shares(out, seen)
-            first = not again and null in rest
-            key = null if first else max(rest, key=shares.__getitem__, default=null)
-            if key not in rest or not (first or shares[key] > np.log(drawing.share)):
-                break
-            del rest[key]
-            if key not in out.ended:
-                _ended(out, [key])
-            out.found[key] = checked(out.search, out.found[key], drawing)
-
-
-def _leaves_structure(out: Grown, shares: Mapping[Key, float]) -> bool:
-    """True if the hypothesis with the largest of the ``shares`` has effects and leaves more than noise all the same."""
-    first = out.found[max(shares, key=shares.__getitem__)]
-    return bool(_own(out, first)) and structure(out.search, first) >= BELIEFS.blurred
-
-
-def _to_the_end(out: Grown) -> None:
-    """What has a share in the sum searched on until nothing is gained, if it was not: a linear model says how probable
-    a set is from beside its end, but draws are made about where the search was.
-    """
-    shares = _shares(out, out.seen())
-    order = sorted((k for k, s in shares.items() if s > np.log(SAMPLED.first.share)), key=lambda k: -shares[k])
-    _ended(out, [k for k in order if k not in out.ended][: GROWTH.to_the_end])
-
-
-def _ended(out: Grown, keys: Sequence[Key]) -> None:
-    """These hypotheses searched on until nothing is gained, and noted as such."""
-    for key, c in zip(keys, out.search.all_polished([out.found[k] for k in keys], SEARCH.iterations), strict=True):
-        out.found[key] = c
-    out.ended.update(keys)
-
-
 def _grow(out: Grown) -> bool:
     """Sets one effect larger than the most probable of every size that none was grown from; True if there were any.
 
     Growth ends where a larger set has less than `GROWTH.worth` of what the smaller ones have together.
     """
-    most, any_new = _most(out), False
+    most, any_new = out.most, False
     if out.case.null.names:
         _with_events(out, 0)
     for size in range(1, most + 1):
@@ -312,7 +98,7 @@ def _with_less(out: Grown) -> None:
     for size in range(BELIEFS.most, 0, -1):
         best = out.best.log_evidence
         near = [c for c in out.of_size(size)[: GROWTH.lessened] if best - c.log_evidence < GROWTH.less_reach]
-        _search_on(out, [without_effect(c, name) for c in near for name in _own(out, c)])
+        _search_on(out, [without_effect(c, name) for c in near for name in out.own(c)])
 
 
 def _with_parts(out: Grown) -> None:
@@ -320,9 +106,9 @@ def _with_parts(out: Grown) -> None:
 
     An effect of no size would seem to matter where the energy beside it is what explains the curve.
     """
-    shares = _shares(out, out.seen())
+    shares = out.shares(out.seen())
     near = [out.found[key] for key, share in shares.items() if share > np.log(SAMPLED.first.share)]
-    steps = [(c, name) for c in near for name in _own(out, c)]
+    steps = [(c, name) for c in near for name in out.own(c)]
     new = [(c, n) for c, n in steps if (c.hypothesis.material.name, frozenset(c.names) - {n}) not in out.found]
     _search_on(out, [without_effect(c, name) for c, name in new])
 
@@ -334,7 +120,7 @@ def _with_crossed(out: Grown) -> None:
     The valley of an energy with many parameters is bent and has several ends: to which of them a search comes hangs on
     round-off, and what was found beside other effects may lead to a better one.
     """
-    shares = _shares(out, out.seen())
+    shares = out.shares(out.seen())
     order = sorted((k for k, share in shares.items() if share > np.log(GROWTH.crossed)), key=lambda k: -shares[k])
     sought = []
     for key in order[: GROWTH.most_crossed]:
@@ -359,23 +145,6 @@ def _with_effects_of_the_best(out: Grown, shares: Mapping[Key, float]) -> list[S
     chosen = list(first.items())[: GROWTH.with_best_effects]
     others = [(best, c) for names, best in chosen for (_, own), c in out.found.items() if own == names]
     return [_transplanted(best, c) for best, c in others if c is not best]
-
-
-def _most(out: Grown) -> int:
-    """Effects of the largest set that is asked for."""
-    return 1 if out.case.question.quick else BELIEFS.most
-
-
-def _own(out: Grown, c: Candidate) -> list[str]:
-    """Its effects beyond the given ones."""
-    return [n for n in c.names if n not in out.case.null.names]
-
-
-def _shares(out: Grown, seen: Mapping[Key, float]) -> dict[Key, float]:
-    """ln of the part that each hypothesis has in the sum of all that were fitted; ``seen`` as `Grown.seen` says."""
-    weights = {key: w + seen[key] for key, w in out.weights().items()}
-    whole = float(np.logaddexp.reduce(list(weights.values())))
-    return {key: w - whole for key, w in weights.items()}
 
 
 def _search_on(out: Grown, steps: Sequence[tuple[Hypothesis, Array]]) -> None:
@@ -405,7 +174,7 @@ def _with_exchanged(out: Grown) -> None:
     """
     for _ in range(GROWTH.exchanges):
         best = out.best
-        own = _own(out, best)
+        own = out.own(best)
         _add_effects(out, [pair for name in own for pair in _exchanges(out, best, name)] if len(own) > 1 else [])
         if best is out.best:
             break
@@ -439,7 +208,7 @@ def _with_pairs(out: Grown) -> None:
     reach, best = GROWTH.again_reach / out.counts, frozenset(before.names)
     sought += [frozenset(c.names) for c in near if before.log_evidence - c.log_evidence < reach]
     others = [names for names in dict.fromkeys(sought) if not best <= names]
-    _add_effects(out, [step for names in others for step in _last_steps(out, names)])
+    _add_effects(out, [step for names in others for step in last_steps(out, names)])
     for size in range(2, BELIEFS.most + 1):
         if out.best is not before:
             _with_other_energies(out, size)
@@ -461,7 +230,7 @@ def _promising_pairs(out: Grown, bases: Sequence[Candidate]) -> list[frozenset[s
     return near[: GROWTH.pairs]
 
 
-def _last_steps(out: Grown, names: frozenset[str]) -> list[tuple[Candidate, Effect]]:
+def last_steps(out: Grown, names: frozenset[str]) -> list[tuple[Candidate, Effect]]:
     """The sets that lack one of ``names``, each with the most probable energy that it was fitted with, and that one."""
     known = {e.name: e for e in out.case.effects}
     parts: dict[str, Candidate] = {}
@@ -517,11 +286,11 @@ def _promising(out: Grown, base: Candidate, size: int) -> list[Effect]:
 
 def _add_effects(out: Grown, pairs: Sequence[tuple[Candidate, Effect]]) -> None:
     """Each of these candidates with one more effect, where that is better than what is known of it."""
-    for c in _fitted(out, pairs):
+    for c in fitted(out, pairs):
         out.add(c)
 
 
-def _fitted(out: Grown, pairs: Sequence[tuple[Candidate, Effect]]) -> list[Candidate]:
+def fitted(out: Grown, pairs: Sequence[tuple[Candidate, Effect]]) -> list[Candidate]:
     """Each of these candidates with one more effect, as far as there is a film."""
     sought = []
     for base, effect in pairs:

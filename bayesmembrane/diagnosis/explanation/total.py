@@ -12,7 +12,7 @@ from bayesmembrane.diagnosis.candidates.candidate import Candidate
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
-from bayesmembrane.diagnosis.explanation.growth import Grown, key_of
+from bayesmembrane.diagnosis.explanation.grown import Grown, key_of
 from bayesmembrane.diagnosis.explanation.neighbours import NEGLIGIBLE
 from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.telling import ANOTHER_LAW, NOTHING, UNLISTED, falling, joined, told

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesmembrane.diagnosis.candidates.weighing import Weighing
+from bayesmembrane.diagnosis.explanation.asked import with_falls, with_sets
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import DiagnosisCase
 from bayesmembrane.diagnosis.explanation.foreign import Foreign, kinds_of
-from bayesmembrane.diagnosis.explanation.growth import grown, with_falls, with_sets
+from bayesmembrane.diagnosis.explanation.growth import grown
 from bayesmembrane.diagnosis.explanation.promise import promised
 from bayesmembrane.diagnosis.explanation.telling import ANOTHER_LAW, NOTHING
 from bayesmembrane.diagnosis.explanation.total import CONCLUDED, Judged, Probabilities, Total, set_name, summed

@@ -9,56 +9,21 @@ import pytest
 
 from bayesmembrane.diagnosis.candidates.candidate import Candidate, with_effects
 from bayesmembrane.diagnosis.candidates.search import Search
+from bayesmembrane.diagnosis.explanation import grown as grown_module
 from bayesmembrane.diagnosis.explanation import growth
-from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.case import OpenCase
-from bayesmembrane.diagnosis.explanation.foreign import SUDDEN, Foreign
+from bayesmembrane.diagnosis.explanation.grown import Grown
 from bayesmembrane.diagnosis.explanation.growth import (
-    Grown,
-    _last_steps,
     _promising_pairs,
     _with_crossed,
     _with_exchanged,
     _with_less,
     _with_parts,
-    weigh_by_draws,
-    with_falls,
-    with_sets,
+    last_steps,
 )
-from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH, SAMPLED, SEARCH, VERDICT
+from bayesmembrane.diagnosis.thresholds import FOREIGN, GROWTH
 from bayesmembrane.ground.registry import components
-from bayesmembrane.physics.hypothesis import Hypothesis, hypothesis
-
-
-def claim(*effects: str) -> Hypothesis:
-    return with_effects(hypothesis("gent"), [components("effects")[n]() for n in effects])
-
-
-def candidate(h: Hypothesis, log_evidence: float) -> Candidate:
-    nothing = np.zeros(3)
-    x = np.arange(h.curve_size, dtype=float)
-    return Candidate(h, x, nothing, nothing[:, None], log_evidence, (), nothing[None], np.zeros(2), nothing)
-
-
-class Shelf:
-    """In place of a search: ln Z by set of effects, before and after it is searched on."""
-
-    def __init__(self, start: dict[frozenset[str], float], end: dict[frozenset[str], float]) -> None:
-        self.start, self.end = start, end
-        self.asked: list[frozenset[str]] = []
-        self.coordinates: list[np.ndarray] = []
-
-    def placed(self, every: list[tuple[Hypothesis, np.ndarray]]) -> list[Candidate | None]:
-        self.coordinates += [x for _, x in every]
-        named = [(h, frozenset(e.name for e in h.effects)) for h, _ in every]
-        return [candidate(h, self.start[names]) if names in self.start else None for h, names in named]
-
-    def log_tempered(self, c: Candidate, counts: float) -> float:
-        return counts * c.log_evidence
-
-    def all_polished(self, every: list[Candidate]) -> list[Candidate]:
-        self.asked += [frozenset(c.names) for c in every]
-        return [candidate(c.hypothesis, self.end[frozenset(c.names)]) for c in every]
+from tests.diagnosis.explanation.shelf import FRICTION, MULLINS, Shelf, candidate, claim
 
 
 def looked_back(shelf: Shelf, *found: Candidate) -> dict[frozenset[str], float]:
@@ -68,9 +33,6 @@ def looked_back(shelf: Shelf, *found: Candidate) -> dict[frozenset[str], float]:
         grown.add(c)
     _with_less(grown)
     return {names: c.log_evidence for (_, names), c in grown.found.items()}
-
-
-FRICTION, MULLINS = frozenset({"friction"}), frozenset({"mullins"})
 
 
 @pytest.mark.parametrize("before", [-80.0, None])
@@ -84,7 +46,7 @@ def test_a_smaller_set_is_searched_for_from_a_larger_one(before: float | None) -
 
 def test_what_decides_is_fitted_without_each_of_its_effects(monkeypatch: pytest.MonkeyPatch) -> None:
     """A set that is fitted with an energy whose part was fitted with others only; one without a share is left alone."""
-    monkeypatch.setattr(growth, "all_seen", lambda _, found, *__: dict.fromkeys(found, 0.0))
+    monkeypatch.setattr(grown_module, "all_seen", lambda _, found, *__: dict.fromkeys(found, 0.0))
     shelf = Shelf({FRICTION: -11.0, MULLINS: -90.0}, {FRICTION: -9.5})
     odds = [SimpleNamespace(odds=1.0) for _ in range(4)]
     plain = candidate(claim(), -60.0)
@@ -119,131 +81,9 @@ def test_what_is_far_behind_is_not_weighed_by_itself() -> None:
     assert found[frozenset()] == pytest.approx(counts * -1000.0 - 4.0)
 
 
-def test_sets_that_the_answer_asks_for_are_fitted_from_their_parts_and_checked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was checked before keeps the ln Z that it has."""
-    shelf, both = Shelf({}, {FRICTION | MULLINS: -12.0}), claim("friction", "mullins")
-    parts = [candidate(claim("friction"), -10.0), candidate(claim("mullins"), -30.0), candidate(claim(), -60.0)]
-    steps: list[Any] = []
-
-    def fitted(_: Grown, pairs: Any) -> list[Candidate]:
-        steps.extend((frozenset(base.names), effect.name) for base, effect in pairs)
-        return [candidate(both, -15.0)]
-
-    monkeypatch.setattr(growth, "_fitted", fitted)
-    monkeypatch.setattr(growth, "checked", lambda _, c: replace(c, log_evidence=c.log_evidence + 1.0))
-    case = SimpleNamespace(effects=both.effects)
-    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, shelf)))
-    for c in parts:
-        grown.add(c)
-    late = list[str]()
-    monkeypatch.setattr(Grown, "renew", lambda _: late.append("noise"))
-    monkeypatch.setattr(growth, "weigh_by_draws", lambda _: late.append("draws"))
-    with_sets(grown, [FRICTION | MULLINS])
-    assert late == ["draws"]  # the same set leads
-    assert set(steps) == {(FRICTION, "mullins"), (MULLINS, "friction")}
-    assert shelf.asked == [FRICTION | MULLINS]
-    found = {names: c.log_evidence for (_, names), c in grown.found.items()}
-    assert found == {FRICTION: -10.0, MULLINS: -30.0, frozenset(): -60.0, FRICTION | MULLINS: -11.0}
-
-
-@pytest.mark.parametrize(("end", "better"), [(-9.0, True), (-20.0, False)])
-def test_a_tear_is_looked_for_where_the_force_is_seen_to_fall(
-    monkeypatch: pytest.MonkeyPatch, end: float, better: bool
-) -> None:
-    """From that moment, beside the set beside which it falls; what is best by that is grown from once more. No set
-    gets more effects than are asked for.
-    """
-    torn, base = claim("mullins", "tearing"), candidate(claim("mullins"), -15.0)
-    tear = torn.effects[1]
-    asked: list[Any] = []
-    grew: list[Any] = []
-
-    def fits(sought: list[Any]) -> list[Candidate | None]:
-        asked.extend(sought)
-        return [candidate(s.hypothesis, -30.0) for s in sought]
-
-    monkeypatch.setattr(growth, "_fitted", lambda _, pairs: grew.extend(pairs) or [])
-    monkeypatch.setattr(growth, "checked", lambda _, c: c)
-    monkeypatch.setattr(growth, "first_order", lambda *_: 1.0)
-    search = SimpleNamespace(
-        fits=fits,
-        all_polished=lambda every: [replace(c, log_evidence=end) for c in every],
-        expected_sizes=lambda e: np.array([0.1]),
-    )
-    friction = claim("friction").effects[0]
-    case = SimpleNamespace(
-        null=candidate(claim(), 0.0), visible=[tear, friction], question=SimpleNamespace(quick=False)
-    )
-    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
-    grown.add(base)
-    once = candidate(torn, -7.0)
-    once.x[torn.names.index("tearing.second")] = 0.0
-    grown.add(replace(once, by_draws=5.0))  # -12 by its linear model
-    falls = [
-        Foreign(SUDDEN, base, 30.0, size=-0.03, on_clock=0.7),
-        Foreign(SUDDEN, grown.best, 3.0, size=-0.01, on_clock=0.2),
-        Foreign(SUDDEN, candidate(claim("mullins", "friction", "rate"), -9.0), 30.0, size=-0.03, on_clock=0.5),
-    ]
-    late = list[str]()
-    monkeypatch.setattr(Grown, "renew", lambda _: late.append("noise"))
-    monkeypatch.setattr(growth, "weigh_by_draws", lambda _: late.append("draws"))
-    assert with_falls(grown, falls) is better
-    assert late == (["noise", "draws"] if better else [])
-    assert [[e.name for e in s.hypothesis.effects] for s in asked] == 2 * [["mullins", "tearing"]]
-    own = [c.name for c in tear.coordinates]
-    place, part, again = (base.x.size + own.index(n) for n in ("moment", "second", "second_moment"))
-    assert {float(start[place]) for start in asked[0].starts} == {0.7}
-    assert {float(start[part]) for start in asked[0].starts} == {0.0}
-    (start,) = asked[1].starts  # where it falls beside a tear, that may run once more
-    assert (start[part], start[again]) == (GROWTH.second_part, 0.2)
-    assert grown.found["gent", MULLINS | {"tearing"}].log_evidence == (end if better else -7.0)
-    assert [e.name for _, e in grew] == (["friction"] if better else [])
-
-
-@pytest.mark.parametrize("structure", [False, True])
-def test_of_what_leads_more_draws_are_made_than_of_what_may_decide(
-    monkeypatch: pytest.MonkeyPatch, structure: bool
-) -> None:
-    """The null model, all that has a share, and, with more draws, what leads by then; each is first searched for to its
-    end, and once. Beside what leaves structure only what leads is checked, and once.
-    """
-    ended: list[tuple[str, ...]] = []
-
-    def all_polished(every: list[Candidate], steps: int) -> list[Candidate]:
-        assert steps == SEARCH.iterations
-        ended.extend(c.names for c in every)
-        return every
-
-    shares = {(): 1e-6, ("friction",): 0.9, ("mullins",): 0.09, ("tearing",): 0.005, ("rate",): 1e-5}
-    drawn: list[tuple[tuple[str, ...], Any]] = []
-    monkeypatch.setattr(growth, "checked", lambda _, c, drawing: drawn.append((c.names, drawing)) or c)
-    monkeypatch.setattr(
-        growth, "_shares", lambda out, _: {key: float(np.log(shares[c.names])) for key, c in out.found.items()}
-    )
-    monkeypatch.setattr(Grown, "seen", lambda _: {})
-    case = SimpleNamespace(null=candidate(claim(), 0.0), tell=lambda _: None)
-    over = 1.0 + BELIEFS.blurred + (0.01 if structure else -0.01)  # of what counts as noise, few points being left
-    points = candidate(claim("friction"), 0.0)
-    noise = 1.0 + VERDICT.chance * float(np.sqrt(2.0 / max(points.residual.size - points.x.size, 1)))
-    squares = over * max(VERDICT.noise_chi2, noise) * max(points.residual.size - points.x.size, 1)
-    search = SimpleNamespace(all_polished=all_polished, squares=lambda *_: squares)
-    grown = Grown(cast(OpenCase, case), cast(Search, cast(Any, search)))
-    for names in shares:
-        grown.add(candidate(claim(*names), 0.0))
-    weigh_by_draws(grown)
-    weigh_by_draws(grown)
-    assert sorted(ended) == [(), ("friction",), ("mullins",), ("tearing",)]
-    del drawn[len(drawn) // 2 :]
-    kinds = (SAMPLED.first, SAMPLED.last, SAMPLED.vague)
-    first, last, vague = ([names for names, d in drawn if d is each] for each in kinds)
-    assert first == ([] if structure else [(), ("friction",), ("mullins",), ("tearing",)])
-    assert last == ([] if structure else [("friction",), ("mullins",)])
-    assert vague == ([(), ("friction",), ("mullins",)] if structure else [])
-
-
 def test_what_decides_is_searched_for_from_the_materials_of_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each from those of its energy that have a share, with its own effects; a better end is polished and kept."""
-    monkeypatch.setattr(growth, "all_seen", lambda _, found, *__: dict.fromkeys(found, 0.0))
+    monkeypatch.setattr(grown_module, "all_seen", lambda _, found, *__: dict.fromkeys(found, 0.0))
     odds = [SimpleNamespace(odds=1.0) for _ in range(4)]
     plain = candidate(claim(), -90.0)
     one, two = (candidate(claim(n), z) for n, z in (("friction", -10.0), ("mullins", -10.5)))
@@ -351,9 +191,9 @@ def several(*found: tuple[tuple[str, ...], float]) -> Grown:
 
 def test_a_set_is_searched_for_from_each_of_its_parts_that_was_found() -> None:
     grown = several(((), -90.0), (("friction",), -40.0), (("tearing",), -50.0), (("friction", "mullins"), -10.0))
-    steps = _last_steps(grown, frozenset({"friction", "mullins", "tearing"}))
+    steps = last_steps(grown, frozenset({"friction", "mullins", "tearing"}))
     assert [(sorted(base.names), effect.name) for base, effect in steps] == [(["friction", "mullins"], "tearing")]
-    steps = _last_steps(grown, frozenset({"friction", "tearing"}))
+    steps = last_steps(grown, frozenset({"friction", "tearing"}))
     assert {(*base.names, effect.name) for base, effect in steps} == {("friction", "tearing"), ("tearing", "friction")}
 
 

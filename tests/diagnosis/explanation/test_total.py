@@ -15,7 +15,7 @@ from bayesmembrane.diagnosis.explanation import visible as visible_module
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS, Beliefs
 from bayesmembrane.diagnosis.explanation.case import OpenCase
 from bayesmembrane.diagnosis.explanation.foreign import LOST, SUDDEN, UNNAMED, Foreign
-from bayesmembrane.diagnosis.explanation.growth import Grown
+from bayesmembrane.diagnosis.explanation.grown import Grown
 from bayesmembrane.diagnosis.explanation.telling import ANOTHER_LAW, NOTHING, UNLISTED
 from bayesmembrane.diagnosis.thresholds import TWINS
 from bayesmembrane.ground.registry import components
