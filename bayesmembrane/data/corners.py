@@ -16,7 +16,7 @@ STEADY = 0.05
 APART = 0.2
 """Of the same: by so much the speeds of both sides differ, at least, at a corner."""
 INSIDE = 0.03
-"""Of an interval: closer to a reading no corner is told from one at it."""
+"""Of an interval, or of that beyond the reading if it is shorter: closer to it no corner is told from one at it."""
 LONGER, MISSED, AS_LONG = 1.5, 3.0, 1.1
 """Times as long as the longer one beside it: in a longer interval nobody knows what the disc did, as where an export
 leaves out a pause; but up to the second number a turn in it has missed a reading or two, where two intervals in which
@@ -48,7 +48,8 @@ def with_corners(measurement: Measurement) -> Measurement:
     other side. A turn that slows down, as of a sine wave, has no corner, and nobody says where it is in an interval
     in which the disc may have stood still (`_in_doubt`), unless another turn to the same side is where it would have
     turned; nor in a long one, where it would have gone on a little farther than at such a turn. Of times that are
-    rounded v1 and v2 are slopes of lines through up to `MOST_READ` readings.
+    rounded v1 and v2 are slopes of lines through up to `MOST_READ` readings. Where all moves between rests have one
+    speed, it is that of those, too, of which too few readings are told.
     Without times, for stretches across, and where legs are said, the path is as it was.
     """
     path = measurement.path
@@ -74,6 +75,9 @@ def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> 
     coarse = _coarseness(time, inner)
     before, after, steady = _speeds(speed, inner, (STEADY + coarse) * larger)
     strictly = _speeds(speed, inner, STEADY * larger)[2]
+    by_others = _as_others(speed, inner, before, after, ~steady)
+    steady |= by_others
+    strictly |= by_others
     turned, beside = np.abs(before - after), np.maximum(gap[inner - 1], gap[inner + 1])
     length = gap[inner] / beside
     apart = (turned >= APART * larger) & (turned * gap[inner] >= SMALLEST * full_range)
@@ -90,8 +94,9 @@ def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> 
             (clock[k], way[k]), least[k] = crossing, INSIDE
         elif not strictly[some[k]]:
             clock[k], way[k] = np.nan, np.nan
-    part = (clock - time[rows]) / gap[rows]
-    found = (part > least) & (part < 1 - least)
+    found = (clock - time[rows] > least * np.minimum(gap[rows], gap[rows - 1])) & (
+        time[rows + 1] - clock > least * np.minimum(gap[rows], gap[rows + 1])
+    )
     turns = np.sign(before - after)[some]
     near = SAME * np.abs(before * beside)[some]
     found = _met(found, doubt, way, turns, near)
@@ -99,8 +104,43 @@ def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> 
     seen = _turns_at_readings(deflection, rows[found])
     found &= ~_refuted(found, way, turns, np.stack([near, farther]), seen)
     # Two in a row are one, which is at the reading between them as far as the clock knows.
-    found &= ~np.any(np.abs(rows[:, None] - rows[found]) == 1, axis=1)
+    found &= by_others[some] | ~np.any(np.abs(rows[:, None] - rows[found]) == 1, axis=1)
     return rows[found], way[found], clock[found]
+
+
+def _as_others(
+    speed: Array, inner: NDArray[np.intp], before: Array, after: Array, unknown: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """(n,) True where the disc left a rest, or came to one, at the speed of all other moves of the test (`_one_speed`),
+    its own being ``unknown`` (n,). ``before`` and ``after`` (n,) m/s become these speeds there.
+    """
+    known, resting = _one_speed(speed)
+    if not known:
+        return np.zeros(inner.size, np.bool_)
+    moved = np.sign(np.where(resting, 0.0, speed))
+    along = moved[inner]
+    some = unknown & (along != 0)
+    leaves = some & resting[inner - 1] & (moved[inner + 1] == along)
+    comes = some & resting[inner + 1] & (moved[inner - 1] == along)
+    before[leaves], after[leaves] = 0.0, known * along[leaves]
+    before[comes], after[comes] = known * along[comes], 0.0
+    return np.asarray(leaves | comes)
+
+
+def _one_speed(speed: Array) -> tuple[float, NDArray[np.bool_]]:
+    """(m/s, (M,)): the speed of all moves between rests, 0 if they have none in common; True where the disc rests.
+
+    Intervals beside a rest may be of both: those between others say the speed, and none is faster. Two are as fast.
+    """
+    size = np.abs(speed)
+    resting = size <= STOOD * np.max(size)
+    along = np.sign(np.where(resting, 0.0, speed))
+    within = np.flatnonzero((along[1:-1] != 0) & (along[:-2] == along[1:-1]) & (along[2:] == along[1:-1])) + 1
+    if not within.size or not np.any(resting):
+        return 0.0, resting
+    known = float(np.median(size[within]))
+    one = np.all(np.abs(size[within] - known) <= STEADY * known) and np.max(size) <= (1 + STEADY) * known
+    return known if one and np.sum(size >= (1 - STEADY) * known) >= 2 else 0.0, resting
 
 
 def _in_doubt(speed: Array, before: Array, after: Array, length: Array, rests: bool) -> NDArray[np.bool_]:

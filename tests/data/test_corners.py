@@ -175,3 +175,52 @@ def test_a_turn_midway_between_two_readings_is_one_where_another_turn_says_so() 
     assert found.path.deflection[between[0]] == pytest.approx(1e-3 * top, abs=1e-9)
     alone = moved(times[:60], way[:60])
     assert with_corners(alone) is alone
+
+
+def stairs(speed: np.ndarray, hold: float, step: float = 1e-3) -> tuple[np.ndarray, np.ndarray]:
+    """(s, m) where a staircase with these speeds (k,) m/s and one height has its corners."""
+    clock = np.cumsum(np.concatenate([[0.0], np.ravel(np.column_stack([step / speed, np.full(speed.size, hold)]))]))
+    return clock, np.repeat(step * np.arange(speed.size + 1), 2)[: clock.size + 1][1:]
+
+
+def corners_of(m: Measurement) -> tuple[np.ndarray, np.ndarray]:
+    """(s, m) of the corners that were found."""
+    found = with_corners(m)
+    between = np.setdiff1d(np.arange(found.path.deflection.size), found.on_path)
+    return found.path.time[between], found.path.deflection[between]
+
+
+def test_a_stop_soon_after_a_reading_is_one_where_the_ramp_is_read_often() -> None:
+    """Ramps are read every 0.05 s, and holds every second: a stop 0.012 s after a reading is well inside."""
+    clock, way = stairs(np.full(4, 1e-3 / 0.962), 5.0)
+    times = [start + np.arange(0.0, 0.96, 0.05) for start in clock[::2][:-1]]
+    times += [stop + np.arange(0.8, 4.9, 1.0) for stop in clock[1::2]]
+    time = np.sort(np.concatenate(times))
+    at, _ = corners_of(moved(time, np.interp(time, clock, way)))
+    for stop in clock[1::2]:
+        assert np.min(np.abs(at - stop)) < 1e-6
+
+
+def test_a_staircase_that_is_read_seldom_moves_as_fast_at_every_step() -> None:
+    """Of some moves one interval shows the whole speed, of none two: all stops and starts are known by it."""
+    clock, way = stairs(np.full(14, 1e-3 / 1.42), 14.3)
+    time = np.arange(0.0, clock[-1], 1.30)
+    at, where = corners_of(moved(time, np.interp(time, clock, way)))
+    inner = [c for c in clock[1:-1] if np.min(np.abs(time - c)) > 0.05]
+    assert len(inner) >= 24
+    for c in inner:
+        k = np.argmin(np.abs(at - c))
+        assert at[k] == pytest.approx(c, abs=1e-6)
+        assert where[k] == pytest.approx(np.interp(c, clock, way), abs=1e-9)
+
+
+@pytest.mark.parametrize(("takes", "hold", "first", "gap"), [((2.9, 4.7), 14.3, 0.0, 1.3), ((0.9,), 9.1, 0.25, 1.0)])
+def test_no_stop_is_made_up_where_nobody_knows_how_fast_it_was_left(
+    takes: tuple[float, ...], hold: float, first: float, gap: float
+) -> None:
+    """Of moves that take different times, or all of which are read at the same moments, none for a whole interval."""
+    clock, way = stairs(np.tile(1e-3 / np.array(takes), 10 // len(takes)), hold)
+    time = np.arange(first, clock[-1], gap)
+    at, _ = corners_of(moved(time, np.interp(time, clock, way)))
+    for c in at:  # those that readings of their own show
+        assert np.min(np.abs(clock - c)) < 1e-6
