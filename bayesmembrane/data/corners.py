@@ -32,6 +32,8 @@ BENT = 1.5
 """Times what rounding of the clock makes of a speed over half of those: what changes by more is no line."""
 SAME = 0.1
 """Of a step of the deflection: so near to another turn the disc turned where its readings might be of a rest, too."""
+EVEN = 0.8
+"""Of the steps, at least, that are of one size where readings without times are even in time."""
 SMALLEST = 2e-4
 """Of the largest deflection: by so much a corner moves the disc in an interval, at least."""
 
@@ -50,18 +52,33 @@ def with_corners(measurement: Measurement) -> Measurement:
     turned; nor in a long one, where it would have gone on a little farther than at such a turn. Of times that are
     rounded v1 and v2 are slopes of lines through up to `MOST_READ` readings. Where all moves between rests have one
     speed, it is that of those, too, of which too few readings are told.
-    Without times, for stretches across, and where legs are said, the path is as it was.
+    Without times steps of one size say that readings are even in time (`_even_clock`). Where neither does, for
+    stretches across, and where legs are said, the path is as it was.
     """
     path = measurement.path
-    if path.time is None or path.across is not None or path.said:
+    time = _even_clock(path.deflection) if path.time is None else path.time
+    if time is None or path.across is not None or path.said:
         return measurement
-    rows, at, clock = _corners(path.deflection, path.time, measurement.full_range, bool(path.rests.any()))
+    rows, at, clock = _corners(path.deflection, time, measurement.full_range, bool(path.rests.any()))
     if not rows.size:
         return measurement
     way = without_round_off(np.insert(path.deflection, rows + 1, at))
-    motion = Motion(way, np.insert(path.time, rows + 1, clock), measurement.full_range)
+    told = None if path.time is None else np.insert(path.time, rows + 1, clock)
+    motion = Motion(way, told, measurement.full_range)
     places = measurement.on_path + np.searchsorted(rows, measurement.on_path, side="left")
     return replace(measurement, motion=motion, places=places)
+
+
+def _even_clock(deflection: Array) -> Array | None:
+    """(N,) a clock that counts readings (N,) m, if nearly all steps between them are of one size; else None.
+
+    Readings that are as far apart everywhere but at turns were taken as long apart at one speed: of some that were
+    taken at chosen deflections none would be beside a turn, and steps that are even up to it show none.
+    """
+    step = np.abs(np.diff(deflection))
+    usual = float(np.median(step)) if step.size else 0.0
+    even = np.abs(step - usual) <= STEADY * usual
+    return np.arange(float(deflection.size)) if usual > 0 and np.mean(even) >= EVEN else None
 
 
 def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> tuple[NDArray[np.intp], Array, Array]:
@@ -88,7 +105,7 @@ def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> 
         clock = time[rows] + gap[rows] * ((speed[inner] - after) / (before - after))[some]
     way = deflection[rows] + before[some] * (clock - time[rows])
     least, by_rounding = np.maximum(INSIDE, 0.5 * coarse[some]), (coarse * larger)[some]
-    for k in np.flatnonzero(by_rounding > 0):
+    for k in np.flatnonzero((by_rounding > 0) & ~by_others[some]):
         crossing = _crossing(deflection, time, int(rows[k]), float(by_rounding[k]))
         if np.isfinite(crossing[0]):
             (clock[k], way[k]), least[k] = crossing, INSIDE
@@ -111,8 +128,8 @@ def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> 
 def _as_others(
     speed: Array, inner: NDArray[np.intp], before: Array, after: Array, unknown: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """(n,) True where the disc left a rest, or came to one, at the speed of all other moves of the test (`_one_speed`),
-    its own being ``unknown`` (n,). ``before`` and ``after`` (n,) m/s become these speeds there.
+    """(n,) True where the disc left a rest of two intervals or more, or came to one, at the speed of all other moves of
+    the test (`_one_speed`), its own being ``unknown`` (n,). ``before`` and ``after`` (n,) m/s become these there.
     """
     known, resting = _one_speed(speed)
     if not known:
@@ -120,8 +137,9 @@ def _as_others(
     moved = np.sign(np.where(resting, 0.0, speed))
     along = moved[inner]
     some = unknown & (along != 0)
-    leaves = some & resting[inner - 1] & (moved[inner + 1] == along)
-    comes = some & resting[inner + 1] & (moved[inner - 1] == along)
+    long = np.pad(resting, 2)  # a turn midway between two readings is a rest in one interval, too
+    leaves = some & long[inner + 1] & long[inner] & (moved[inner + 1] == along)
+    comes = some & long[inner + 3] & long[inner + 4] & (moved[inner - 1] == along)
     before[leaves], after[leaves] = 0.0, known * along[leaves]
     before[comes], after[comes] = known * along[comes], 0.0
     return np.asarray(leaves | comes)

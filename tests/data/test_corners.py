@@ -88,8 +88,15 @@ def test_no_corner_is_made_up() -> None:
     ]
     for m in each:
         assert with_corners(m) is m
-    timeless = Measurement(each[0].deflection, each[0].force, each[0].rig, each[0].specimen)
-    assert with_corners(timeless) is timeless
+    timeless = [Measurement(m.deflection, m.force, m.rig, m.specimen) for m in each]
+    # Read at chosen deflections: every millimetre on the way up and back, the top among them or not; and unevenly.
+    up = np.arange(0.0, 0.0205, 1e-3)
+    for way in ([*up, *up[-2::-1]], [*up, 0.0203, *up[::-1]], [*up, 0.0203, *(up[::-1] - 0.3e-3)], [*up, *up[::-1]]):
+        timeless.append(Measurement(np.maximum(way, 0), np.ones(len(way)), each[0].rig, each[0].specimen))
+    uneven = np.cumsum(np.abs(np.sin(np.arange(1.0, 60.0))))
+    timeless.append(Measurement(1e-4 * np.append(uneven, uneven[::-1]), np.ones(118), each[0].rig, each[0].specimen))
+    for m in timeless:
+        assert with_corners(m) is m
 
 
 @pytest.mark.parametrize(("step", "gap"), [(0.1, 1.03), (0.01, 0.16)])
@@ -175,6 +182,22 @@ def test_a_turn_midway_between_two_readings_is_one_where_another_turn_says_so() 
     assert found.path.deflection[between[0]] == pytest.approx(1e-3 * top, abs=1e-9)
     alone = moved(times[:60], way[:60])
     assert with_corners(alone) is alone
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_readings_without_times_turn_where_those_with_times_do(seed: int) -> None:
+    """Steps of one size but at turns are those of an even clock."""
+    offset = np.random.default_rng(seed).uniform()
+    time = 0.41 * (np.arange(200.0) + offset)
+    way = np.interp(time, [0, 12.2, 22.4, 41.7, 60.0, 82.1], 1e-3 * np.array([0, 12.2, 2.0, 21.3, 3.0, 25.1]))
+    told = moved(time, way)
+    times, ways = corners_of(told)
+    untold = with_corners(Measurement(way, told.force, told.rig, told.specimen))
+    between = np.setdiff1d(np.arange(untold.path.deflection.size), untold.on_path)
+    assert times.size >= 3
+    assert untold.path.time is None
+    np.testing.assert_allclose(untold.path.deflection[between], ways, atol=1e-9)
+    assert np.array_equal(untold.leg, with_corners(told).leg)
 
 
 def stairs(speed: np.ndarray, hold: float, step: float = 1e-3) -> tuple[np.ndarray, np.ndarray]:
