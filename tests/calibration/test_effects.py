@@ -86,5 +86,5 @@ def test_too_few_points_are_refused_with_effects() -> None:
     claim = hypothesis("yeoh", ("zero_offset", "force_offset"))
     with pytest.raises(SettingsError, match="3 points cannot fix the 5 parameters of yeoh"):
         Posterior(claim, m)
-    with pytest.raises(SettingsError, match="3 points cannot fix the 7 parameters of yeoh"):  # nothing holds shapes
+    with pytest.raises(SettingsError, match="3 points cannot fix the 8 parameters of yeoh"):  # nothing holds shapes
         fit(m, claim)

@@ -38,7 +38,7 @@ LIFT, NOISE = 35e-3, 2e-3  # m, N
 MIDDLE, LN_GD = 0.5, 2.0  # truths are medians of the priors, but for the modulus
 FEW, MANY = 10, 60  # readings where their number does not vary
 EMCEE_STEPS, FORM_DRAWS = 100, 32
-# Added one after another to a neo-Hookean film of stated noise; the last makes it fourteen parameters.
+# Added one after another to a neo-Hookean film of stated noise; the last makes it fifteen parameters.
 EFFECTS = (
     "zero_offset",
     "prestretch",
@@ -166,7 +166,7 @@ AXES: dict[str, tuple[Callable[[int, int], Row], tuple[int, ...]]] = {
     "readings, a draw with form error": (readings_form, (15, 60, 250, 1000, 4500, 20000)),
     "walkers": (walkers, (32, 64, 128, 256, 512, 1024)),
     "walkers, a hundred steps of emcee": (walkers_emcee, (32, 64, 128, 256, 512, 1024)),
-    "parameters": (parameters, (1, 2, 3, 4, 6, 9, 14)),
+    "parameters": (parameters, (1, 2, 3, 4, 6, 10, 15)),
     "specimens, joint": (specimens_joint, (1, 3, 10, 30, 100)),
     "specimens, population": (specimens_population, (3, 10, 30, 100)),
 }

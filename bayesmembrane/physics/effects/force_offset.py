@@ -15,18 +15,19 @@ from bayesmembrane.physics.effects.base import EffectParameter, Sensor
 
 @dataclass(frozen=True)
 class ForceOffset(Sensor):
-    """F_read = F + offset [1 - s exp(-|delta| / lift)], with s = 1 / (1 + exp(-log_odds_resting)).
+    """F_read = F + offset [1 + hangs delta / D - s exp(-|delta| / lift)], with s = 1 / (1 + exp(-log_odds_resting)).
 
     A load cell that was tared while the disc, or what hangs from it, rested on something reads its weight once it is
-    lifted (s = 1); one that was not tared reads it from the start (0).
+    lifted (s = 1); one that was not tared reads it from the start (0). Cables and hoses pull more or less as the disc
+    goes to the full range D of the test.
     """
 
     name: ClassVar[str] = "force_offset"
     title: ClassVar[str] = "offset of the force zero"
     reference: ClassVar[str] = "ISO 376:2011, zero error of force-proving instruments"
     signature: ClassVar[str] = (
-        "A constant force everywhere, also where the film is slack; or one that comes with the first of the way, where "
-        "what was resting is lifted."
+        "A constant force everywhere, also where the film is slack, or nearly so, as where a cable hangs from the disc; "
+        "or one that comes with the first of the way, where what was resting is lifted."
     )
     exact: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
@@ -40,6 +41,7 @@ class ForceOffset(Sensor):
             (-20.0, 8.0),
         ),
         EffectParameter("lift", "m", "way on which that is lifted", LogNormal(1e-3, 0.7), (5e-5, 1e-2)),
+        EffectParameter("hangs", "-", "part by which it is larger at the full range", Normal(0.0, 0.15), (-0.8, 0.8)),
     )
 
     @property
@@ -49,4 +51,5 @@ class ForceOffset(Sensor):
 
     def read(self, p: Array, force: Array, path: Motion) -> Array:
         resting = expit(p[:, 1:2]) * np.exp(-np.abs(path.deflection) / p[:, 2:3])
-        return np.asarray(force + p[:, :1] * (1 - resting))
+        more = p[:, 3:4] * path.deflection / path.full_range
+        return np.asarray(force + p[:, :1] * (1 + more - resting))

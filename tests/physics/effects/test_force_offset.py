@@ -1,4 +1,4 @@
-"""The zero of the load cell: from the start, or once what rested is lifted."""
+"""The zero of the load cell: from the start, once what rested is lifted, or as a cable is."""
 
 import numpy as np
 import pytest
@@ -16,12 +16,21 @@ def read(*p: float) -> np.ndarray:
 
 
 def test_a_cell_that_was_not_tared_is_off_from_the_start() -> None:
-    assert read(0.02, -20.0, 1e-3) == pytest.approx(0.02, rel=1e-8)
+    assert read(0.02, -20.0, 1e-3, 0.0) == pytest.approx(0.02, rel=1e-8)
 
 
 def test_a_weight_that_rested_comes_as_it_is_lifted_and_goes_as_it_is_set_down() -> None:
-    found = read(-0.02, 20.0, 1e-3)
+    found = read(-0.02, 20.0, 1e-3, 0.0)
     assert found[[0, -1]] == pytest.approx(0.0, abs=1e-9)
     assert found == pytest.approx(-0.02 * (1 - np.exp(-WAY / 1e-3)), abs=1e-9)
     assert found == pytest.approx(found[::-1])
     assert found[50] == pytest.approx(-0.02, rel=1e-6)
+
+
+def test_a_cable_pulls_more_in_proportion_to_the_way() -> None:
+    """As its tangent does at the start, and as far up as back."""
+    found = read(0.02, -20.0, 1e-3, 0.3)
+    assert found[0] == pytest.approx(0.02, rel=1e-8)
+    assert found[50] == pytest.approx(0.026, rel=1e-8)
+    assert np.diff(found[:51]) == pytest.approx(0.006 / 50)
+    assert found == pytest.approx(found[::-1])
