@@ -26,7 +26,7 @@ class ForceOffset(Sensor):
     title: ClassVar[str] = "offset of the force zero"
     reference: ClassVar[str] = "ISO 376:2011, zero error of force-proving instruments"
     signature: ClassVar[str] = (
-        "A constant force everywhere, also where the film is slack, or nearly so, as if a cable hangs from the disc; or "
+        "A constant force everywhere, also where the film is slack, or nearly so, if a cable hangs from the disc; or "
         "one that comes with the first of the way, where what was resting is lifted."
     )
     exact: ClassVar[bool] = True
