@@ -23,10 +23,6 @@ leaves out a pause; but up to the second number a turn in it has missed a readin
 the disc went on are as long, each beside its own, or nearly (the third number)."""
 STOOD = 0.003
 """Of the speed before: by no more was the disc moved in an interval with a turn in which it may have stood still."""
-TURNED, TURNED_UNTIMED = 0.75, 1 / 3
-"""Of a loop, by which the force falls where a disc has turned (`_fallen`); without times nothing relaxes in a rest."""
-LOOP = 4.0
-"""Times the median of second differences of the force, 1.65 sd of white noise: a wider loop says something."""
 MOST_READ = 10
 """Readings on each side that say how fast the disc was there: times and deflections are rounded."""
 ROUNDED, ROUND_OFF, COARSEST = (1.0, 0.1, 0.01), 1e-6, 0.2
@@ -63,11 +59,7 @@ def with_corners(measurement: Measurement) -> Measurement:
     time = _even_clock(path.deflection) if path.time is None else path.time
     if time is None or path.across is not None or path.said:
         return measurement
-    force = np.full(time.size, np.nan)
-    force[measurement.on_path] = measurement.force
-    least = TURNED if path.time is not None else TURNED_UNTIMED
-    turned = _fallen(force, path.deflection) >= least
-    rows, at, clock = _corners(path.deflection, time, measurement.full_range, bool(path.rests.any()), turned)
+    rows, at, clock = _corners(path.deflection, time, measurement.full_range, bool(path.rests.any()))
     if not rows.size:
         return measurement
     way = without_round_off(np.insert(path.deflection, rows + 1, at))
@@ -89,12 +81,9 @@ def _even_clock(deflection: Array) -> Array | None:
     return np.arange(float(deflection.size)) if usual > 0 and np.mean(even) >= EVEN else None
 
 
-def _corners(
-    deflection: Array, time: Array, full_range: float, rests: bool, turned_there: NDArray[np.bool_]
-) -> tuple[NDArray[np.intp], Array, Array]:
+def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> tuple[NDArray[np.intp], Array, Array]:
     """(n,) numbers of the readings before corners, (n,) m, and (n,) s on the clock of the (N,) readings; where the disc
-    ``rests`` anywhere, it may have done so in any interval that is longer than those beside it, but for those (N - 1,)
-    where it ``turned_there`` by what the force says.
+    ``rests`` anywhere, it may have done so in any interval that is longer than those beside it.
     """
     gap = np.diff(time)
     speed = np.diff(deflection) / gap
@@ -110,7 +99,7 @@ def _corners(
     length = gap[inner] / beside
     apart = (turned >= APART * larger) & (turned * gap[inner] >= SMALLEST * full_range)
     some = np.flatnonzero(steady & apart & ((before * after < 0) | (length <= LONGER)))
-    doubt = _in_doubt(speed[inner], before, after, length, rests)[some] & ~turned_there[inner][some]
+    doubt = _in_doubt(speed[inner], before, after, length, rests)[some]
     rows = inner[some]
     with np.errstate(all="ignore"):
         clock = time[rows] + gap[rows] * ((speed[inner] - after) / (before - after))[some]
@@ -170,23 +159,6 @@ def _one_speed(speed: Array) -> tuple[float, NDArray[np.bool_]]:
     known = float(np.median(size[within]))
     one = np.all(np.abs(size[within] - known) <= STEADY * known) and np.max(size) <= (1 + STEADY) * known
     return known if one and np.sum(size >= (1 - STEADY) * known) >= 2 else 0.0, resting
-
-
-def _fallen(force: Array, deflection: Array) -> Array:
-    """(N - 1,) of forces (N,) N: the part of a loop by which the force falls where the deflection stays; else 0.
-
-    The loop is as wide as the readings before and after, which are at one deflection, are apart. A disc that turned
-    between two readings leaves all of it, or half where the loop opens slowly; one that stood leaves none by friction,
-    half by what resists motion alone, and of relaxation the part that three intervals do not have. A loop no wider
-    than noise says nothing.
-    """
-    out, step = np.zeros(force.size - 1), np.abs(np.diff(deflection))
-    k, bends = np.arange(1, force.size - 2), np.abs(np.diff(force, 2))
-    stays = (step[k] <= STOOD * step[k - 1]) & (np.abs(step[k - 1] - step[k + 1]) <= STEADY * step[k - 1])
-    wide, noise = force[k - 1] - force[k + 2], np.median(bends[np.isfinite(bends)]) if np.any(bends >= 0) else np.inf
-    open_there = stays & (np.abs(wide) > LOOP * noise)
-    out[k[open_there]] = ((force[k] - force[k + 1])[open_there]) / wide[open_there]
-    return np.nan_to_num(out)
 
 
 def _in_doubt(speed: Array, before: Array, after: Array, length: Array, rests: bool) -> NDArray[np.bool_]:

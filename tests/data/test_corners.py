@@ -247,25 +247,3 @@ def test_no_stop_is_made_up_where_nobody_knows_how_fast_it_was_left(
     at, _ = corners_of(moved(time, np.interp(time, clock, way)))
     for c in at:  # those that readings of their own show
         assert np.min(np.abs(clock - c)) < 1e-6
-
-
-@pytest.mark.parametrize("told", [True, False])
-@pytest.mark.parametrize("stood", [True, False])
-@pytest.mark.parametrize("loop", [0.05, 0.0])
-def test_a_turn_midway_between_two_readings_is_told_from_a_rest_by_the_force(
-    told: bool, stood: bool, loop: float
-) -> None:
-    """The only turn of a test, whose readings lie alike about it; the force of a guide falls with the first way back.
-    Where no loop is seen nothing is known.
-    """
-    time = np.arange(0.0, 48.0)
-    way = 1e-3 * np.minimum(time, 47.0 - time)
-    turned = time > 23.5
-    sign = np.where(turned & ~(stood & (time == 24.0)), -1.0, 1.0)
-    force = 1e3 * way**2 + loop * sign + 1e-4 * np.random.default_rng(5).standard_normal(time.size)
-    m = Measurement(way, force, Annulus(0.010, 0.035), Specimen("film", 5e-5), time=time if told else None)
-    found = with_corners(m)
-    between = np.setdiff1d(np.arange(found.path.deflection.size), found.on_path)
-    expected = [] if stood or not loop else [23.5e-3]
-    np.testing.assert_allclose(found.path.deflection[between], expected, atol=1e-9)
-    assert found.leg[24] == (1 if stood or not loop else -1)
