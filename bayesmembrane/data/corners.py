@@ -34,6 +34,8 @@ SAME = 0.1
 """Of a step of the deflection: so near to another turn the disc turned where its readings might be of a rest, too."""
 EVEN = 0.8
 """Of the steps, at least, that are of one size where readings without times are even in time."""
+AGREE, UNTIMED_STOOD = 2, 0.05
+"""Turns without times that must do so; and the part of a step up to which the disc may have stood at one of them."""
 SMALLEST = 2e-4
 """Of the largest deflection: by so much a corner moves the disc in an interval, at least."""
 
@@ -52,15 +54,16 @@ def with_corners(measurement: Measurement) -> Measurement:
     turned; nor in a long one, where it would have gone on a little farther than at such a turn. Of times that are
     rounded v1 and v2 are slopes of lines through up to `MOST_READ` readings. Where all moves between rests have one
     speed, it is that of those, too, of which too few readings are told.
-    Without times steps of one size say that readings are even in time (`_even_clock`). Where neither does, for
-    stretches across, and where legs are said, the path is as it was.
+    Without times steps of one size may say that readings are even in time (`_even_clock`), if turns agree (`_agree`).
+    Where neither does, for stretches across, and where legs are said, the path is as it was.
     """
     path = measurement.path
     time = _even_clock(path.deflection) if path.time is None else path.time
     if time is None or path.across is not None or path.said:
         return measurement
-    rows, at, clock = _corners(path.deflection, time, measurement.full_range, bool(path.rests.any()))
-    if not rows.size:
+    stood = STOOD if path.time is not None else UNTIMED_STOOD
+    rows, at, clock = _corners(path.deflection, time, measurement.full_range, bool(path.rests.any()), stood)
+    if not rows.size or (path.time is None and not _agree(path.deflection, rows, at)):
         return measurement
     way = without_round_off(np.insert(path.deflection, rows + 1, at))
     told = None if path.time is None else np.insert(path.time, rows + 1, clock)
@@ -72,8 +75,8 @@ def with_corners(measurement: Measurement) -> Measurement:
 def _even_clock(deflection: Array) -> Array | None:
     """(N,) a clock that counts readings (N,) m, if nearly all steps between them are of one size; else None.
 
-    Readings that are as far apart everywhere but at turns were taken as long apart at one speed: of some that were
-    taken at chosen deflections none would be beside a turn, and steps that are even up to it show none.
+    Readings that are as far apart everywhere but at turns were taken as long apart at one speed, or at deflections that
+    somebody chose: which of these it was turns say (`_agree`).
     """
     step = np.abs(np.diff(deflection))
     usual = float(np.median(step)) if step.size else 0.0
@@ -81,9 +84,29 @@ def _even_clock(deflection: Array) -> Array | None:
     return np.arange(float(deflection.size)) if usual > 0 and np.mean(even) >= EVEN else None
 
 
-def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> tuple[NDArray[np.intp], Array, Array]:
+def _agree(deflection: Array, rows: NDArray[np.intp], way: Array) -> bool:
+    """True if turns at ``way`` (n,) m, in the intervals after ``rows`` (n,), are where others are that were missed by
+    another part of an interval, or the test began: `AGREE` of them at least, and none far below its begin.
+
+    An even clock misses each turn by another part; turns that are made up of chosen deflections, or for a rest that
+    nobody timed, lie anywhere.
+    """
+    step = float(np.median(np.abs(np.diff(deflection))))
+    missed, near = np.abs(way - deflection[rows]) / step, SAME * step
+    back = way < deflection[rows]
+    if np.any(way[back] < deflection[0] - near):
+        return False
+    begin = back & (np.abs(way - deflection[0]) <= near)
+    alike = (np.abs(way[:, None] - way) <= near) & (back[:, None] == back) & (np.abs(missed[:, None] - missed) > SAME)
+    return bool(np.sum(begin & (np.abs(missed - 0.5) < 0.5 - SAME)) + np.sum(np.any(alike, axis=1)) >= AGREE)
+
+
+def _corners(
+    deflection: Array, time: Array, full_range: float, rests: bool, stood: float
+) -> tuple[NDArray[np.intp], Array, Array]:
     """(n,) numbers of the readings before corners, (n,) m, and (n,) s on the clock of the (N,) readings; where the disc
-    ``rests`` anywhere, it may have done so in any interval that is longer than those beside it.
+    ``rests`` anywhere, it may have done so in any interval that is longer than those beside it, and where it was moved
+    by no more than the part ``stood`` of an interval.
     """
     gap = np.diff(time)
     speed = np.diff(deflection) / gap
@@ -92,14 +115,14 @@ def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> 
     coarse = _coarseness(time, inner)
     before, after, steady = _speeds(speed, inner, (STEADY + coarse) * larger)
     strictly = _speeds(speed, inner, STEADY * larger)[2]
-    by_others = _as_others(speed, inner, before, after, ~steady)
+    by_others = _as_others(deflection, time, inner, before, after, ~steady)
     steady |= by_others
     strictly |= by_others
     turned, beside = np.abs(before - after), np.maximum(gap[inner - 1], gap[inner + 1])
     length = gap[inner] / beside
     apart = (turned >= APART * larger) & (turned * gap[inner] >= SMALLEST * full_range)
     some = np.flatnonzero(steady & apart & ((before * after < 0) | (length <= LONGER)))
-    doubt = _in_doubt(speed[inner], before, after, length, rests)[some]
+    doubt = _in_doubt(speed[inner], before, after, length, (rests, stood))[some]
     rows = inner[some]
     with np.errstate(all="ignore"):
         clock = time[rows] + gap[rows] * ((speed[inner] - after) / (before - after))[some]
@@ -126,18 +149,18 @@ def _corners(deflection: Array, time: Array, full_range: float, rests: bool) -> 
 
 
 def _as_others(
-    speed: Array, inner: NDArray[np.intp], before: Array, after: Array, unknown: NDArray[np.bool_]
+    deflection: Array, time: Array, inner: NDArray[np.intp], before: Array, after: Array, unknown: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """(n,) True where the disc left a rest of two intervals or more, or came to one, at the speed of all other moves of
     the test (`_one_speed`), its own being ``unknown`` (n,). ``before`` and ``after`` (n,) m/s become these there.
     """
-    known, resting = _one_speed(speed)
+    step = np.diff(deflection)
+    known, moved, as_high = _one_speed(np.abs(step), np.sign(step), np.diff(time))
     if not known:
         return np.zeros(inner.size, np.bool_)
-    moved = np.sign(np.where(resting, 0.0, speed))
     along = moved[inner]
-    some = unknown & (along != 0)
-    long = np.pad(resting, 2)  # a turn midway between two readings is a rest in one interval, too
+    some = unknown & (along != 0) & as_high[inner]
+    long = np.pad(moved == 0, 2)  # a turn midway between two readings is a rest in one interval, too
     leaves = some & long[inner + 1] & long[inner] & (moved[inner + 1] == along)
     comes = some & long[inner + 3] & long[inner + 4] & (moved[inner - 1] == along)
     before[leaves], after[leaves] = 0.0, known * along[leaves]
@@ -145,33 +168,39 @@ def _as_others(
     return np.asarray(leaves | comes)
 
 
-def _one_speed(speed: Array) -> tuple[float, NDArray[np.bool_]]:
-    """(m/s, (M,)): the speed of all moves between rests, 0 if they have none in common; True where the disc rests.
+def _one_speed(step: Array, sign: Array, gap: Array) -> tuple[float, Array, NDArray[np.bool_]]:
+    """(m/s, (M,), (M,)): the speed of all moves between rests, 0 if they have none in common; to which side each of the
+    intervals moves, 0 at rest; and True in moves as high as one that shows the speed. ``step`` and ``gap``: (M,) m, s.
 
-    Intervals beside a rest may be of both: those between others say the speed, and none is faster. Two are as fast.
+    Intervals beside a rest may be of both: those between others say the speed, and none is faster. Two are as fast. A
+    lower move, as for a preload, may have another speed.
     """
-    size = np.abs(speed)
-    resting = size <= STOOD * np.max(size)
-    along = np.sign(np.where(resting, 0.0, speed))
-    within = np.flatnonzero((along[1:-1] != 0) & (along[:-2] == along[1:-1]) & (along[2:] == along[1:-1])) + 1
-    if not within.size or not np.any(resting):
-        return 0.0, resting
+    size = step / gap
+    moved = np.where(size <= STOOD * np.max(size), 0.0, sign)
+    within = np.flatnonzero((moved[1:-1] != 0) & (moved[:-2] == moved[1:-1]) & (moved[2:] == moved[1:-1])) + 1
+    if not within.size or np.all(moved != 0):
+        return 0.0, moved, moved != 0
     known = float(np.median(size[within]))
     one = np.all(np.abs(size[within] - known) <= STEADY * known) and np.max(size) <= (1 + STEADY) * known
-    return known if one and np.sum(size >= (1 - STEADY) * known) >= 2 else 0.0, resting
+    move = np.cumsum(np.diff(moved, prepend=moved[0]) != 0)
+    height = np.bincount(move, step)[move]
+    as_high = height >= (1 - STEADY) * np.min(height[within])
+    return known if one and np.sum(size >= (1 - STEADY) * known) >= 2 else 0.0, moved, as_high
 
 
-def _in_doubt(speed: Array, before: Array, after: Array, length: Array, rests: bool) -> NDArray[np.bool_]:
+def _in_doubt(speed: Array, before: Array, after: Array, length: Array, known: tuple[bool, float]) -> NDArray[np.bool_]:
     """(n,) True where the disc turned in an interval in which it may have stood still: its ends are in one place, or it
     is longer than those beside it by the factor ``length`` (n,), which two others in which the disc went on are not, or
-    the disc ``rests`` elsewhere. ``speed`` (n,) m/s there, ``before`` and ``after`` it.
+    the disc rests elsewhere. ``speed`` (n,) m/s there, ``before`` and ``after`` it; ``known``: whether it does, and
+    up to which part of the speed the ends are in one place.
     """
+    rests, stood = known
     larger = np.maximum(np.abs(before), np.abs(after))
     went_on = (np.abs(before - after) < APART * larger) & (np.abs(speed - before) < APART * larger)
     others = np.sort(length[went_on])[-2:]
     missed = min(AS_LONG * float(others[0]), MISSED) if others.size == 2 and not rests else 0.0
     longer = (length > LONGER) & (length > missed)
-    return np.asarray((before * after < 0) & ((np.abs(speed) <= STOOD * larger) | longer))
+    return np.asarray((before * after < 0) & ((np.abs(speed) <= stood * larger) | longer))
 
 
 def _met(

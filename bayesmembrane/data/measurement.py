@@ -20,6 +20,8 @@ from bayesmembrane.ground.text import file_name, showable
 
 ROUND_OFF = 1e-13
 """Of the largest deflection."""
+AWAY = 0.01
+"""Of the full range: nearer to rest the disc waits for the test."""
 BLANK_READINGS = 3
 FALLS, LEAST_TRAVEL = 3.0, 1e-7  # standard errors of a slope, and m: a fall by less is noise, and round-off
 
@@ -151,6 +153,12 @@ class Measurement:
     def holds(self) -> list[NDArray[np.intp]]:
         """The points of each time at which the disc stands still."""
         return holds(self.deflection)
+
+    @property
+    def pauses(self) -> bool:
+        """True if the disc stands still on its way, for long or not, and times say for how long."""
+        on_its_way = np.abs(self.path.deflection) > AWAY * self.full_range
+        return self.time is not None and (bool(self.holds) or bool(np.any(self.path.rests & on_its_way)))
 
     @property
     def moving(self) -> NDArray[np.bool_]:

@@ -251,6 +251,8 @@ class SampledThresholds:
     0.9 by the first ones; docs/studies/few_draws.md."""
     vague: Drawing = Drawing(enough=60.0, early=2, enough_later=8.0, most_rounds=8, share=0.03)
     """Instead of both, where what leads leaves more than noise."""
+    may_change: float = 8.0
+    """ln of a share by which draws bring one forward: linear evidences are 7 to 11 off; docs/studies/few_draws.md."""
     freedom: float = 6.0
     """Of the t-distribution: tails that no posterior of this kind has more of."""
     kept: float = 0.1

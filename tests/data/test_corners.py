@@ -89,14 +89,30 @@ def test_no_corner_is_made_up() -> None:
     for m in each:
         assert with_corners(m) is m
     timeless = [Measurement(m.deflection, m.force, m.rig, m.specimen) for m in each]
-    # Read at chosen deflections: every millimetre on the way up and back, the top among them or not; and unevenly.
-    up = np.arange(0.0, 0.0205, 1e-3)
-    for way in ([*up, *up[-2::-1]], [*up, 0.0203, *up[::-1]], [*up, 0.0203, *(up[::-1] - 0.3e-3)], [*up, *up[::-1]]):
-        timeless.append(Measurement(np.maximum(way, 0), np.ones(len(way)), each[0].rig, each[0].specimen))
-    uneven = np.cumsum(np.abs(np.sin(np.arange(1.0, 60.0))))
-    timeless.append(Measurement(1e-4 * np.append(uneven, uneven[::-1]), np.ones(118), each[0].rig, each[0].specimen))
     for m in timeless:
         assert with_corners(m) is m
+
+
+UP = np.arange(21.0)
+
+
+@pytest.mark.parametrize(
+    "cycle",
+    [
+        [*UP, *UP[-2::-1]],
+        [*UP, *UP[::-1]],
+        [*UP, 20.3, *UP[::-1]],
+        [*UP, 20.01, *UP[-2::-1]],  # the top read twice
+        [*UP, 20.4, *(UP[:0:-1] - 0.6), 0.0],  # the end of a way kept, and the next one counted from there
+        [*UP, *(UP[:0:-1] - 0.5), 0.0],  # chosen otherwise on the way back
+        np.append(np.cumsum(np.abs(np.sin(UP + 1))), np.cumsum(np.abs(np.sin(UP + 1)))[::-1]),
+    ],
+)
+@pytest.mark.parametrize("cycles", [1, 3])
+def test_readings_at_chosen_deflections_without_times_have_no_corners(cycle: list[float], cycles: int) -> None:
+    way = 1e-3 * np.concatenate([cycle, *[cycle[1:]] * (cycles - 1)])
+    m = Measurement(way, np.ones(way.size), Annulus(0.010, 0.035), Specimen("film", 5e-5))
+    assert with_corners(m) is m
 
 
 @pytest.mark.parametrize(("step", "gap"), [(0.1, 1.03), (0.01, 0.16)])
@@ -188,8 +204,8 @@ def test_a_turn_midway_between_two_readings_is_one_where_another_turn_says_so() 
 def test_readings_without_times_turn_where_those_with_times_do(seed: int) -> None:
     """Steps of one size but at turns are those of an even clock."""
     offset = np.random.default_rng(seed).uniform()
-    time = 0.41 * (np.arange(200.0) + offset)
-    way = np.interp(time, [0, 12.2, 22.4, 41.7, 60.0, 82.1], 1e-3 * np.array([0, 12.2, 2.0, 21.3, 3.0, 25.1]))
+    time = 0.41 * (np.arange(180.0) + offset)
+    way = np.interp(time, [0, 12.2, 22.4, 32.6, 42.8, 53.0, 75.2], 1e-3 * np.array([0, 12.2, 2, 12.2, 2, 12.2, 34.4]))
     told = moved(time, way)
     times, ways = corners_of(told)
     untold = with_corners(Measurement(way, told.force, told.rig, told.specimen))
@@ -237,13 +253,32 @@ def test_a_staircase_that_is_read_seldom_moves_as_fast_at_every_step() -> None:
         assert where[k] == pytest.approx(np.interp(c, clock, way), abs=1e-9)
 
 
-@pytest.mark.parametrize(("takes", "hold", "first", "gap"), [((2.9, 4.7), 14.3, 0.0, 1.3), ((0.9,), 9.1, 0.25, 1.0)])
+@pytest.mark.parametrize(
+    ("takes", "hold", "first", "gap", "readings"),
+    [
+        ((2.9, 4.7), 14.3, 0.0, 1.3, None),  # of two speeds
+        ((4.7, 0.5), 14.3, 0.0, 1.3, None),  # of two, of which the faster one is read in no whole interval
+        ((0.9,), 9.1, 0.25, 1.0, 0),  # all read at the same moments, none for a whole interval
+        ((1.42,), 14.3, 0.6, 1.3, None),  # one shows its speed, and none another
+    ],
+)
 def test_no_stop_is_made_up_where_nobody_knows_how_fast_it_was_left(
-    takes: tuple[float, ...], hold: float, first: float, gap: float
+    takes: tuple[float, ...], hold: float, first: float, gap: float, readings: int | None
 ) -> None:
-    """Of moves that take different times, or all of which are read at the same moments, none for a whole interval."""
+    """What is found is by readings of its own, and there."""
     clock, way = stairs(np.tile(1e-3 / np.array(takes), 10 // len(takes)), hold)
     time = np.arange(first, clock[-1], gap)
     at, _ = corners_of(moved(time, np.interp(time, clock, way)))
-    for c in at:  # those that readings of their own show
+    assert readings is None or at.size == readings
+    for c in at:
         assert np.min(np.abs(clock - c)) < 1e-6
+
+
+def test_a_low_first_step_need_not_be_as_fast_as_the_others() -> None:
+    """A preload at a third of the speed, held, then ramps at one speed."""
+    clock = np.cumsum([0.0, 2.0, 20.0, *np.tile([5.0, 20.0], 4)])
+    way = 1e-3 * np.concatenate([[0.0, 0.6, 0.6], 0.6 + np.repeat(5.0 * np.arange(1, 5), 2)])
+    time = np.arange(0.0, clock[-1], 1.03)
+    at, _ = corners_of(moved(time, np.interp(time, clock, way)))
+    assert np.min(np.abs(at - clock[3])) < 1e-6
+    assert np.all(at > 21.0)

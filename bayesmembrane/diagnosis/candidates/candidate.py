@@ -139,10 +139,10 @@ def unsought(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:
 
 def _shows(effect: Effect, m: Measurement) -> bool:
     """True if the motion is such that it is no matter of the energy alone."""
-    returns, rests = bool(np.any(m.leg < 0)), bool(m.time is not None and m.holds)
+    returns = bool(np.any(m.leg < 0))
     if effect.needs_speeds:
         return returns or not one_speed(m)
-    return returns or not effect.needs_return or (rests and effect.shows_at_rest)
+    return returns or not effect.needs_return or (m.pauses and effect.shows_at_rest)
 
 
 def _possible(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:

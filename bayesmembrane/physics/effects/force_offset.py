@@ -18,8 +18,8 @@ class ForceOffset(Sensor):
     """F_read = F + offset [1 + hangs delta / D - s exp(-|delta| / lift)], with s = 1 / (1 + exp(-log_odds_resting)).
 
     A load cell that was tared while the disc, or what hangs from it, rested on something reads its weight once it is
-    lifted (s = 1); one that was not tared reads it from the start (0). Cables and hoses pull more or less as the disc
-    goes to the full range D of the test.
+    lifted (s = 1); one that was not tared reads it from the start (0). Of cables and hoses that hang from it more or
+    less pulls as the disc goes to the full range D of the test.
     """
 
     name: ClassVar[str] = "force_offset"

@@ -28,9 +28,10 @@ def test_a_weight_that_rested_comes_as_it_is_lifted_and_goes_as_it_is_set_down()
 
 
 def test_a_cable_pulls_more_in_proportion_to_the_way() -> None:
-    """As its tangent does at the start, and as far up as back."""
-    found = read(0.02, -20.0, 1e-3, 0.3)
-    assert found[0] == pytest.approx(0.02, rel=1e-8)
-    assert found[50] == pytest.approx(0.026, rel=1e-8)
-    assert np.diff(found[:51]) == pytest.approx(0.006 / 50)
-    assert found == pytest.approx(found[::-1])
+    """Of the full range, of which this test goes half; as far up as back, and less below."""
+    way = np.append(WAY, [-0.01, -0.02])
+    path = Motion(way, None, 0.1)
+    found = ForceOffset().read(np.array([[0.02, -20.0, 1e-3, 0.3]]), np.zeros((1, way.size)), path)[0]
+    assert found == pytest.approx(0.02 * (1 + 0.3 * way / 0.1), rel=1e-8)
+    resting = ForceOffset().read(np.array([[0.02, 20.0, 1e-3, 0.3]]), np.zeros((1, way.size)), path)[0]
+    assert found - resting == pytest.approx(0.02 * np.exp(-np.abs(way) / 1e-3), rel=1e-6)
