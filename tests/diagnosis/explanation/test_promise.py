@@ -70,20 +70,20 @@ def test_what_is_promised_is_a_part_of_the_likelihood_over_sizes_that_are_seen(
     usual = np.minimum(base.theta, model.priors[:, 0])
     here = model.log_density(base.theta).value
     for i, effect in enumerate(OFFSETS):
-        white = search.noise.white(columns(search, base))[:, i]
-        own = search.noise.white(base.slopes)
-        length = np.linalg.norm(white - own @ np.linalg.lstsq(own, white, rcond=None)[0])
-        r = np.linspace(BELIEFS.visible, 80.0, 4000)
-        prior = np.minimum(1 / r, length / r**2) / (1 + np.log(length / BELIEFS.visible))
-        weights = []
-        for theta in (base.theta, usual):
-            log_l = []
-            for step in (white / length, -white / length):
-                here_and_there = [replace(model, data=model.data - a * step) for a in r[::40]]
-                each = [m.log_density(theta).value - here for m in here_and_there]
-                log_l.append(np.interp(r, r[::40], each))
-            weights.append(np.log(0.5 * sum(np.trapezoid(prior * np.exp(counts * v), r) for v in log_l)))
-        assert length > BELIEFS.visible
+        weights, own = [], search.noise.white(base.slopes)
+        for shape in range(len(slopes_of_effect(search, base, effect))):
+            white = search.noise.white(columns(search, base, shape))[:, i]
+            length = np.linalg.norm(white - own @ np.linalg.lstsq(own, white, rcond=None)[0])
+            r = np.linspace(BELIEFS.visible, 80.0, 4000)
+            prior = np.minimum(1 / r, length / r**2) / (1 + np.log(length / BELIEFS.visible))
+            for theta in (base.theta, usual):
+                log_l = []
+                for step in (white / length, -white / length):
+                    here_and_there = [replace(model, data=model.data - a * step) for a in r[::40]]
+                    each = [m.log_density(theta).value - here for m in here_and_there]
+                    log_l.append(np.interp(r, r[::40], each))
+                weights.append(np.log(0.5 * sum(np.trapezoid(prior * np.exp(counts * v), r) for v in log_l)))
+            assert length > BELIEFS.visible
         assert promised(search, base, effect, counts) == pytest.approx(max(weights), abs=0.1)
 
 
