@@ -121,10 +121,8 @@ class Grown:
 
     def search_to_the_end(self, keys: Sequence[Key]) -> None:
         """These hypotheses searched on until nothing is gained, and noted as such."""
-        for key, c in zip(
-            keys, self.search.all_polished([self.found[k] for k in keys], SEARCH.iterations), strict=True
-        ):
-            self.found[key] = c
+        ends = self.search.all_polished([self.found[k] for k in keys], SEARCH.iterations)
+        self.found |= dict(zip(keys, ends, strict=True))
         self.ended.update(keys)
 
 
