@@ -29,36 +29,29 @@ parts of the whole, over all sizes.
 
 FOUND = """## What grows faster than the work
 
-Only the number of parameters. Readings, walkers and specimens have exponents of 0.5 to 0.9 over all sizes, and at
-most 1 at their end.
+Only the number of parameters, and joint specimens a little, at their end. Readings and walkers have exponents of 0.3
+to 0.8 over all sizes, and at most 0.9 at their end.
 
-- **Parameters** (1.9 over all, 6.6 from 8 to 12). *A draw*, 1.6: up to three parameters the film is one curve that is
-  scaled (2 µs, and 28 with effects on it), with pre-stretch each draw has a film of its own (70 µs), and with twelve
-  they are asked for in the small batches of emcee's walkers; from 4 to 10 parameters the exponent is 0.3. *Draws
-  asked for*: from 8 parameters on the mixture is worth less, and at 12 it is not close enough, so that emcee's
-  ensembles walk. *All else*: at 12 parameters 45 of 61 s. Under a profiler 62 of 79 s of such a run (its first 330
-  steps) went into six rounds of learning a mixture that was then not used, and 43 of these 62 into one call, the
-  nearest point that tells whether the prior is cut there (`Lookup`): in twelve dimensions a tree looks at nearly all
-  of them.
-- *What could be done about it.* In that case the look-up tells nothing: all 245 of 1472 points that were not possible
-  had left the bounds of an effect (a half-normal prior), which the density of the prior knows without it; a
-  neo-Hookean film is always convex. Only points that convexity or the film cut away need looking up. And rounds that
-  come to nothing could end sooner.
+- **Parameters** (2.4 over all, 4.2 from 6 to 15). *A draw*, 1.2: up to two parameters the film is one curve that is
+  scaled (33 µs with an effect on it), with pre-stretch each draw has a film of its own (80 µs, and no more up to ten
+  parameters), and the film on a frame that yields, which is the last effect, has to be closed (140 to 170 µs). *Draws
+  asked for*, 1.7: with fifteen parameters one run of two fell back on emcee's ensembles, and both asked for 800 000
+  to 1 100 000 draws, for twice the effective ones that ten parameters have from 58 000. From one to ten parameters
+  the cost grows 47-fold.
+- *What could be done about it* was not looked into: four of the frame's five coordinates are shapes that a first
+  cycle hardly shows, with bounds on most sides, where a mixture of normal distributions may be poor.
 
 Beside the exponents:
 
-- `sample` of 20 000 readings takes 20 times as long as of 250: 11 s in the density (1.8 ms a draw), 6 s in all else.
-  The number of draws does not grow.
-- A draw with form error costs 3.3 ms at 20 000 readings, and nowhere grows faster than they do.
-- Walkers: more of them are more draws (122 000 effective with 1024), and the cost of a draw falls with the batch
-  (emcee: 41 to 13 µs). Ensembles of 1024 were refused, with a false reason, until more starts were tried for them.
-- Specimens: a joint posterior walks with emcee whatever is asked, since its walk begins without a mixture; one film
-  takes 3.1 s that way, and some 0.5 s by `sample` alone. Half of the time at 100 films is in their densities (61 µs a
-  film), half in all else, among it emulated curves of all readings (those of one test are shortened to a few axes,
-  those of several are not) and a run for each test.
+- `sample` of 20 000 readings takes 5.1 times as long as of 250, though it asks for a tenth of the draws; 2.1 of its
+  3.0 s are not in the density.
+- A draw with form error costs 2.2 ms at 20 000 readings, and nowhere grows faster than they do.
+- Walkers: more of them are more draws (114 000 effective with 1024), and by emcee the cost of a draw falls with the
+  batch (49 to 15 µs).
+- Specimens: 100 joint ones take 34 s, of which 11 s are in their densities (17 µs a film) and 24 s in all else, among
+  it a run for each test. From 30 to 100 their exponent is 1.2.
 - A population of 100 specimens takes a second.
 """
-
 Part = Callable[[Row], float]
 PARTS: dict[str, Part] = {
     "draws asked for": lambda r: r["evaluations"],
