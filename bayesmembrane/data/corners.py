@@ -122,7 +122,7 @@ def _corners(
     length = gap[inner] / beside
     apart = (turned >= APART * larger) & (turned * gap[inner] >= SMALLEST * full_range)
     some = np.flatnonzero(steady & apart & ((before * after < 0) | (length <= LONGER)))
-    doubt = _in_doubt(speed[inner], before, after, length, (rests, stood))[some]
+    doubt = _in_doubt(speed[inner], before, after, length, rests, stood)[some]
     rows = inner[some]
     with np.errstate(all="ignore"):
         clock = time[rows] + gap[rows] * ((speed[inner] - after) / (before - after))[some]
@@ -154,8 +154,7 @@ def _as_others(
     """(n,) True where the disc left a rest of two intervals or more, or came to one, at the speed of all other moves of
     the test (`_one_speed`), its own being ``unknown`` (n,). ``before`` and ``after`` (n,) m/s become these there.
     """
-    step = np.diff(deflection)
-    known, moved, as_high = _one_speed(np.abs(step), np.sign(step), np.diff(time))
+    known, moved, as_high = _one_speed(np.diff(deflection), np.diff(time))
     if not known:
         return np.zeros(inner.size, np.bool_)
     along = moved[inner]
@@ -168,33 +167,32 @@ def _as_others(
     return np.asarray(leaves | comes)
 
 
-def _one_speed(step: Array, sign: Array, gap: Array) -> tuple[float, Array, NDArray[np.bool_]]:
+def _one_speed(step: Array, gap: Array) -> tuple[float, Array, NDArray[np.bool_]]:
     """(m/s, (M,), (M,)): the speed of all moves between rests, 0 if they have none in common; to which side each of the
     intervals moves, 0 at rest; and True in moves as high as one that shows the speed. ``step`` and ``gap``: (M,) m, s.
 
     Intervals beside a rest may be of both: those between others say the speed, and none is faster. Two are as fast. A
     lower move, as for a preload, may have another speed.
     """
-    size = step / gap
-    moved = np.where(size <= STOOD * np.max(size), 0.0, sign)
+    size = np.abs(step) / gap
+    moved = np.where(size <= STOOD * np.max(size), 0.0, np.sign(step))
     within = np.flatnonzero((moved[1:-1] != 0) & (moved[:-2] == moved[1:-1]) & (moved[2:] == moved[1:-1])) + 1
     if not within.size or np.all(moved != 0):
         return 0.0, moved, moved != 0
     known = float(np.median(size[within]))
     one = np.all(np.abs(size[within] - known) <= STEADY * known) and np.max(size) <= (1 + STEADY) * known
     move = np.cumsum(np.diff(moved, prepend=moved[0]) != 0)
-    height = np.bincount(move, step)[move]
+    height = np.bincount(move, np.abs(step))[move]
     as_high = height >= (1 - STEADY) * np.min(height[within])
     return known if one and np.sum(size >= (1 - STEADY) * known) >= 2 else 0.0, moved, as_high
 
 
-def _in_doubt(speed: Array, before: Array, after: Array, length: Array, known: tuple[bool, float]) -> NDArray[np.bool_]:
+def _in_doubt(speed: Array, before: Array, after: Array, length: Array, rests: bool, stood: float) -> NDArray[np.bool_]:
     """(n,) True where the disc turned in an interval in which it may have stood still: its ends are in one place, or it
     is longer than those beside it by the factor ``length`` (n,), which two others in which the disc went on are not, or
-    the disc rests elsewhere. ``speed`` (n,) m/s there, ``before`` and ``after`` it; ``known``: whether it does, and
-    up to which part of the speed the ends are in one place.
+    the disc ``rests`` elsewhere. ``speed`` (n,) m/s there, ``before`` and ``after`` it; up to the part ``stood`` of
+    these the ends are in one place.
     """
-    rests, stood = known
     larger = np.maximum(np.abs(before), np.abs(after))
     went_on = (np.abs(before - after) < APART * larger) & (np.abs(speed - before) < APART * larger)
     others = np.sort(length[went_on])[-2:]

@@ -155,7 +155,7 @@ class Measurement:
         return holds(self.deflection)
 
     @property
-    def pauses(self) -> bool:
+    def has_pauses(self) -> bool:
         """True if the disc stands still on its way, for long or not, and times say for how long."""
         on_its_way = np.abs(self.path.deflection) > AWAY * self.full_range
         return self.time is not None and (bool(self.holds) or bool(np.any(self.path.rests & on_its_way)))

@@ -254,7 +254,7 @@ def test_a_staircase_that_is_read_seldom_moves_as_fast_at_every_step() -> None:
 
 
 @pytest.mark.parametrize(
-    ("takes", "hold", "first", "gap", "readings"),
+    ("takes", "hold", "first", "gap", "corners"),
     [
         ((2.9, 4.7), 14.3, 0.0, 1.3, None),  # of two speeds
         ((4.7, 0.5), 14.3, 0.0, 1.3, None),  # of two, of which the faster one is read in no whole interval
@@ -263,13 +263,13 @@ def test_a_staircase_that_is_read_seldom_moves_as_fast_at_every_step() -> None:
     ],
 )
 def test_no_stop_is_made_up_where_nobody_knows_how_fast_it_was_left(
-    takes: tuple[float, ...], hold: float, first: float, gap: float, readings: int | None
+    takes: tuple[float, ...], hold: float, first: float, gap: float, corners: int | None
 ) -> None:
     """What is found is by readings of its own, and there."""
     clock, way = stairs(np.tile(1e-3 / np.array(takes), 10 // len(takes)), hold)
     time = np.arange(first, clock[-1], gap)
     at, _ = corners_of(moved(time, np.interp(time, clock, way)))
-    assert readings is None or at.size == readings
+    assert corners is None or at.size == corners
     for c in at:
         assert np.min(np.abs(clock - c)) < 1e-6
 

@@ -142,7 +142,7 @@ def _shows(effect: Effect, m: Measurement) -> bool:
     returns = bool(np.any(m.leg < 0))
     if effect.needs_speeds:
         return returns or not one_speed(m)
-    return returns or not effect.needs_return or (m.pauses and effect.shows_at_rest)
+    return returns or not effect.needs_return or (m.has_pauses and effect.shows_at_rest)
 
 
 def _possible(measurement: Measurement, hypothesis: Hypothesis) -> list[Effect]:

@@ -15,7 +15,7 @@ def one_speed(*measurements: Measurement) -> bool:
     """
     timed = [m for m in measurements if m.time is not None]
     each = [v for m in timed for v in _speeds(m)]
-    return not any(m.pauses for m in timed) and (len(each) < 2 or max(each) < TWINS.speeds * min(each))
+    return not any(m.has_pauses for m in timed) and (len(each) < 2 or max(each) < TWINS.speeds * min(each))
 
 
 def _speeds(measurement: Measurement) -> list[float]:

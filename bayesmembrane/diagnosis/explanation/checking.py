@@ -59,8 +59,8 @@ def _nothing_stands_out(out: Grown, seen: Mapping[Key, float]) -> bool:
     most = max(shares.values())
     near = [out.found[key] for key, s in shares.items() if most - s < SAMPLED.may_change]
     first = out.found[max(shares, key=shares.__getitem__)]
-    with_effects = (c for c in near if out.own(c))
-    return bool(out.own(first)) and all(structure(out.search, c) >= BELIEFS.blurred for c in with_effects)
+    rivals = (c for c in near if out.own(c))
+    return bool(out.own(first)) and all(structure(out.search, c) >= BELIEFS.blurred for c in rivals)
 
 
 def _to_the_end(out: Grown) -> None:

@@ -21,9 +21,11 @@ Joint = Mapping[tuple[str, str], float]
 """Probabilities by (set of effects, kind of what is foreign)."""
 
 
-def told(joint: Joint, visible: Sequence[str], vague: Mapping[str, float]) -> tuple[dict[tuple[str, str], float], ...]:
-    """What is told of the sum where effects of these names are ``visible``; before it, without what is told of sets and
-    faults next to those that were weighed. ``vague``, 0 to 1 by kind of what is foreign: how far none stands out.
+def told(joint: Joint, visible: Sequence[str], vague: Mapping[str, float]) -> tuple[Joint, Joint]:
+    """(flattened, told): the sum as it is flattened, and that with parts of it told of sets next to those that were
+    weighed, of effects whose names are ``visible``, and of faults that are not listed.
+
+    vague : 0 to 1 by kind of what is foreign, how far no set stands out beside it
     """
     flat = _flattened(joint, vague)
     near = _with_neighbours(flat, visible, vague)

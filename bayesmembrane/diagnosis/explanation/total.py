@@ -139,7 +139,7 @@ def summed(grown: Grown) -> Total:
     shown = [f for f in found if f.counted(grown.counts) > BELIEFS.supported]  # what the data speak for
     kinds = kinds_of(found)
     nothing = BELIEFS.log_foreign(0) if kinds else 0.0
-    strange = _beside_tears(grown, every, weights, shown, (BELIEFS.log_foreign(kinds), nothing))
+    strange = _beside_tears(grown, every, weights, shown, BELIEFS.log_foreign(kinds), nothing)
     every.sort(key=weights, reverse=True)
     terms = [(c, NOTHING, weights(c) + nothing) for c in every]
     terms += [(f.base, f.key, w) for f, w in zip(shown, strange, strict=True)]
@@ -197,12 +197,14 @@ def _beside_tears(
     every: Sequence[Candidate],
     weights: _Weights,
     shown: Sequence[Foreign],
-    log_prior: tuple[float, float],
+    of_kind: float,
+    of_none: float,
 ) -> list[float]:
     """ln of the weight of what is foreign and ``shown``, no less than what leaves the same trace allows; and sets are
-    raised in ``weights`` by what it has that a tear of theirs leaves, too. ``log_prior``: of a kind, and of none.
+    raised in ``weights`` by what it has that a tear of theirs leaves, too. ``of_kind`` and ``of_none``: ln of
+    the probability of one kind, and of nothing foreign, before the data.
     """
-    counts, (of_kind, of_none) = grown.counts, log_prior
+    counts = grown.counts
     strange = [weights.own[key_of(f.base)] - counts * _undone(f) + f.counted(counts) + of_kind for f in shown]
     tears = [_tears(f, every, grown.search) for f in shown]
     least = [_like_a_tear(f, some, weights, grown.search) for f, some in zip(shown, tears, strict=True)]

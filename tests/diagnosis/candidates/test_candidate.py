@@ -30,7 +30,7 @@ def test_relaxation_is_sought_on_stairs_whose_steps_are_held_for_few_readings(
     m = measured(way, np.arange(way.size) + 1.0)
     m = m if timed else timeless(m)
     assert not m.holds
-    assert m.pauses is seen
+    assert m.has_pauses is seen
     assert ("viscoelastic" in {e.name for e in available(m, hypothesis("gent"))}) is seen
     assert not (seen and one_speed(m))
 
