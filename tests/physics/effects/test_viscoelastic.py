@@ -1,0 +1,103 @@
+"""Relaxation that stress quickens: a flow of the network."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
+
+from bayesmembrane.physics.effects._history import relaxing
+from bayesmembrane.physics.effects.viscoelastic import TERMS, USUAL, Viscoelastic, flowing
+from tests.physics.effects.protocols import path
+
+TIMES = 15.0 * 10 ** (1.5 * ((np.arange(TERMS) + 0.5) / TERMS - 0.5))
+EVEN = np.full(TERMS, 1 / TERMS)
+
+
+def two_loadings(points: int = 40, wait: int = 6, seconds: float = 60.0) -> tuple[np.ndarray, np.ndarray]:
+    """Up to 50 mm, held there, down and up again; (N,) deflections in m, and times in s."""
+    up = np.linspace(0.0, 0.05, points + 1)
+    d = np.concatenate([up[1:], np.full(wait, 0.05), up[-2::-1], up[1:]])
+    return d, np.cumsum(np.where(np.diff(d, prepend=0.0) == 0, 10.0, seconds / points))
+
+
+def stiffening(d: np.ndarray) -> np.ndarray:
+    x = d / np.max(d)
+    return 0.3 * x + x**3
+
+
+def integrated(stress: np.ndarray, time: np.ndarray, flow) -> np.ndarray:  # type: ignore[no-untyped-def]
+    """(N,) what is left of a ``stress`` (N,) that moves evenly between times, h' = stress' - flow(h)."""
+    h, left = np.zeros(TERMS), []
+    for (before, value), (begin, end) in zip(
+        itertools.pairwise(np.append(0.0, stress)), itertools.pairwise(np.append(0.0, time)), strict=True
+    ):
+        rate = (value - before) / (end - begin)
+        run = solve_ivp(lambda _, h, r=rate: r - flow(h), (0, end - begin), h, "LSODA", rtol=1e-8, atol=1e-10)
+        h = run.y[:, -1]
+        left.append(h @ EVEN)
+    return np.array(left)
+
+
+@pytest.mark.parametrize("points", [12, 60])
+@pytest.mark.parametrize("quickens", [3.0, 12.0, 30.0])
+def test_a_flow_equals_an_integrator_with_error_control(points: int, quickens: float) -> None:
+    d, time = two_loadings(points)
+    stress = stiffening(d)
+    exact = integrated(stress, time, lambda h: h / TIMES * np.exp(quickens * (abs(h @ EVEN) - USUAL)))
+    found = flowing(stress[None], path(d, time), TIMES[None], EVEN[None], np.array([quickens]))[0]
+    assert found == pytest.approx(exact, abs=0.015 * np.max(np.abs(exact)))
+    assert np.sqrt(np.mean((found - exact) ** 2)) < 0.004 * np.max(np.abs(exact))
+
+
+def test_one_that_stress_hardly_quickens_is_linear() -> None:
+    d, time = two_loadings()
+    stress, way = stiffening(d)[None], path(d, time)
+    linear = relaxing(stress, np.diff(way.clock, prepend=0.0), TIMES[None], EVEN[None])
+    for little in (0.0, 1e-7):
+        assert flowing(stress, way, TIMES[None], EVEN[None], np.array([little])) == pytest.approx(linear, abs=1e-7)
+
+
+def test_films_side_by_side_equal_films_alone() -> None:
+    d, time = two_loadings()
+    way, force = path(d, time), stiffening(d)
+    p = np.repeat(Viscoelastic().typical[None], 3, axis=0)
+    p[:, 6] = 0.0, 5.0, 20.0
+    together = Viscoelastic().remember(p, np.repeat(force[None], 3, axis=0), way)
+    alone = [Viscoelastic().remember(row[None], force[None], way)[0] for row in p]
+    assert together == pytest.approx(np.array(alone), rel=1e-9)
+
+
+def test_loops_of_a_flow_depend_less_on_speed() -> None:
+    """Twenty times slower a loop of what relaxes linearly closes by two thirds; that of a flow by one."""
+
+    def width(quickens: float, seconds: float) -> float:
+        d, time = two_loadings(wait=0, seconds=seconds)
+        p = Viscoelastic().typical[None].copy()
+        p[0, 1], p[0, 2], p[0, 6] = 5.0, 0.0, quickens
+        kept = Viscoelastic().remember(p, stiffening(d)[None], path(d, time))[0]
+        up, down = kept[:40], kept[40:80][::-1]
+        return float(np.mean(up[1:] - down[:-1]))
+
+    linear, flow = (width(q, 400.0) / width(q, 20.0) for q in (0.0, 30.0))
+    assert linear < 0.6 * flow
+
+
+def test_a_flow_with_a_power_of_the_stress_is_followed() -> None:
+    """A Maxwell element whose rate of flow is the fourth power of its stress, which is not the law's own form."""
+    d, time = two_loadings(60)
+    stress, way = stiffening(d), path(d, time)
+    element = integrated(stress, time, lambda h: np.sign(h) * 0.5 * (np.abs(h) / 0.2) ** 4)
+    measured = stress - 0.3 * (stress - element)
+
+    def misfit(q: np.ndarray, flows: bool) -> np.ndarray:
+        p = np.array([[q[0], np.exp(q[1]), abs(q[2]), 1.0, 0.0, 0.0, abs(q[3]) if flows else 0.0]])
+        return Viscoelastic().remember(p, stress[None], way)[0] - measured
+
+    rms = [
+        np.sqrt(2 * least_squares(misfit, (0.3, np.log(10.0), 1.0, 8.0), args=(flows,)).cost / d.size)
+        for flows in (False, True)
+    ]
+    assert rms[1] < 0.4 * rms[0]
+    assert rms[1] < 0.005 * np.max(measured)
