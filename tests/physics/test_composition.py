@@ -157,7 +157,7 @@ def test_relaxation_is_the_convolution(measure: float, tilt: float) -> None:
 
 def test_a_softened_film_unloads_below_and_rejoins() -> None:
     m = measured(staircase((0.03, 0.03, 0.05)))
-    f, plain = force(m, "mullins", x=np.array([0.2, 0.5, 1.0, 2.0, 0.0])), force(m)
+    f, plain = force(m, "mullins", x=np.array([0.2, 0.5, 1.0, 2.0, 0.0, 0.0])), force(m)
     first, again, third = (m.cycle == i for i in (1, 2, 3))
     up, down = m.leg > 0, m.leg < 0
     assert f[first & up] == pytest.approx(plain[first & up], rel=1e-12)
@@ -170,10 +170,24 @@ def test_a_softened_film_unloads_below_and_rejoins() -> None:
     assert f[beyond] == pytest.approx(plain[beyond], rel=1e-12)
 
 
+def test_damage_that_is_repeated_goes_on_with_the_way_of_the_energy() -> None:
+    """(1 - F / F0) / softening = (1 - exp(-[(1 - c) M + c A] / w)) / (1 - exp(-1 / w)), by sums over the path."""
+    m = measured(staircase((0.03, 0.03, 0.05)))
+    softening, width, power, part = 0.2, 0.8, 2.0, 0.4
+    lost = 1 - force(m, "mullins", x=np.array([softening, width, 1.0, power, 1.0, part])) / force(m)
+    way = (np.append(0.0, m.path.deflection) / m.full_range) ** power
+    energy = np.cumsum(np.abs(np.diff(way)))[m.on_path]
+    most = np.maximum.accumulate(way)[1:][m.on_path]
+    expected = np.expm1(-((1 - part) * most + part * energy) / width) / np.expm1(-1 / width)
+    assert lost == pytest.approx(softening * expected, rel=1e-9)
+    first, again = (m.cycle == i for i in (1, 2))
+    assert np.min(lost[again]) > np.max(lost[first & (m.leg > 0)])
+
+
 def test_continuum_damage_softens_first_loading_too_and_is_the_same_wherever_the_film_is() -> None:
     """F / F0 is a function of the largest deflection alone."""
     m = measured(staircase((0.03, 0.03, 0.05)))
-    part = force(m, "mullins", x=np.array([0.2, 0.5, 1.0, 2.0, 1.0])) / force(m)
+    part = force(m, "mullins", x=np.array([0.2, 0.5, 1.0, 2.0, 1.0, 0.0])) / force(m)
     most = np.maximum.accumulate(m.deflection) / m.full_range
     lost = np.expm1(-(most**2) / 0.5) / np.expm1(-1 / 0.5)
     pulled = m.deflection > 2e-3

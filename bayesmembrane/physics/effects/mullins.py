@@ -17,11 +17,13 @@ from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmSta
 class Mullins(Carried):
     """F = F0 (1 - softening [(1 - damage) erf((1 - (delta / m)^power) / w) / erf(1 / width) + damage H(m) / H(D)]).
 
-    With w = width (D / m)^fading and H(m) = 1 - exp(-(m / D)^power / width), where m is the largest deflection so far
-    and D the full range of the test. (delta / m)^power stands for the stored energy relative to its maximum W_m: the
-    reference's erf((W_m - W) / (a + b W_m)) with b = 0 is fading = power, with a = 0 it is fading = 0. Unloading runs
-    below loading, and reloading rejoins at m. ``damage`` is the part of continuum damage, 1 - exp(-W_m / c), which
-    softens first loading, too (J. C. Simo, Comput. Methods Appl. Mech. Eng. 60 (1987) 153).
+    With w = width (D / m)^fading, H(m) = 1 - exp(-[(1 - repeated) (m / D)^power + repeated A] / width) and H(D) that of
+    a first loading to D, where m is the largest deflection so far, D the full range of the test and A the sum so far of
+    all changes, up and down, of (delta / D)^power. (delta / m)^power stands for the stored energy relative to its
+    maximum W_m: the reference's erf((W_m - W) / (a + b W_m)) with b = 0 is fading = power, with a = 0 it is fading = 0.
+    Unloading runs below loading, and reloading rejoins at m. ``damage`` is the part of continuum damage,
+    1 - exp(-W_m / c), which softens first loading, too (J. C. Simo, Comput. Methods Appl. Mech. Eng. 60 (1987) 153);
+    what is ``repeated`` of it goes on in every cycle (C. Miehe, Eur. J. Mech. A 14 (1995) 697).
     """
 
     name: ClassVar[str] = "mullins"
@@ -59,11 +61,19 @@ class Mullins(Carried):
         EffectParameter(
             "damage", "-", "part that first loading loses, too, as it goes on", Uniform(0.0, 1.0), (0.0, 1.0)
         ),
+        EffectParameter(
+            "repeated",
+            "-",
+            "part of that which goes on in every cycle, up and down, and not only beyond the previous maximum",
+            HalfNormal(0.3),
+            (0.0, 1.0),
+            begin=0.0,
+        ),
     )
 
     @property
     def starts(self) -> list[dict[str, float]]:
-        return [{"damage": 0.05}, {"damage": 0.95}]
+        return [{"damage": 0.05}, {"damage": 0.95}, {"damage": 0.5, "repeated": 0.5}]
 
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         given = [for_kernel(np.atleast_2d(v)) for v in (p, state.deflection, state.reached)]
@@ -76,15 +86,23 @@ class Mullins(Carried):
 def _lost(p, deflection, reached, full, out):  # type: ignore[no-untyped-def]
     """(B, N) what stands in brackets: most readings reach no further, and of three powers one is new at each."""
     for b in range(out.shape[0]):
-        width, fading, power, damage = p[b, 1], p[b, 2], p[b, 3], p[b, 4]
-        i, before, wide, ever = b if deflection.shape[0] > 1 else 0, -1.0, 1.0, 0.0
+        width, fading, power, damage, repeated = p[b, 1], p[b, 2], p[b, 3], p[b, 4], p[b, 5]
+        i, before, wide, most = b if deflection.shape[0] > 1 else 0, -1.0, 1.0, 0.0
+        at, path = 0.0, 0.0
         back_whole, ever_whole = math.erf(1.0 / width), np.expm1(-1.0 / width)
+        ever = 0.0
         for n in range(out.shape[1]):
             m, x = reached[i, n], deflection[i, n]
-            if m != before:
+            new = m != before
+            if new:
                 before = m
                 wide = width * (full / max(m, 1e-6 * full)) ** fading
-                ever = np.expm1(-((m / full) ** power) / width) / ever_whole
+                most = (m / full) ** power
             part = (x / m if x > 0.0 else 0.0) if m > 0.0 else 1.0
-            back = math.erf((1.0 - part**power) / wide) / back_whole if part < 1.0 else 0.0
+            lower = part**power if part < 1.0 else 1.0
+            if repeated > 0.0:
+                path, at = path + abs(lower * most - at), lower * most
+            if new or repeated > 0.0:
+                ever = np.expm1(-((1.0 - repeated) * most + repeated * path) / width) / ever_whole
+            back = math.erf((1.0 - lower) / wide) / back_whole if part < 1.0 else 0.0
             out[b, n] = (1.0 - damage) * back + damage * ever
