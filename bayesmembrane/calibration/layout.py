@@ -73,6 +73,7 @@ def laid_out(measurement: Measurement, walk: Mapping[str, Array] | None = None, 
         "specimen": {"name": measurement.specimen.name, "thickness": measurement.specimen.thickness},
         "provenance": {**asdict(p), "notes": list(p.notes)},
         "full_range": measurement.full_range,
+        "full_force": measurement.full_force,
     }
     data.constant_data.attrs["measurement"] = json.dumps(about)
     return data
@@ -104,13 +105,14 @@ def measurement_of(data: Groups) -> Measurement:
     if "covariance" in arrays:
         arrays.pop("force_sd", None)
     notes = {**about["provenance"], "notes": tuple(about["provenance"]["notes"])}
+    more: dict[str, Any] = {"places": places, **arrays}
     return Measurement(
         force=np.asarray(data.observed_data["force"].values, dtype=float),
         rig=rig,
         specimen=Specimen(**about["specimen"]),
         provenance=Provenance(**notes),
         full_range=about["full_range"],
+        full_force=float(about.get("full_force", np.nan)),
         motion=Motion(**{"time": None, "full_range": about["full_range"], **motion}) if motion else None,
-        places=places,
-        **arrays,
+        **more,
     )

@@ -75,6 +75,7 @@ class Measurement:
     force_sd : (N,) N, standard deviation of the measurement's own noise, or None if unknown
     covariance : (N, N) N^2, covariance of that noise, or None if it is independent or unknown
     full_range : the largest deflection of the whole measurement in m, also where this one is truncated
+    full_force : the largest force of it in N, likewise, whatever its sign
     motion : how the disc was moved, also past points that were left out; the film remembers those too
     places : (N,) where the points lie on it
     across : (N,) stretch across the direction of pull where it was measured (biaxial tests), or None
@@ -94,6 +95,7 @@ class Measurement:
     covariance: Array | None = None
     provenance: Provenance = Provenance()
     full_range: float = math.nan
+    full_force: float = math.nan
     motion: Motion | None = None
     places: NDArray[np.int64] | None = None
     across: Array | None = None
@@ -119,6 +121,8 @@ class Measurement:
             raise DataError("the standard deviation of the force must be positive at every point")
         if not math.isfinite(self.full_range):
             self._set("full_range", float(np.max(self.deflection)))
+        if not math.isfinite(self.full_force):
+            self._set("full_force", float(np.max(np.abs(self.force))))
 
     def __len__(self) -> int:
         """The number of points."""
@@ -220,7 +224,7 @@ class Measurement:
         return parts
 
     def select(self, keep: NDArray[Any]) -> Measurement:
-        """The points at ``keep``, (N,) booleans or indices in order; `full_range` and the path to the last stay."""
+        """The points at ``keep``, (N,) booleans or indices in order; what is full, and the path to the last, stay."""
 
         def part(array: Array | None) -> Array | None:
             return None if array is None else array[keep]

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from bayesmembrane.data.motion import jitter
 from bayesmembrane.ground.compiling import compiled, for_kernel
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
@@ -19,11 +20,13 @@ class Mullins(Carried):
 
     With w = width (D / m)^fading, H(m) = 1 - exp(-[(1 - repeated) (m / D)^power + repeated A] / width) and H(D) that of
     a first loading to D, where m is the largest deflection so far, D the full range of the test and A the sum so far of
-    all changes, up and down, of (delta / D)^power. (delta / m)^power stands for the stored energy relative to its
-    maximum W_m: the reference's erf((W_m - W) / (a + b W_m)) with b = 0 is fading = power, with a = 0 it is fading = 0.
-    Unloading runs below loading, and reloading rejoins at m. ``damage`` is the part of continuum damage,
-    1 - exp(-W_m / c), which softens first loading, too (J. C. Simo, Comput. Methods Appl. Mech. Eng. 60 (1987) 153);
-    what is ``repeated`` of it goes on in every cycle (C. Miehe, Eur. J. Mech. A 14 (1995) 697).
+    all changes, up and down, of (delta / D)^power; a way back that is shorter than the jitter of the readings is none.
+    (delta / m)^power stands for the stored energy relative to its maximum W_m: the reference's erf((W_m - W) /
+    (a + b W_m)) with b = 0 is fading = power, with a = 0 it is fading = 0. Unloading runs below loading, and reloading
+    rejoins at m, but for what is repeated. ``damage`` is the part of continuum damage, 1 - exp(-W_m / c), which softens
+    first loading, too (J. C. Simo, Comput. Methods Appl. Mech. Eng. 60 (1987) 153); what is ``repeated`` of it goes on
+    in every cycle (C. Miehe, Eur. J. Mech. A 14 (1995) 697). Where the square bracket is more than 1, as after many
+    cycles, what is kept falls off exponentially instead, with the same slope: never below nothing.
     """
 
     name: ClassVar[str] = "mullins"
@@ -31,7 +34,7 @@ class Mullins(Carried):
     reference: ClassVar[str] = "R. W. Ogden, D. G. Roxburgh, Proc. R. Soc. A 455 (1999) 2861"
     signature: ClassVar[str] = (
         "Unloading and reloading below the previous maximum are softer than first loading and coincide with each "
-        "other; the curve rejoins first loading where the previous maximum is passed."
+        "other, or nearly so; the curve rejoins first loading where the previous maximum is passed."
     )
     of_the_material = True
     needs_return: ClassVar[bool] = True
@@ -78,19 +81,19 @@ class Mullins(Carried):
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         given = [for_kernel(np.atleast_2d(v)) for v in (p, state.deflection, state.reached)]
         lost = np.empty((len(p), given[1].shape[1]))
-        _lost(*given, state.path.full_range, lost)
-        return np.asarray(force * np.maximum(1.0 - p[:, :1] * lost, 0.0))
+        _lost(*given, state.path.full_range, jitter(state.path.deflection), lost)
+        kept, beyond = 1.0 - p[:, :1], np.maximum(lost - 1.0, 0.0)
+        return np.asarray(force * (1.0 - p[:, :1] * np.minimum(lost, 1.0)) * np.exp(-p[:, :1] / kept * beyond))
 
 
 @compiled(error_model="numpy")
-def _lost(p, deflection, reached, full, out):  # type: ignore[no-untyped-def]
+def _lost(p, deflection, reached, full, least, out):  # type: ignore[no-untyped-def]
     """(B, N) what stands in brackets: most readings reach no further, and of three powers one is new at each."""
     for b in range(out.shape[0]):
         width, fading, power, damage, repeated = p[b, 1], p[b, 2], p[b, 3], p[b, 4], p[b, 5]
         i, before, wide, most = b if deflection.shape[0] > 1 else 0, -1.0, 1.0, 0.0
-        at, path = 0.0, 0.0
+        turn, at, path, ever = 0.0, 0.0, 0.0, 0.0
         back_whole, ever_whole = math.erf(1.0 / width), np.expm1(-1.0 / width)
-        ever = 0.0
         for n in range(out.shape[1]):
             m, x = reached[i, n], deflection[i, n]
             new = m != before
@@ -100,8 +103,8 @@ def _lost(p, deflection, reached, full, out):  # type: ignore[no-untyped-def]
                 most = (m / full) ** power
             part = (x / m if x > 0.0 else 0.0) if m > 0.0 else 1.0
             lower = part**power if part < 1.0 else 1.0
-            if repeated > 0.0:
-                path, at = path + abs(lower * most - at), lower * most
+            if repeated > 0.0 and (abs(x - turn) >= least or x == m):
+                path, at, turn = path + abs(lower * most - at), lower * most, x
             if new or repeated > 0.0:
                 ever = np.expm1(-((1.0 - repeated) * most + repeated * path) / width) / ever_whole
             back = math.erf((1.0 - lower) / wide) / back_whole if part < 1.0 else 0.0

@@ -17,14 +17,16 @@ from bayesmembrane.physics.reach import SOURCE
 TERMS = 12
 """Nearly two to a decade at the largest width."""
 USUAL = 0.15
-"""Of the largest measured force: where what has not yet relaxed is this, it relaxes in the times that are told."""
+"""Of the largest stress: where what has not yet relaxed is this, it relaxes in the times that are told."""
 MOST = 40.0
 """The largest power of e by which it relaxes more quickly, and to which anything relaxes in a step."""
 STEPS = 40
 """To the full range, at least, in which a flow is followed."""
-HALVED = 5
-"""Parts of the first wait after a way: the last is half of it."""
-ROUNDS = 2
+SLOW = 0.05
+"""Of the fastest before: slower than that the disc waits."""
+HALVED = 10
+"""Parts of the first wait after a way: the last is half of it, the one before a quarter."""
+ROUNDS = 3
 """In which what is left at the end of a step is found."""
 
 
@@ -43,9 +45,10 @@ class Viscoelastic(Memory):
     have m = -1 to -4, and are followed 1.1 to 2.5 times as closely as with m = 0. Where tests go to other ranges, w is
     each one's own, and m the same.
 
-    Stress quickens it: time counts exp(``quickens`` (|q| - 0.15)), with q the stress that has not yet relaxed, over the
-    largest measured force. Networks flow like that (Eyring; Bergstrom and Boyce have a power of the stress), and loops
-    of a film that does are nearly as wide at any speed.
+    Stress quickens it: time counts exp(``quickens`` (|q| - 0.15)), with q the stress that has not yet relaxed, over
+    that of the test's largest measured force at its full range; where tests go to other forces q is each one's own, as
+    w is. Networks flow like that (Eyring; Bergstrom and Boyce have a power of the stress), and loops of a film that
+    does narrow less where it is slower.
 
     After a fast return F is negative, and counts ``withstood``: a thin film is slack then (0), one that is stiff or
     sticks to the disc withstands some of it, a block all (1).
@@ -85,7 +88,7 @@ class Viscoelastic(Memory):
             "-",
             "ln of how much more quickly it relaxes under the largest stress than under none",
             HalfNormal(10.0),
-            (0.0, 60.0),
+            (0.0, 40.0),
             begin=0.0,
         ),
     )
@@ -105,7 +108,8 @@ class Viscoelastic(Memory):
         share /= np.sum(share, axis=1, keepdims=True)
         stress, times = force / weight, p[:, 1:2] * spread
         if np.any(p[:, 6]):
-            largest = (self.reach or SOURCE).force
+            reach = self.reach or SOURCE
+            largest = (reach.whole_force or reach.force) * 2.0 ** -p[:, 4:5]
             kept = largest * flowing(stress / largest, path, times, share, p[:, 6])
         else:
             kept = relaxing(stress, gap, times, share)
@@ -130,20 +134,50 @@ def flowing(stress: Array, path: Motion, times: Array, share: Array, quickens: A
     relaxed.
 
     Over a step this is taken at the mean of q at its two ends, the second by `ROUNDS` of Newton's method. A long way
-    has `STEPS` to the full range; the first wait after a way is `HALVED`, for most is gone soon. What is left is then
-    within 1.5 % of an integrator with error control for ``quickens`` up to 30 and 12 readings a way.
+    has `STEPS` to the full range, a wait is parted as its time grows: most is gone soon. With stresses up to 1, 12
+    readings a way and ``quickens`` up to 30 what is left is within 1.5 % of an integrator with error control.
     """
     gap, way = np.diff(path.clock, prepend=0.0), np.abs(np.diff(path.deflection, prepend=0.0)) / path.full_range
-    rests = np.append(False, (way[1:] == 0) & (way[:-1] > 0))
-    parts = np.where(rests, HALVED, np.ceil(np.clip(way * STEPS, 1, STEPS))).astype(np.int64)
+    first, waits = _steps(gap, way)
     out = np.empty(stress.shape)
-    films = [for_kernel(v) for v in (stress, times, share, quickens)]
-    _flow(*films, gap, parts, rests, out)
+    _flow(*(for_kernel(v) for v in (stress, times, share, quickens)), first, waits, out)
     return out
 
 
+@compiled(error_model="numpy")
+def _steps(gap, way):  # type: ignore[no-untyped-def]
+    """((N + 1,) where the steps of each reading begin, (M,) s how long each takes), of gaps (N,) s and ways (N,)."""
+    first, rested = np.zeros(gap.size + 1, np.int64), np.zeros(gap.size)
+    fastest, still = 0.0, 0.0
+    for n in range(gap.size):
+        speed = way[n] / gap[n] if gap[n] > 0.0 else np.inf
+        waits = way[n] == 0.0 or speed < SLOW * fastest
+        parts = np.ceil(max(way[n] * STEPS, 1.0))
+        if waits:
+            growth = np.log2((still + gap[n]) / still) if still > 0.0 else float(HALVED)
+            parts = max(parts, np.ceil(min(growth, float(HALVED))))
+        elif gap[n] > 0.0:
+            fastest = max(fastest, speed)
+        rested[n] = still if waits else -1.0
+        still = still + gap[n] if waits else 0.0
+        first[n + 1] = first[n] + int(parts)
+    out = np.empty(first[-1])
+    for n in range(gap.size):
+        parts, before = first[n + 1] - first[n], 0.0
+        for k in range(parts):
+            if rested[n] > 0.0:
+                end = rested[n] * ((rested[n] + gap[n]) / rested[n]) ** ((k + 1) / parts) - rested[n]
+            elif rested[n] == 0.0:
+                end = gap[n] * 0.5 ** (parts - 1 - k)
+            else:
+                end = gap[n] * (k + 1) / parts
+            out[first[n] + k] = end - before
+            before = end
+    return first, out
+
+
 @compiled(error_model="numpy", fastmath={"reassoc", "contract"})
-def _flow(stress, times, share, quick, gap, parts, rests, out):  # type: ignore[no-untyped-def]
+def _flow(stress, times, share, quick, first, waits, out):  # type: ignore[no-untyped-def]
     """`flowing` of films one after the other: each time waits for what is left of the others.
 
     The times of a film stand side by side in a processor's lanes, for which exp(-g) is a polynomial in g / 64, squared
@@ -158,16 +192,16 @@ def _flow(stress, times, share, quick, gap, parts, rests, out):  # type: ignore[
             h[t], rate[t] = 0.0, 1.0 / times[b, t]
         left, before, steep = 0.0, 0.0, 0.5 * quick[b]
         for n in range(points):
-            step, wait = (stress[b, n] - before) / parts[n], gap[n] / parts[n]
+            some_waits = waits[first[n] : first[n + 1]]
+            moved, gap = stress[b, n] - before, np.sum(some_waits)
             before = stress[b, n]
-            for part in range(parts[n]):
-                if rests[n]:
-                    wait = gap[n] * 0.5 ** min(parts[n] - part, parts[n] - 1)
-                begun = abs(left)
+            for wait in some_waits:
+                step, begun = (moved * wait / gap if gap > 0.0 else moved), abs(left)
                 for _ in range(ROUNDS):
-                    time = wait * np.exp(min(steep * (begun + abs(left) - 2 * USUAL), MOST))
+                    passed = wait * np.exp(min(steep * (begun + abs(left) - 2 * USUAL), MOST))
                     for t in range(terms):
-                        g = min(time * rate[t], MOST)
+                        whole = passed * rate[t]
+                        g = min(whole, MOST)
                         x = g / 64
                         e = 1.0 - x * (1.0 - x * (1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120)))))
                         e *= e
@@ -176,7 +210,7 @@ def _flow(stress, times, share, quick, gap, parts, rests, out):  # type: ignore[
                         e *= e
                         e *= e
                         e *= e
-                        s = (1.0 - e) / g if g > 1e-5 else 1.0 - 0.5 * g
+                        s = (1.0 - e) / whole if whole > 1e-5 else 1.0 - 0.5 * whole
                         kept = e * h[t]
                         new[t] = kept + s * step
                         some[t] = share[b, t] * new[t]

@@ -9,9 +9,17 @@ from scipy.optimize import least_squares
 
 from bayesmembrane.physics.effects._history import relaxing
 from bayesmembrane.physics.effects.viscoelastic import TERMS, USUAL, Viscoelastic, flowing
-from tests.physics.effects.protocols import path
+from bayesmembrane.physics.forward import Forward
+from bayesmembrane.physics.hypothesis import hypothesis
+from bayesmembrane.physics.reach import Reach, reach_of
+from tests.physics.effects.protocols import measured, path, vector
 
-TIMES = 15.0 * 10 ** (1.5 * ((np.arange(TERMS) + 0.5) / TERMS - 0.5))
+
+def spectrum(middle: float, decades: float) -> np.ndarray:
+    return middle * 10 ** (decades * ((np.arange(TERMS) + 0.5) / TERMS - 0.5))
+
+
+TIMES = spectrum(15.0, 1.5)
 EVEN = np.full(TERMS, 1 / TERMS)
 
 
@@ -51,12 +59,64 @@ def test_a_flow_equals_an_integrator_with_error_control(points: int, quickens: f
     assert np.sqrt(np.mean((found - exact) ** 2)) < 0.004 * np.max(np.abs(exact))
 
 
-def test_one_that_stress_hardly_quickens_is_linear() -> None:
+@pytest.mark.parametrize("decades", [1.5, 7.0])
+def test_one_that_stress_hardly_quickens_is_linear(decades: float) -> None:
+    """To less than a step of a difference moves it: times from far above to far below a gap, too."""
     d, time = two_loadings()
-    stress, way = stiffening(d)[None], path(d, time)
-    linear = relaxing(stress, np.diff(way.clock, prepend=0.0), TIMES[None], EVEN[None])
-    for little in (0.0, 1e-7):
-        assert flowing(stress, way, TIMES[None], EVEN[None], np.array([little])) == pytest.approx(linear, abs=1e-7)
+    stress, way, times = stiffening(d)[None], path(d, time), spectrum(2.0, decades)[None]
+    linear = relaxing(stress, np.diff(way.clock, prepend=0.0), times, EVEN[None])
+    assert flowing(stress, way, times, EVEN[None], np.zeros(1)) == pytest.approx(linear, abs=1e-11)
+    assert flowing(stress, way, times, EVEN[None], np.full(1, 1e-7)) == pytest.approx(linear, abs=1e-7)
+
+
+@pytest.mark.parametrize("names", [["viscoelastic"], ["viscoelastic", "machine_compliance"]])
+def test_slopes_where_nothing_quickens_are_differences(names: list[str]) -> None:
+    """Searches begin there: films beside each other may flow and not."""
+    d, time = two_loadings(20)
+    m = measured(d + 1e-4, time)
+    h = hypothesis("yeoh", names).on(m)
+    f, x = Forward(h, m, m.deflection), vector(h)
+    place = {p.name: i for i, p in enumerate(h.parameters)}
+    x[place["viscoelastic.time"]], x[place["viscoelastic.decades"]] = 1.0, 5.0
+    x[place["viscoelastic.quickens"]] = 0.0
+    slopes = f(x, sensitivities=True).sensitivity
+    assert slopes is not None
+    for name in ("viscoelastic.strength", "viscoelastic.time", "viscoelastic.measure"):
+        step = np.zeros(x.size)
+        step[place[name]] = 1e-4
+        central = (f(x + step).force - f(x - step).force)[0] / 2e-4
+        assert slopes[0, :, place[name]] == pytest.approx(central, abs=2e-3 * np.max(np.abs(central)))
+
+
+@pytest.mark.parametrize("creep", [0.0, 1e-9, 1e-6])
+def test_a_wait_is_one_where_the_encoder_still_moves(creep: float) -> None:
+    """Read seldom, so that most of it is gone by the first reading; the disc goes on by a little."""
+    up, rest = np.linspace(0.0, 0.05, 41)[1:], 0.05 + creep * np.arange(1, 7)
+    d, time = np.append(up, rest), np.append(np.arange(1, 41) * 0.5, 20 + 60.0 * np.arange(1, 7))
+    stress = stiffening(np.minimum(d, 0.05))
+    exact = integrated(stress, time, lambda h: h / TIMES * np.exp(20 * (abs(h @ EVEN) - USUAL)))
+    found = flowing(stress[None], path(d, time), TIMES[None], EVEN[None], np.array([20.0]))[0]
+    assert found == pytest.approx(exact, abs=0.01 * np.max(np.abs(exact)))
+
+
+@pytest.mark.parametrize("measure", [-4.0, 2.0])
+def test_stress_counts_in_parts_of_the_largest_whatever_its_measure(measure: float) -> None:
+    d, time = two_loadings()
+    law, weight = Viscoelastic(reach=Reach(0.05, 2.0, 100.0)), 1 + d / 0.05
+    force = 2.0 * stiffening(d) / 1.3
+    x = np.array([[0.5, 15.0, 1.5, 1.0, measure, 0.0, 10.0]])
+    scaled = force / weight**measure * 2**measure / 2.0
+    left = integrated(scaled, time, lambda h: h / TIMES * np.exp(10 * (abs(h @ EVEN) - USUAL)))
+    expected = force - 0.5 * (force - 2.0 * (weight / 2) ** measure * left)
+    assert law.remember(x, force[None], path(d, time))[0] == pytest.approx(expected, abs=0.004 * np.max(force))
+
+
+def test_a_part_of_a_test_knows_the_largest_force_of_all_of_it() -> None:
+    """Cycles that are held out are foretold by the model that was fitted."""
+    m = measured()
+    part = m.select(m.cycle == 1)
+    assert np.max(part.force) < np.max(m.force)
+    assert reach_of(part).whole_force == np.max(m.force)
 
 
 def test_films_side_by_side_equal_films_alone() -> None:
