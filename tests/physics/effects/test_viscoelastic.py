@@ -1,14 +1,16 @@
 """Relaxation that stress quickens: a flow of the network."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
+from bayesmembrane.physics.effects._flow import USUAL, flowing
 from bayesmembrane.physics.effects._history import relaxing
-from bayesmembrane.physics.effects.viscoelastic import TERMS, USUAL, Viscoelastic, flowing
+from bayesmembrane.physics.effects.viscoelastic import TERMS, Viscoelastic
 from bayesmembrane.physics.forward import Forward
 from bayesmembrane.physics.hypothesis import hypothesis
 from bayesmembrane.physics.reach import Reach, reach_of
@@ -161,3 +163,22 @@ def test_a_flow_with_a_power_of_the_stress_is_followed() -> None:
     ]
     assert rms[1] < 0.4 * rms[0]
     assert rms[1] < 0.005 * np.max(measured)
+
+
+@pytest.mark.parametrize("height", [0.05, 0.0])
+def test_a_test_that_begins_at_the_top_has_moved_there_once(height: float) -> None:
+    """Its first reading is at no time, and what is left then is all of it; be it that the film alone has moved."""
+    d, time = np.full(6, height), np.array([0.0, 1.0, 5.0, 50.0, 200.0, 1000.0])
+    stress, way = np.ones(6), replace(path(d, time), full_range=0.05)
+    found = flowing(stress[None], way, TIMES[None], EVEN[None], np.array([12.0]))[0]
+    run = solve_ivp(
+        lambda _, h: -h / TIMES * np.exp(12 * (abs(h @ EVEN) - USUAL)),
+        (0.0, 1000.0),
+        np.ones(TERMS),
+        "LSODA",
+        time,
+        rtol=1e-8,
+        atol=1e-10,
+    )
+    assert found[0] == pytest.approx(1.0)
+    assert found == pytest.approx(EVEN @ run.y, abs=0.01)
