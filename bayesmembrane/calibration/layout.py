@@ -7,6 +7,7 @@ the whole walk among it), sample_stats; a chain is an ensemble.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Any
@@ -73,7 +74,7 @@ def laid_out(measurement: Measurement, walk: Mapping[str, Array] | None = None, 
         "specimen": {"name": measurement.specimen.name, "thickness": measurement.specimen.thickness},
         "provenance": {**asdict(p), "notes": list(p.notes)},
         "full_range": measurement.full_range,
-        "full_force": measurement.full_force,
+        "whole_force": measurement.whole_force if math.isfinite(measurement.whole_force) else None,
     }
     data.constant_data.attrs["measurement"] = json.dumps(about)
     return data
@@ -112,7 +113,7 @@ def measurement_of(data: Groups) -> Measurement:
         specimen=Specimen(**about["specimen"]),
         provenance=Provenance(**notes),
         full_range=about["full_range"],
-        full_force=float(about.get("full_force", np.nan)),
+        whole_force=about.get("whole_force") or math.nan,
         motion=Motion(**{"time": None, "full_range": about["full_range"], **motion}) if motion else None,
         **more,
     )

@@ -99,6 +99,11 @@ class Motion:
         return np.asarray(self.time - self.time[0] + min(start, float(self.time[-1] - self.time[0])))
 
     @cached_property
+    def least_way(self) -> float:
+        """m, the `jitter` of its deflections: less is no movement."""
+        return jitter(self.deflection)
+
+    @cached_property
     def first_turn(self) -> float:
         """s on the `clock`: when the first leg ends, or the last reading is taken."""
         turns = np.flatnonzero(np.diff(self.leg))

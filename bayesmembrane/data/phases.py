@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bayesmembrane.data.fixture import Fixture
 from bayesmembrane.data.measurement import Measurement
-from bayesmembrane.data.motion import jitter, reached
+from bayesmembrane.data.motion import reached
 from bayesmembrane.data.thinning import thinned
 from bayesmembrane.ground.parameters import Array
 
@@ -82,6 +82,6 @@ def phases_of(measurement: Measurement) -> Phases | None:
         still=stands[index],
         reached=reached(m.deflection)[index],
         said=tuple(said),
-        jitter=jitter(m.path.deflection),
+        jitter=m.path.least_way,
         readings=len(m),
     )

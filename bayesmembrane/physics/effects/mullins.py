@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from bayesmembrane.data.motion import jitter
 from bayesmembrane.ground.compiling import compiled, for_kernel
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Uniform
 from bayesmembrane.physics.effects.base import Carried, EffectParameter, FilmState
@@ -81,7 +80,7 @@ class Mullins(Carried):
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         given = [for_kernel(np.atleast_2d(v)) for v in (p, state.deflection, state.reached)]
         lost = np.empty((len(p), given[1].shape[1]))
-        _lost(*given, state.path.full_range, jitter(state.path.deflection), lost)
+        _lost(*given, state.path.full_range, state.path.least_way, lost)
         kept, beyond = 1.0 - p[:, :1], np.maximum(lost - 1.0, 0.0)
         return np.asarray(force * (1.0 - p[:, :1] * np.minimum(lost, 1.0)) * np.exp(-p[:, :1] / kept * beyond))
 
