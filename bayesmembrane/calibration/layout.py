@@ -7,7 +7,6 @@ the whole walk among it), sample_stats; a chain is an ensemble.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Any
@@ -74,7 +73,6 @@ def laid_out(measurement: Measurement, walk: Mapping[str, Array] | None = None, 
         "specimen": {"name": measurement.specimen.name, "thickness": measurement.specimen.thickness},
         "provenance": {**asdict(p), "notes": list(p.notes)},
         "full_range": measurement.full_range,
-        "whole_force": measurement.whole_force if math.isfinite(measurement.whole_force) else None,
     }
     data.constant_data.attrs["measurement"] = json.dumps(about)
     return data
@@ -106,14 +104,13 @@ def measurement_of(data: Groups) -> Measurement:
     if "covariance" in arrays:
         arrays.pop("force_sd", None)
     notes = {**about["provenance"], "notes": tuple(about["provenance"]["notes"])}
-    more: dict[str, Any] = {"places": places, **arrays}
     return Measurement(
         force=np.asarray(data.observed_data["force"].values, dtype=float),
         rig=rig,
         specimen=Specimen(**about["specimen"]),
         provenance=Provenance(**notes),
         full_range=about["full_range"],
-        whole_force=about.get("whole_force") or math.nan,
         motion=Motion(**{"time": None, "full_range": about["full_range"], **motion}) if motion else None,
-        **more,
+        places=places,
+        **arrays,
     )

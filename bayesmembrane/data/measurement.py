@@ -75,7 +75,6 @@ class Measurement:
     force_sd : (N,) N, standard deviation of the measurement's own noise, or None if unknown
     covariance : (N, N) N^2, covariance of that noise, or None if it is independent or unknown
     full_range : the largest deflection of the whole measurement in m, also where this one is truncated
-    whole_force : where this one is truncated, the largest force of the whole one in N, whatever its sign; else nan
     motion : how the disc was moved, also past points that were left out; the film remembers those too
     places : (N,) where the points lie on it
     across : (N,) stretch across the direction of pull where it was measured (biaxial tests), or None
@@ -95,7 +94,6 @@ class Measurement:
     covariance: Array | None = None
     provenance: Provenance = Provenance()
     full_range: float = math.nan
-    whole_force: float = math.nan
     motion: Motion | None = None
     places: NDArray[np.int64] | None = None
     across: Array | None = None
@@ -125,11 +123,6 @@ class Measurement:
     def __len__(self) -> int:
         """The number of points."""
         return int(self.deflection.size)
-
-    @property
-    def full_force(self) -> float:
-        """N, the largest force of the whole measurement, also where this one is truncated, whatever its sign."""
-        return self.whole_force if math.isfinite(self.whole_force) else float(np.max(np.abs(self.force)))
 
     @cached_property
     def path(self) -> Motion:
@@ -227,7 +220,7 @@ class Measurement:
         return parts
 
     def select(self, keep: NDArray[Any]) -> Measurement:
-        """The points at ``keep``, (N,) booleans or indices in order; what is whole, and the path to the last, stay."""
+        """The points at ``keep``, (N,) booleans or indices in order; `full_range` and the path to the last stay."""
 
         def part(array: Array | None) -> Array | None:
             return None if array is None else array[keep]
@@ -243,7 +236,6 @@ class Measurement:
             places=places if remembers else None,
             deflection=self.deflection[keep],
             force=self.force[keep],
-            whole_force=self.full_force,
             time=part(self.time),
             force_sd=part(self.force_sd),
             covariance=covariance,

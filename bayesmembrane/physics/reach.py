@@ -17,14 +17,12 @@ class Reach:
 
     travel : largest deflection of the whole test; force : largest measured; duration : s, of the whole test since the
         disc stood at zero, which is what its clock shows; clamped : True if the film is clamped all round
-    whole_force : largest of the whole test, where readings are left out; 0 of what is no measurement: ``force``
     """
 
     travel: float
     force: float
     duration: float
     clamped: bool = True
-    whole_force: float = 0.0
 
     @property
     def by_unit(self) -> dict[str, float]:
@@ -54,6 +52,5 @@ SOURCE = Reach(0.0915, 2.25, 35.0)
 def reach_of(measurement: Measurement) -> Reach:
     """Of one measurement."""
     force = float(np.max(np.abs(measurement.force)))
-    duration, whole = max(float(measurement.path.clock[-1]), SHORTEST), measurement.full_force
-    force = force if force > 0 else SOURCE.force
-    return Reach(measurement.full_range, force, duration, measurement.rig.clamped, whole)
+    duration = max(float(measurement.path.clock[-1]), SHORTEST)
+    return Reach(measurement.full_range, force if force > 0 else SOURCE.force, duration, measurement.rig.clamped)

@@ -137,9 +137,7 @@ def test_relaxation_is_the_convolution(measure: float, tilt: float) -> None:
     time = np.cumsum(rng.uniform(0.2, 8.0, d.size))
     m = measured(d, time)
     g, tau, decades = 0.4, 12.0, 1.5
-    f, pushed = (
-        force(m, "viscoelastic", x=np.array([g, tau, decades, part, measure, tilt, 0.0])) for part in (0.0, 1.0)
-    )
+    f, pushed = (force(m, "viscoelastic", x=np.array([g, tau, decades, part, measure, tilt])) for part in (0.0, 1.0))
     clock, whole, weight = m.path.clock, direct("yeoh", d), (1 + d / np.max(d)) ** measure
     knots, values = np.concatenate([[0.0], clock]), np.concatenate([[0.0], whole / weight])
     times = tau * 10 ** (decades * np.linspace(-11 / 24, 11 / 24, 12))

@@ -184,7 +184,7 @@ def test_a_relaxed_film_on_a_frame_that_is_soft_at_no_force_closes(play: tuple[f
     m = Measurement(way, np.ones(way.size), strip, Specimen("tape", 1e-3), time=time)
     h = hypothesis("gent", ["viscoelastic", "machine_compliance"])
     f = Forward(h.on(m), m, m.deflection)
-    theta = {"viscoelastic": [0.5, 20.0, 0.0, 0.5, -1.5, 0.0, 0.0], "machine_compliance": [2e-3, 0.3, -0.8, *play]}
+    theta = {"viscoelastic": [0.5, 20.0, 0.0, 0.5, -1.5, 0.0], "machine_compliance": [2e-3, 0.3, -0.8, *play]}
     x = np.concatenate([theta[e.name] for e in f.composition.effects])[None]
     law, _ = f.law(np.array([[20.0, 60.0]]), x)
     delta, force, status = f.composition.closed(law, x)

@@ -10,10 +10,8 @@ import numpy as np
 from bayesmembrane.data.motion import Motion
 from bayesmembrane.ground.compiling import compiled, for_kernel
 from bayesmembrane.ground.parameters import Array, HalfNormal, LogNormal, Normal, Uniform
-from bayesmembrane.physics.effects._flow import flowing
 from bayesmembrane.physics.effects._history import relaxing
 from bayesmembrane.physics.effects.base import EffectParameter, Memory
-from bayesmembrane.physics.reach import SOURCE
 
 TERMS = 12
 """Nearly two to a decade at the largest width."""
@@ -34,11 +32,6 @@ class Viscoelastic(Memory):
     have m = -1 to -4, and are followed 1.1 to 2.5 times as closely as with m = 0. Where tests go to other ranges, w is
     each one's own, and m the same.
 
-    Stress quickens it: time counts exp(``quickens`` (|q| - 0.15)), with q the stress that has not yet relaxed, over
-    that of the test's largest measured force at its full range; where tests go to other forces q is each one's own, as
-    w is. Networks flow like that (Eyring; Bergstrom and Boyce have a power of the stress), and loops of a film that
-    does narrow less where it is slower.
-
     After a fast return F is negative, and counts ``withstood``: a thin film is slack then (0), one that is stiff or
     sticks to the disc withstands some of it, a block all (1).
     """
@@ -48,8 +41,7 @@ class Viscoelastic(Memory):
     reference: ClassVar[str] = (
         "Y. C. Fung, Biomechanics: Mechanical Properties of Living Tissues, 2nd ed. (1993), 7.6; "
         "J. C. Simo, Comput. Methods Appl. Mech. Eng. 60 (1987) 153, for another measure of stress; A. V. Tobolsky, "
-        "Properties and Structure of Polymers (1960), for boxes and wedges; J. S. Bergstrom, M. C. Boyce, J. Mech. "
-        "Phys. Solids 46 (1998) 931, and H. Eyring, J. Chem. Phys. 4 (1936) 283, for flow that stress quickens"
+        "Properties and Structure of Polymers (1960), for boxes and wedges"
     )
     signature: ClassVar[str] = (
         "Unloading below loading in every cycle, with a gap that depends on time and speed and closes at rest; force "
@@ -58,6 +50,7 @@ class Viscoelastic(Memory):
     of_the_material = True
     constant = True
     needs_return: ClassVar[bool] = True
+    scales_with_modulus: ClassVar[bool] = True
     shows_at_rest: ClassVar[bool] = True
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
@@ -72,21 +65,12 @@ class Viscoelastic(Memory):
         EffectParameter(
             "tilt", "-", "power of 1 / time in the weight of a relaxation time", Normal(0.0, 0.3), (-1.0, 1.5)
         ),
-        EffectParameter(
-            "quickens",
-            "-",
-            "ln of how much more quickly it relaxes under the largest stress than under none",
-            HalfNormal(10.0),
-            (0.0, 40.0),
-            begin=0.0,
-        ),
     )
 
     @property
     def starts(self) -> list[dict[str, float]]:
-        """A broad spectrum is not found from one time alone, nor a flow from what relaxes linearly."""
-        broad = [{"time": 10.0, "decades": 2.5}, {"time": 100.0, "decades": 2.5}, {"decades": 5.0, "tilt": 0.3}]
-        return [*broad, {"time": 3.0, "decades": 2.0, "quickens": 15.0}]
+        """A broad spectrum is not found from one time alone."""
+        return [{"time": 10.0, "decades": 2.5}, {"time": 100.0, "decades": 2.5}, {"decades": 5.0, "tilt": 0.3}]
 
     def remember(self, p: Array, force: Array, path: Motion) -> Array:
         gap = np.diff(path.clock, prepend=0.0)
@@ -95,13 +79,7 @@ class Viscoelastic(Memory):
         spread = 10.0 ** (places * p[:, 2:3])
         share = spread ** -p[:, 5:6]
         share /= np.sum(share, axis=1, keepdims=True)
-        stress, times = force / weight, p[:, 1:2] * spread
-        if np.any(p[:, 6]):
-            reach = self.reach or SOURCE
-            largest = (reach.whole_force or reach.force) * 2.0 ** -p[:, 4:5]
-            kept = largest * flowing(stress / largest, path, times, share, p[:, 6])
-        else:
-            kept = relaxing(stress, gap, times, share)
+        kept = relaxing(force / weight, gap, p[:, 1:2] * spread, share)
         out = np.empty(kept.shape)
         _remembered(for_kernel(force), weight, kept, for_kernel(p[:, 0]), for_kernel(p[:, 3]), out)
         return out
