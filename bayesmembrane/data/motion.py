@@ -99,8 +99,8 @@ class Motion:
         return np.asarray(self.time - self.time[0] + min(start, float(self.time[-1] - self.time[0])))
 
     @cached_property
-    def least_way(self) -> float:
-        """m, the `jitter` of its deflections: less is no movement."""
+    def jitter(self) -> float:
+        """m: less is no movement."""
         return jitter(self.deflection)
 
     @cached_property

@@ -82,6 +82,6 @@ def phases_of(measurement: Measurement) -> Phases | None:
         still=stands[index],
         reached=reached(m.deflection)[index],
         said=tuple(said),
-        jitter=m.path.least_way,
+        jitter=m.path.jitter,
         readings=len(m),
     )

@@ -80,31 +80,37 @@ class Mullins(Carried):
     def carried(self, p: Array, force: Array, state: FilmState) -> Array:
         given = [for_kernel(np.atleast_2d(v)) for v in (p, state.deflection, state.reached)]
         lost = np.empty((len(p), given[1].shape[1]))
-        _lost(*given, state.path.full_range, state.path.least_way, lost)
-        kept, beyond = 1.0 - p[:, :1], np.maximum(lost - 1.0, 0.0)
-        return np.asarray(force * (1.0 - p[:, :1] * np.minimum(lost, 1.0)) * np.exp(-p[:, :1] / kept * beyond))
+        _lost(*given, state.path.full_range, state.path.jitter, lost)
+        softening, beyond = p[:, :1], np.maximum(lost - 1.0, 0.0)
+        kept = (1.0 - softening * np.minimum(lost, 1.0)) * np.exp(-softening / (1.0 - softening) * beyond)
+        return np.asarray(force * kept)
 
 
 @compiled(error_model="numpy")
-def _lost(p, deflection, reached, full, least, out):  # type: ignore[no-untyped-def]
-    """(B, N) what stands in brackets: most readings reach no further, and of three powers one is new at each."""
+def _lost(p, deflection, reached, full, jitter, out):  # type: ignore[no-untyped-def]
+    """(B, N) what stands in brackets: most readings reach no further, and of three powers one is new at each.
+
+    Energies are in parts of that at the full range; ``way`` is how far they have gone, up and down, which is counted
+    wherever the deflection is farther than the ``jitter`` from where it was counted last.
+    """
     for b in range(out.shape[0]):
         width, fading, power, damage, repeated = p[b, 1], p[b, 2], p[b, 3], p[b, 4], p[b, 5]
-        i, before, wide, most = b if deflection.shape[0] > 1 else 0, -1.0, 1.0, 0.0
-        turn, at, path, ever = 0.0, 0.0, 0.0, 0.0
+        i, before, wide, most, ever = b if deflection.shape[0] > 1 else 0, -1.0, 1.0, 0.0, 0.0
+        last, energy_there, way = 0.0, 0.0, 0.0
         back_whole, ever_whole = math.erf(1.0 / width), np.expm1(-1.0 / width)
         for n in range(out.shape[1]):
             m, x = reached[i, n], deflection[i, n]
-            new = m != before
-            if new:
+            farther = m != before
+            if farther:
                 before = m
                 wide = width * (full / max(m, 1e-6 * full)) ** fading
                 most = (m / full) ** power
             part = (x / m if x > 0.0 else 0.0) if m > 0.0 else 1.0
-            lower = part**power if part < 1.0 else 1.0
-            if repeated > 0.0 and (abs(x - turn) >= least or x == m):
-                path, at, turn = path + abs(lower * most - at), lower * most, x
-            if new or repeated > 0.0:
-                ever = np.expm1(-((1.0 - repeated) * most + repeated * path) / width) / ever_whole
-            back = math.erf((1.0 - lower) / wide) / back_whole if part < 1.0 else 0.0
+            of_most = part**power if part < 1.0 else 1.0
+            if repeated > 0.0 and (x == m or abs(x - last) >= jitter):
+                energy = of_most * most
+                last, way, energy_there = x, way + abs(energy - energy_there), energy
+            if farther or repeated > 0.0:
+                ever = np.expm1(-((1.0 - repeated) * most + repeated * way) / width) / ever_whole
+            back = math.erf((1.0 - of_most) / wide) / back_whole if part < 1.0 else 0.0
             out[b, n] = (1.0 - damage) * back + damage * ever
