@@ -49,6 +49,8 @@ def for_kernel(values: Any) -> Any:
 
     What may only be read is another type to numba, for which all of a kernel would be compiled again.
     """
+    if isinstance(values, np.ndarray) and values.dtype == float and values.flags.carray:  # asked for very often
+        return values
     return np.require(values, float, ("C", "W"))
 
 

@@ -46,6 +46,9 @@ class Search(Weighing):
     _made: Lately[int, tuple[Hypothesis, RememberingObjective]] = field(
         default_factory=lambda: Lately(MADE), init=False, repr=False
     )
+    _standards: Lately[int, tuple[Hypothesis, Standard]] = field(
+        default_factory=lambda: Lately(MADE), init=False, repr=False
+    )
 
     @property
     def force(self) -> Array:
@@ -93,7 +96,8 @@ class Search(Weighing):
         return {n + i: step[p.event] for i, p in enumerate(own) if p.event}
 
     def axes(self, hypothesis: Hypothesis) -> Standard:
-        return standard(hypothesis, self.measurement)
+        # By identity, as below.
+        return self._standards.of(id(hypothesis), lambda: (hypothesis, standard(hypothesis, self.measurement)))[1]
 
     def expected_sizes(self, effect: Effect) -> Array:
         return np.array([expected_size(effect, self.measurement)])

@@ -239,8 +239,13 @@ class Effect(ABC):
 
     def within_bounds(self, p: Array) -> Array:
         """Parameters (B, k), moved to the nearest bound of what means anything where they lie outside."""
+        return np.clip(p, *self._sense)
+
+    @cached_property
+    def _sense(self) -> tuple[Array, Array]:
+        """(k,) and (k,): between which parameters mean anything."""
         low, high = np.array([c.sense for c in self.coordinates]).reshape(-1, 2).T
-        return np.clip(p, low, high)
+        return low, high
 
 
 @dataclass(frozen=True, eq=False)

@@ -150,7 +150,7 @@ class MachineCompliance(Compliance):
     def yielding(self, p: Array, force: Array, peaks: Array) -> tuple[Array, Array]:
         if self.curve is None:
             lost, soft = np.empty(force.shape), np.empty(force.shape)
-            p = np.broadcast_to(p, (len(force), p.shape[1]))
+            p = p if len(p) == len(force) else np.broadcast_to(p, (len(force), p.shape[1]))
             _yielding(for_kernel(p), for_kernel(expit(p[:, 2])), for_kernel(force), for_kernel(peaks), lost, soft)
             return lost, soft
         compliance = np.full((len(force), 1), self.curve.compliance) if self.held else p[:, :1]
