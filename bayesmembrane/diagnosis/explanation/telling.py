@@ -33,8 +33,8 @@ def told(joint: Joint, visible: Sequence[str], vague: Mapping[str, float]) -> tu
 
 
 def _flattened(joint: Joint, vague: Mapping[str, float]) -> dict[tuple[str, str], float]:
-    """`Beliefs.flattened` over the sets of effects beside each kind of what is foreign; together one, and falling.
-    As far as a kind is ``vague`` none stands out beside it.
+    """`Beliefs.flattened` over the sets of effects beside each kind of what is foreign, and smaller ones favoured;
+    together one, and falling. As far as a kind is ``vague`` none stands out beside it.
 
     No effect keeps what it has, for it is of laws that too much is said: of a hundred sets that are next to nothing
     each, flattened with it, all together would come to more than it.
@@ -47,14 +47,16 @@ def _flattened(joint: Joint, vague: Mapping[str, float]) -> dict[tuple[str, str]
             kinds[kind][name] = q
     for kind, sets in kinds.items():
         by_known_laws = 0.0 if kind == ANOTHER_LAW else 1.0 - vague.get(kind, 0.0)
-        out |= {(name, kind): q for name, q in BELIEFS.flattened(sets, by_known_laws).items()}
+        flat = BELIEFS.flattened(sets, by_known_laws)
+        out |= {(name, kind): q for name, q in BELIEFS.fewer_favoured(flat, _size).items()}
     whole = sum(joint.values())
     return falling({key: q / whole for key, q in out.items()})
 
 
 def _with_neighbours(joint: Joint, visible: Sequence[str], vague: Mapping[str, float]) -> dict[tuple[str, str], float]:
-    """With a part of what sets have beside each kind of what is foreign told of those next to them, as far as none
-    stands out by known laws; a larger one as far as a kind is ``vague``.
+    """With a part of what sets have beside each kind of what is foreign told of those next to them: of one effect as
+    far as none stands out by known laws, of several a further part in any case; a larger one as far as a kind is
+    ``vague``.
     """
     kinds, out = defaultdict[str, dict[frozenset[str], float]](dict), dict[tuple[str, str], float]()
     for (name, kind), q in joint.items():
@@ -63,7 +65,8 @@ def _with_neighbours(joint: Joint, visible: Sequence[str], vague: Mapping[str, f
         doubted, degree = BELIEFS.elsewhere * (1 - BELIEFS.standing_out(sets.values())), vague.get(kind, 0.0)
         doubted += degree * (BELIEFS.elsewhere_beside_structure - doubted)
         share = BELIEFS.elsewhere_by_another_law if kind == ANOTHER_LAW else doubted
-        near = spread(sets, visible, BELIEFS.most, share, BELIEFS.farther)
+        shares = [1 - (1 - share) * (1 - of_size) for of_size in BELIEFS.stands_in]
+        near = spread(sets, visible, shares, BELIEFS.farther)
         out |= {(joined(names), kind): q for names, q in near.items()}
     return falling(out)
 
@@ -84,6 +87,11 @@ def _with_unlisted(joint: Joint, vague: float) -> dict[tuple[str, str], float]:
 def falling(p: Mapping[Named, float]) -> dict[Named, float]:
     """The largest first."""
     return dict(sorted(p.items(), key=lambda i: -i[1]))
+
+
+def _size(name: str) -> int:
+    """Of a set of effects that is not empty."""
+    return name.count("+") + 1
 
 
 def joined(names: frozenset[str]) -> str:

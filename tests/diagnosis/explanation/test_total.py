@@ -115,8 +115,8 @@ def summed_up(
 
 
 def told(flatter: float = 1.0, elsewhere: float = 0.0, unlisted: float = 0.0) -> Beliefs:
-    """With another power of `Beliefs.flattened`, and so much told of sets next to those of the sum, and of what is not
-    listed.
+    """With another power of `Beliefs.flattened`, so much told of sets next to those of the sum, and of what is not
+    listed, and sets of every size alike.
     """
     shares = {
         "elsewhere": elsewhere,
@@ -124,7 +124,8 @@ def told(flatter: float = 1.0, elsewhere: float = 0.0, unlisted: float = 0.0) ->
         "elsewhere_beside_structure": elsewhere,
     }
     faults = {"unlisted": unlisted, "unlisted_beside_structure": unlisted}
-    return replace(BELIEFS, flatter=flatter, **shares, **faults)
+    sizes: dict[str, Any] = {"spurious": 0.0, "stands_in": (0.0,) * 4}
+    return replace(BELIEFS, flatter=flatter, **shares, **faults, **sizes)
 
 
 def by_likelihood_alone(monkeypatch: pytest.MonkeyPatch) -> None:
