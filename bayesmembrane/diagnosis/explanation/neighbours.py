@@ -15,23 +15,21 @@ NEGLIGIBLE = 1e-5
 """Of all that is told; sets that have less give nothing away, and receive nothing if they were not summed."""
 
 
-def spread(p: Mapping[Set, float], visible: Sequence[str], shares: Sequence[float], farther: float) -> dict[Set, float]:
-    """p - q + (1 - farther) q K + farther q K K, with the sum that p has, where q of a set is its ``shares`` [size] p.
+def spread(p: Mapping[Set, float], visible: Sequence[str], most: int, share: float, farther: float) -> dict[Set, float]:
+    """(1 - share) p + share (1 - farther) p K + share farther p K K, with the sum that p has.
 
-    K takes a set to those of ``visible`` effects, as large as there are shares at the most, that differ from it by one
-    that is added, left out or exchanged: each of the three is as probable, where there is such a set, and so are all
-    sets of one of them. No effect is left as it is, for it is of laws that too much is said, and so is a set that
-    nothing is next to.
+    K takes a set to every one of ``visible`` effects, ``most`` at the most, that differs from it by one that is added,
+    left out or exchanged, with the same probability. No effect is left as it is, for it is of laws that too much is
+    said, and so is a set that nothing is next to.
     """
-    whole, most = sum(p.values()), len(shares) - 1
-    given = {n: shares[len(n)] * q for n, q in p.items()}
-    if not any(given.values()):
+    whole = sum(p.values())
+    if share == 0.0 or whole <= 0.0:
         return dict(p)
     least = NEGLIGIBLE * whole
-    one = _stepped(given, visible, most, least)
+    one = _stepped(p, visible, most, least)
     two = _stepped(one, visible, most, least)
     near = {n: (1 - farther) * one.get(n, 0.0) + farther * two.get(n, 0.0) for n in dict.fromkeys([*one, *two])}
-    out = {n: p.get(n, 0.0) - given.get(n, 0.0) + near.get(n, 0.0) for n in dict.fromkeys([*p, *near])}
+    out = {n: (1 - share) * p.get(n, 0.0) + share * near.get(n, 0.0) for n in dict.fromkeys([*p, *near])}
     told = {n: q for n, q in out.items() if n in p or q > least}
     kept = whole / sum(told.values())
     return {n: q * kept for n, q in told.items()}
@@ -41,20 +39,17 @@ def _stepped(p: Mapping[Set, float], visible: Sequence[str], most: int, least: f
     """p K, but for what is next to nothing."""
     out = defaultdict[Set, float](float)
     for names, q in p.items():
-        near = (_next_to(names, visible, most) if q > least else []) or [[names]]
-        for alike in near:
-            for other in alike:
-                out[other] += q / (len(near) * len(alike))
+        near = (_next_to(names, visible, most) if q > least else []) or [names]
+        for other in near:
+            out[other] += q / len(near)
     return out
 
 
-def _next_to(names: Set, visible: Sequence[str], most: int) -> list[list[Set]]:
-    """The sets of some effects that have one more, one less and another one, as far as there are any, in an order that
-    hangs on no hash.
-    """
+def _next_to(names: Set, visible: Sequence[str], most: int) -> list[Set]:
+    """All sets of some effects that differ by one, in an order that hangs on no hash."""
     if not names:
         return []
     rest = [v for v in visible if v not in names]
     less = [names - {own} for own in sorted(names)]
     more = [names | {v} for v in rest] if len(names) < most else []
-    return [alike for alike in (more, [part for part in less if part], [p | {v} for p in less for v in rest]) if alike]
+    return more + [part for part in less if part] + [part | {v} for part in less for v in rest]

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from bayesmembrane.diagnosis.explanation.beliefs import BELIEFS
 from bayesmembrane.diagnosis.explanation.neighbours import spread
+from bayesmembrane.diagnosis.explanation.stand_ins import smaller_favoured, stood_in
 
 Named = TypeVar("Named")
 
@@ -21,20 +22,22 @@ Joint = Mapping[tuple[str, str], float]
 """Probabilities by (set of effects, kind of what is foreign)."""
 
 
-def told(joint: Joint, visible: Sequence[str], vague: Mapping[str, float]) -> tuple[Joint, Joint]:
+def told(joint: Joint, mistaken: Mapping[str, float], vague: Mapping[str, float]) -> tuple[Joint, Joint]:
     """(flattened, told): the sum as it is flattened, and that with parts of it told of sets next to those that were
-    weighed, of effects whose names are ``visible``, and of faults that are not listed.
+    weighed, of faults that are not listed, and of effects for which others may stand in.
 
+    mistaken : of the effects that are visible, by name, how often they are mistaken for another (`Effect.mistaken`)
     vague : 0 to 1 by kind of what is foreign, how far no set stands out beside it
     """
     flat = _flattened(joint, vague)
-    near = _with_neighbours(flat, visible, vague)
-    return flat, _with_unlisted(near, vague.get(NOTHING, 0.0))
+    near = _with_neighbours(flat, list(mistaken), vague)
+    listed = _with_unlisted(near, vague.get(NOTHING, 0.0))
+    return flat, _with_stand_ins(listed, mistaken)
 
 
 def _flattened(joint: Joint, vague: Mapping[str, float]) -> dict[tuple[str, str], float]:
-    """`Beliefs.flattened` over the sets of effects beside each kind of what is foreign, and smaller ones favoured;
-    together one, and falling. As far as a kind is ``vague`` none stands out beside it.
+    """`Beliefs.flattened` over the sets of effects beside each kind of what is foreign; together one, and falling.
+    As far as a kind is ``vague`` none stands out beside it.
 
     No effect keeps what it has, for it is of laws that too much is said: of a hundred sets that are next to nothing
     each, flattened with it, all together would come to more than it.
@@ -47,26 +50,21 @@ def _flattened(joint: Joint, vague: Mapping[str, float]) -> dict[tuple[str, str]
             kinds[kind][name] = q
     for kind, sets in kinds.items():
         by_known_laws = 0.0 if kind == ANOTHER_LAW else 1.0 - vague.get(kind, 0.0)
-        flat = BELIEFS.flattened(sets, by_known_laws)
-        out |= {(name, kind): q for name, q in BELIEFS.fewer_favoured(flat, _size).items()}
+        out |= {(name, kind): q for name, q in BELIEFS.flattened(sets, by_known_laws).items()}
     whole = sum(joint.values())
     return falling({key: q / whole for key, q in out.items()})
 
 
 def _with_neighbours(joint: Joint, visible: Sequence[str], vague: Mapping[str, float]) -> dict[tuple[str, str], float]:
-    """With a part of what sets have beside each kind of what is foreign told of those next to them: of one effect as
-    far as none stands out by known laws, of several a further part in any case; a larger one as far as a kind is
-    ``vague``.
+    """With a part of what sets have beside each kind of what is foreign told of those next to them, as far as none
+    stands out by known laws; a larger one as far as a kind is ``vague``.
     """
-    kinds, out = defaultdict[str, dict[frozenset[str], float]](dict), dict[tuple[str, str], float]()
-    for (name, kind), q in joint.items():
-        kinds[kind][frozenset() if name == NOTHING else frozenset(name.split("+"))] = q
-    for kind, sets in kinds.items():
+    out = dict[tuple[str, str], float]()
+    for kind, sets in _by_kind(joint).items():
         doubted, degree = BELIEFS.elsewhere * (1 - BELIEFS.standing_out(sets.values())), vague.get(kind, 0.0)
         doubted += degree * (BELIEFS.elsewhere_beside_structure - doubted)
         share = BELIEFS.elsewhere_by_another_law if kind == ANOTHER_LAW else doubted
-        shares = [1 - (1 - share) * (1 - of_size) for of_size in BELIEFS.stands_in]
-        near = spread(sets, visible, shares, BELIEFS.farther)
+        near = spread(sets, visible, BELIEFS.most, share, BELIEFS.farther)
         out |= {(joined(names), kind): q for names, q in near.items()}
     return falling(out)
 
@@ -84,14 +82,29 @@ def _with_unlisted(joint: Joint, vague: float) -> dict[tuple[str, str], float]:
     )
 
 
+def _with_stand_ins(joint: Joint, mistaken: Mapping[str, float]) -> dict[tuple[str, str], float]:
+    """With smaller sets favoured, and a part of what each has told of those in which one of its effects is another one
+    or none, beside each kind of what is foreign.
+    """
+    out = dict[tuple[str, str], float]()
+    for kind, sets in _by_kind(joint).items():
+        fewer = smaller_favoured(sets, BELIEFS.spurious)
+        doubted = stood_in(fewer, mistaken, BELIEFS.alone, BELIEFS.left_out)
+        out |= {(joined(names), kind): q for names, q in doubted.items()}
+    return falling(out)
+
+
+def _by_kind(joint: Joint) -> dict[str, dict[frozenset[str], float]]:
+    """By kind of what is foreign: by set of effects, its probability."""
+    kinds = defaultdict[str, dict[frozenset[str], float]](dict)
+    for (name, kind), q in joint.items():
+        kinds[kind][frozenset() if name == NOTHING else frozenset(name.split("+"))] = q
+    return kinds
+
+
 def falling(p: Mapping[Named, float]) -> dict[Named, float]:
     """The largest first."""
     return dict(sorted(p.items(), key=lambda i: -i[1]))
-
-
-def _size(name: str) -> int:
-    """Of a set of effects that is not empty."""
-    return name.count("+") + 1
 
 
 def joined(names: frozenset[str]) -> str:

@@ -86,6 +86,7 @@ def in_tests(name: str, parts: Sequence[tuple[int, Effect]], one_clock: bool = T
             "begins": first.begins if len(parts) == 1 else "",
             "like_foreign": first.like_foreign,
             "odds": first.odds,
+            "mistaken": first.mistaken,
             "remembers": first.remembers,
             "of_the_material": first.of_the_material,
             "constant": constant,

@@ -31,6 +31,7 @@ class ForceDrift(Sensor):
         "deflection: all cycles shift, slack parts too."
     )
     rank: ClassVar[int] = 1
+    mistaken: ClassVar[float] = 0.01
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "rate",

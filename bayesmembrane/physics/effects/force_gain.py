@@ -26,6 +26,7 @@ class ForceGain(Sensor):
     exact: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
     scales_with_modulus: ClassVar[bool] = True
+    mistaken: ClassVar[float] = 0.01
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("error", "-", "reading over true force, less one", Normal(0.0, 0.02), (-0.5, 0.5), 0.0),
     )

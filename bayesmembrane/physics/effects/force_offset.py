@@ -31,6 +31,7 @@ class ForceOffset(Sensor):
     )
     exact: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
+    mistaken: ClassVar[float] = 0.01
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("offset", "N", "reading without load", Normal(0.0, 0.03), (-1.0, 1.0), 0.0),
         EffectParameter(

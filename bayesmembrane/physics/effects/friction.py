@@ -37,6 +37,7 @@ class Friction(Sensor):
     )
     twins_one_way: ClassVar[tuple[str, ...]] = ("force_offset",)  # both add a force, which only one turns with the disc
     rank: ClassVar[int] = -1  # the guide has the film's force, before the load cell adds to it
+    mistaken: ClassVar[float] = 0.01
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("level", "N", "sliding friction without a force", HalfNormal(0.03), (0.0, 2.0), 0.0),
         EffectParameter(

@@ -103,6 +103,7 @@ class MachineCompliance(Compliance):
         "alike on all legs, but for what a load string that was not preloaded loses at its first loading."
     )
     remembers: ClassVar[bool] = False
+    mistaken: ClassVar[float] = 0.12
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("compliance", "m/N", "travel lost by the first newton", Lomax(5e-4), (0.0, 1e-2), 0.0),
         EffectParameter("exponent", "-", "of the force that the travel lost grows with", Normal(0.9, 0.2), (0.25, 1.6)),

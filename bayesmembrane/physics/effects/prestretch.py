@@ -24,6 +24,7 @@ class Prestretch(Geometry):
     exact: ClassVar[bool] = True
     may_change: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
+    mistaken: ClassVar[float] = 0.01
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("stretch", "-", "equibiaxial stretch before clamping", HalfNormal(0.03, 1.0), (1.0, 1.3), 1.0),
     )

@@ -48,6 +48,7 @@ class Rate(Memory):
     # Far above the slow speed a loop is hardly wider where the disc is faster: only a hold shows that it is gone.
     twins_at_one_speed: ClassVar[tuple[str, ...]] = ("viscoelastic",)
     twins_at_any_speed: ClassVar[tuple[str, ...]] = ("hysteresis", "friction")
+    mistaken: ClassVar[float] = 0.01
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("exponent", "-", "power of the speed", HalfNormal(0.05), (0.0, 0.5), 0.0),
         EffectParameter(

@@ -23,6 +23,7 @@ class Thickness(Carried):
     exact: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
     scales_with_modulus: ClassVar[bool] = True
+    mistaken: ClassVar[float] = 0.01
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter("error", "-", "true over stated thickness, less one", Normal(0.0, 0.05), (-0.5, 0.5), 0.0),
     )

@@ -23,6 +23,7 @@ class ZeroOffset(Deflection):
     exact: ClassVar[bool] = True
     may_change: ClassVar[bool] = True
     remembers: ClassVar[bool] = False
+    mistaken: ClassVar[float] = 0.12
     coordinates: ClassVar[tuple[EffectParameter, ...]] = (
         EffectParameter(
             "shift", "m", "deflection read when the film becomes taut", Normal(0.0, 5e-4), (-5e-3, 5e-3), 0.0

@@ -68,12 +68,3 @@ def test_the_larger_a_probability_the_larger_it_is_flattened(rivals: int) -> Non
     flat = [BELIEFS.flattened({"a": p, **{f"b{i}": (1 - p) / rivals for i in range(rivals)}})["a"] for p in firsts]
     assert np.all(np.diff(flat) > 0)
     assert np.all(np.array(flat) <= firsts + 1e-12)
-
-
-def test_sets_lose_by_each_further_effect_and_keep_their_sum() -> None:
-    p = {"a": 0.2, "a+b": 0.2, "a+b+c": 0.2}
-    told = BELIEFS.fewer_favoured(p, lambda name: name.count("+") + 1)
-    assert sum(told.values()) == pytest.approx(0.6)
-    assert told["a"] / told["a+b"] == pytest.approx(exp(BELIEFS.spurious))
-    assert told["a+b"] / told["a+b+c"] == pytest.approx(exp(BELIEFS.spurious))
-    assert BELIEFS.fewer_favoured({}, len) == {}

@@ -24,7 +24,7 @@ from bayesmembrane.physics.hypothesis import hypothesis
 
 LEFT = 100.0
 FOUR = (1.0,) * 4  # odds of all effects
-TRIED = [SimpleNamespace(odds=1.0, name=n) for n in ("friction", "mullins")]
+TRIED = [SimpleNamespace(odds=1.0, mistaken=0.0, name=n) for n in ("friction", "mullins")]
 
 
 def candidate(*effects: str, log_evidence: float, energy: str = "gent") -> Candidate:
@@ -124,8 +124,7 @@ def told(flatter: float = 1.0, elsewhere: float = 0.0, unlisted: float = 0.0) ->
         "elsewhere_beside_structure": elsewhere,
     }
     faults = {"unlisted": unlisted, "unlisted_beside_structure": unlisted}
-    sizes: dict[str, Any] = {"spurious": 0.0, "stands_in": (0.0,) * 4}
-    return replace(BELIEFS, flatter=flatter, **shares, **faults, **sizes)
+    return replace(BELIEFS, flatter=flatter, spurious=0.0, **shares, **faults)
 
 
 def by_likelihood_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,7 +188,7 @@ def test_probabilities_add_up_to_one(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_further_effect_that_nobody_fitted_is_not_excluded(monkeypatch: pytest.MonkeyPatch) -> None:
     """It keeps a small part of what its trace promises beside the set, and no more however much that is."""
-    unseen = [SimpleNamespace(odds=1.0, name="tearing")]
+    unseen = [SimpleNamespace(odds=1.0, mistaken=0.0, name="tearing")]
     nothing = effects(monkeypatch, seen=0.0, gain=-1.0)
     assert "friction+tearing" not in nothing
     found = {p: effects(monkeypatch, seen=0.0, gain=-1.0, untried=unseen, promised=p) for p in (-2.0, 50.0)}
@@ -248,7 +247,7 @@ def test_a_tear_is_at_most_twelve_times_less_probable_than_a_fall_that_stands_li
     case = SimpleNamespace(
         null=candidate(log_evidence=-90.0),
         plain={"gent": base},
-        visible=[*TRIED, SimpleNamespace(odds=1.0, name="tearing")],
+        visible=[*TRIED, SimpleNamespace(odds=1.0, mistaken=0.0, name="tearing")],
         question=SimpleNamespace(energy=None),
         sees_nothing=True,
         twins=lambda: frozenset(),
@@ -369,7 +368,7 @@ def test_beside_another_law_sets_are_flatter_however_one_stands_out(monkeypatch:
 
 def test_a_part_is_told_of_sets_next_to_those_of_the_sum(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where none stands out; nothing is taken from no effect, and the sum by the laws of the library is kept."""
-    said = {"seen": 0.0, "gain": 3.0, "untried": [SimpleNamespace(odds=1.0, name="tearing")]}
+    said = {"seen": 0.0, "gain": 3.0, "untried": [SimpleNamespace(odds=1.0, mistaken=0.0, name="tearing")]}
     plain, near = (summed_up(monkeypatch, **said, elsewhere=e) for e in (0.0, 0.2))
     before, after = (dict(t.probabilities.effects) for t in (plain, near))
     assert max(before.values()) < 0.9

@@ -1,0 +1,47 @@
+"""Sets of effects of which one stands in for another: by a law that is not the library's, or for nothing at all.
+
+A curve says how much a film softens or relaxes, and by what law of the library; of laws that are not there it says
+nothing. Beside other effects, which take what such a law leaves, the sum is sure of the wrong one as often as not where
+what it is made of has many laws, and hardly ever where it is an offset.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from math import exp, prod
+
+from bayesmembrane.diagnosis.explanation.twins import Set
+
+
+def smaller_favoured(p: Mapping[Set, float], spurious: float) -> dict[Set, float]:
+    """p e^(-s n) of sets of n effects, s being ``spurious``, with the sum that they have; no effect keeps what it has."""
+    weighed = {names: q * exp(-spurious * (len(names) - 1)) for names, q in p.items() if names}
+    before, after = sum(q for names, q in p.items() if names), sum(weighed.values())
+    return {names: weighed[names] * before / after if names and after > 0 else q for names, q in p.items()}
+
+
+def stood_in(p: Mapping[Set, float], mistaken: Mapping[str, float], alone: float, left_out: float) -> dict[Set, float]:
+    """A set with effects i keeps prod (1 - m_i) of p, and gives the rest away by each of them as m_i / sum m.
+
+    m is how often an effect is ``mistaken``; of one without others beside it the part ``alone`` of that. Of what is
+    given away by one effect the part ``left_out`` goes to the set without it, and the rest to those with another one
+    instead, as often as that is mistaken itself; all of it where nothing else is in the set. The sum is kept.
+    """
+    out = defaultdict[Set, float](float)
+    for names, q in p.items():
+        m = {n: mistaken.get(n, 0.0) * (1.0 if len(names) > 1 else alone) for n in sorted(names)}
+        others = {n: often for n, often in mistaken.items() if n not in names and often > 0}
+        if not others or not any(m.values()):
+            out[names] += q
+            continue
+        kept = prod(1 - often for often in m.values())
+        out[names] += q * kept
+        for n, often in m.items():
+            given, rest = q * (1 - kept) * often / sum(m.values()), names - {n}
+            if rest:
+                out[rest] += left_out * given
+                given *= 1 - left_out
+            for other, of_other in others.items():
+                out[rest | {other}] += given * of_other / sum(others.values())
+    return dict(out)
