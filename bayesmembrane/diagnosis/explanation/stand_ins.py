@@ -15,7 +15,7 @@ from bayesmembrane.diagnosis.explanation.twins import Set
 
 
 def smaller_favoured(p: Mapping[Set, float], spurious: float) -> dict[Set, float]:
-    """p e^(-s n) of sets of n effects, s being ``spurious``, with the sum that they have; no effect keeps what it has."""
+    """p e^(-s n) of sets of n effects, s being ``spurious``, with the sum that they had; none keeps what it has."""
     weighed = {names: q * exp(-spurious * (len(names) - 1)) for names, q in p.items() if names}
     before, after = sum(q for names, q in p.items() if names), sum(weighed.values())
     return {names: weighed[names] * before / after if names and after > 0 else q for names, q in p.items()}
