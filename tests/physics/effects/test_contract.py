@@ -34,6 +34,11 @@ def plain(curve: Measurement) -> np.ndarray:
     return force(curve)
 
 
+@every
+def test_how_often_it_is_mistaken_is_a_part_and_rarer_where_it_is_exact(effect: Effect) -> None:
+    assert 0 <= effect.mistaken <= (0.12 if effect.exact else 0.5)
+
+
 def test_the_promised_effects_are_there() -> None:
     assert set(EFFECTS) >= NAMED
 
