@@ -441,6 +441,8 @@ def _when_unknown(d: Diagnosis) -> str:
 
 def _tell_apart(d: Diagnosis) -> str:
     best = next(iter(d.experiments), None)
+    if len(d.members) == 1:
+        return "Repeat the test in another motion: an effect may be there for which this one stands in."
     if best is None or best.separation < NEXT_TEST.helps:
         return "No further test that was simulated tells them apart: rely on what holds for each of them."
     if best.separation < NEXT_TEST.clear:

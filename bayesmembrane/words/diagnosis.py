@@ -125,7 +125,10 @@ def finding_sentence(found: Diagnosis) -> str:
     if found.verdict != "ambiguous":
         return _with_the_rest(_ANSWERS[found.verdict](found), found)
     count = len(found.members)
-    told = f"{_misses(found)}{_common(found)}any of {count} explanations may be right. {_error(found)}{_beside(found)}"
+    may_be = f"{_common(found)}any of {count} explanations may be right"
+    if count == 1:
+        may_be = "one explanation stands out, and another effect may be behind it"
+    told = f"{_misses(found)}{may_be}. {_error(found)}{_beside(found)}"
     return _with_the_rest(told, found)
 
 
@@ -323,10 +326,10 @@ def _ambiguous(found: Diagnosis) -> str:
         f"; or one of {more} less probable sets" if more > 1 else "; or a less probable set" if more > 0 else ""
     )
     names += elsewhere(found.probabilities, {set_name(j.candidate, found.null.names) for j in found.members})
-    return (
-        f"{_misses(found)}{_common(found)}this measurement cannot tell which of these it is: {names}. {_error(found)}"
-        f"{_advice(found)}{_beside(found)}"
-    )
+    lead = f"{_common(found)}this measurement cannot tell which of these it is:"
+    if len(found.members) == 1:
+        lead = "most probably it is"
+    return f"{_misses(found)}{lead} {names}. {_error(found)}{_advice(found)}{_beside(found)}"
 
 
 def elsewhere(p: Probabilities, members: Collection[str]) -> str:

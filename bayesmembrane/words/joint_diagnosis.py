@@ -113,6 +113,8 @@ def _answer(found: JointDiagnosis) -> str:
         more = len(found.members) - len(names)
         rest = f"; or one of {more} less probable sets" if more > 0 else ""
         rest += elsewhere(found.probabilities, {m.name for m in found.members})
+        if len(found.members) == 1:
+            return f"{misses}: most probably it is {names[0]}{rest}."
         return f"{misses}: {_common(found)}these tests cannot tell which of these it is: {'; or '.join(names)}{rest}."
     if found.members:
         return f"{misses}: {_member(found.members[0], found)} is the most probable, yet leaves too much to be named."

@@ -181,7 +181,8 @@ def test_a_relaxation_test_shows_relaxation() -> None:
     found = diagnose(m, Hypothesis(materials()["neo_hookean"]))
     assert found.verdict in ("named", "ambiguous")  # a further effect that is not seen may be there
     assert all("viscoelastic" in j.candidate.names for j in found.members)
-    assert found.probabilities.of_effect("viscoelastic") > 0.9  # some is told of other sets whatever is seen
+    assert found.probabilities.of_effect("viscoelastic") > 0.88  # some is told of other sets whatever is seen
+    assert found.firm == ("viscoelastic",)
     assert next(iter(found.probabilities.effects)) == "viscoelastic"
     assert found.best.parameters["viscoelastic.strength"] == pytest.approx(0.35, rel=0.25)
 
@@ -235,9 +236,9 @@ def test_points_as_few_as_a_model_with_an_effect_has_coordinates_are_diagnosed()
         ({"friction+mullins": 0.97, "friction": 0.03}, (), ()),
         ({"friction": 0.5, "friction+mullins": 0.46, "mullins": 0.04}, ("friction", "mullins"), ("friction",)),
         ({"friction": 0.5, "mullins": 0.5}, ("friction", "mullins"), ()),
-        # Nine in ten are enough, for a part is told of other sets whatever is seen; less are not.
-        ({"friction": 0.6, "friction+mullins": 0.31, "rate": 0.09}, ("friction",), ("friction",)),
-        ({"friction": 0.6, "friction+mullins": 0.29, "rate": 0.11}, ("friction",), ()),
+        # Nearly nine in ten are enough, for a part is told of other sets whatever is seen; less are not.
+        ({"friction": 0.6, "friction+mullins": 0.29, "rate": 0.11}, ("friction",), ("friction",)),
+        ({"friction": 0.6, "friction+mullins": 0.27, "rate": 0.13}, ("friction",), ()),
     ],
 )
 @pytest.mark.parametrize("strange", [True, False])

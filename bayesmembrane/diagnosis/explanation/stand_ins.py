@@ -11,7 +11,9 @@ from collections import defaultdict
 from collections.abc import Mapping
 from math import exp, prod
 
+from bayesmembrane.diagnosis.explanation.neighbours import NEGLIGIBLE
 from bayesmembrane.diagnosis.explanation.twins import Set
+from bayesmembrane.physics.effects.base import AT
 
 
 def smaller_favoured(p: Mapping[Set, float], spurious: float) -> dict[Set, float]:
@@ -21,18 +23,23 @@ def smaller_favoured(p: Mapping[Set, float], spurious: float) -> dict[Set, float
     return {names: weighed[names] * before / after if names and after > 0 else q for names, q in p.items()}
 
 
-def stood_in(p: Mapping[Set, float], mistaken: Mapping[str, float], alone: float, left_out: float) -> dict[Set, float]:
+def stood_in(
+    p: Mapping[Set, float], mistaken: Mapping[str, float], alone: float, left_out: float, beside: int = 0
+) -> dict[Set, float]:
     """A set with effects i keeps prod (1 - m_i) of p, and gives the rest away by each of them as m_i / sum m.
 
-    m is how often an effect is ``mistaken``; of one without others beside it the part ``alone`` of that. Of what is
-    given away by one effect the part ``left_out`` goes to the set without it, and the rest to those with another one
-    instead, as often as that is mistaken itself; all of it where nothing else is in the set. The sum is kept.
+    m is how often an effect is ``mistaken``; of one without others beside it, in its set or among as many as are given
+    ``beside`` every set, the part ``alone`` of that. Of what is given away by one effect the part ``left_out`` goes to
+    the set without it, and the rest to those with another one instead that is at work in the same tests, as often as
+    that is mistaken itself; all of it where nothing else is in the set. The sum is kept. What has next to nothing gives
+    nothing.
     """
-    out = defaultdict[Set, float](float)
+    whole, out = sum(p.values()), defaultdict[Set, float](float)
     for names, q in p.items():
-        m = {n: mistaken.get(n, 0.0) * (1.0 if len(names) > 1 else alone) for n in sorted(names)}
-        others = {n: often for n, often in mistaken.items() if n not in names and often > 0}
-        if not others or not any(m.values()):
+        m = {n: mistaken.get(n, 0.0) * (1.0 if len(names) + beside > 1 else alone) for n in sorted(names)}
+        instead = {n: _instead_of(n, names, mistaken) for n in m}
+        m = {n: often for n, often in m.items() if often > 0 and (instead[n] or len(names) > 1)}
+        if not m or q <= NEGLIGIBLE * whole:
             out[names] += q
             continue
         kept = prod(1 - often for often in m.values())
@@ -40,8 +47,15 @@ def stood_in(p: Mapping[Set, float], mistaken: Mapping[str, float], alone: float
         for n, often in m.items():
             given, rest = q * (1 - kept) * often / sum(m.values()), names - {n}
             if rest:
-                out[rest] += left_out * given
-                given *= 1 - left_out
-            for other, of_other in others.items():
-                out[rest | {other}] += given * of_other / sum(others.values())
+                part = left_out if instead[n] else 1.0
+                out[rest] += part * given
+                given *= 1 - part
+            for other, of_other in instead[n].items():
+                out[rest | {other}] += given * of_other / sum(instead[n].values())
     return dict(out)
+
+
+def _instead_of(name: str, names: Set, mistaken: Mapping[str, float]) -> dict[str, float]:
+    """Effects that are not among ``names`` and could be behind what ``name`` explains: of the same test, or of all."""
+    tests = {"", name.partition(AT)[2]}
+    return {n: m for n, m in mistaken.items() if m > 0 and n not in names and n.partition(AT)[2] in tests}

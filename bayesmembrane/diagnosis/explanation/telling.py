@@ -22,17 +22,20 @@ Joint = Mapping[tuple[str, str], float]
 """Probabilities by (set of effects, kind of what is foreign)."""
 
 
-def told(joint: Joint, mistaken: Mapping[str, float], vague: Mapping[str, float]) -> tuple[Joint, Joint]:
+def told(
+    joint: Joint, mistaken: Mapping[str, float], vague: Mapping[str, float], beside: int = 0
+) -> tuple[Joint, Joint]:
     """(flattened, told): the sum as it is flattened, and that with parts of it told of sets next to those that were
     weighed, of faults that are not listed, and of effects for which others may stand in.
 
     mistaken : of the effects that are visible, by name, how often they are mistaken for another (`Effect.mistaken`)
     vague : 0 to 1 by kind of what is foreign, how far no set stands out beside it
+    beside : how many effects are given, and were not measured: they are beside every set
     """
     flat = _flattened(joint, vague)
     near = _with_neighbours(flat, list(mistaken), vague)
     listed = _with_unlisted(near, vague.get(NOTHING, 0.0))
-    return flat, _with_stand_ins(listed, mistaken)
+    return flat, _with_stand_ins(listed, mistaken, beside)
 
 
 def _flattened(joint: Joint, vague: Mapping[str, float]) -> dict[tuple[str, str], float]:
@@ -82,14 +85,14 @@ def _with_unlisted(joint: Joint, vague: float) -> dict[tuple[str, str], float]:
     )
 
 
-def _with_stand_ins(joint: Joint, mistaken: Mapping[str, float]) -> dict[tuple[str, str], float]:
+def _with_stand_ins(joint: Joint, mistaken: Mapping[str, float], beside: int) -> dict[tuple[str, str], float]:
     """With smaller sets favoured, and a part of what each has told of those in which one of its effects is another one
     or none, beside each kind of what is foreign.
     """
     out = dict[tuple[str, str], float]()
     for kind, sets in _by_kind(joint).items():
         fewer = smaller_favoured(sets, BELIEFS.spurious)
-        doubted = stood_in(fewer, mistaken, BELIEFS.alone, BELIEFS.left_out)
+        doubted = stood_in(fewer, mistaken, BELIEFS.alone, BELIEFS.left_out, beside)
         out |= {(joined(names), kind): q for names, q in doubted.items()}
     return falling(out)
 

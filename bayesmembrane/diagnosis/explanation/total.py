@@ -163,7 +163,9 @@ def summed(grown: Grown) -> Total:
             joint[name, ANOTHER_LAW] += moved
             p[i] -= moved
     vague = _vague(grown, every, shown, joint)
-    flat, both = told(joint, {e.name: e.mistaken for e in case.visible if e.name not in given}, vague)
+    mistaken = {e.name: e.mistaken for e in case.visible if e.name not in given}
+    beside = sum(not e.known for e in case.null.hypothesis.effects)
+    flat, both = told(joint, mistaken, vague, beside)
     judged = []
     for (c, kind, _), q in zip(terms, p[: len(terms)].tolist(), strict=True):
         if kind == NOTHING:

@@ -127,16 +127,17 @@ def decided(case: DiagnosisCase, total: Total) -> Verdict:
 
 
 def _told(total: Total, fitted: Collection[str]) -> list[str]:
-    """The most probable sets that were ``fitted``, as many as are needed by the laws; one that is not told to be sure
-    has the next one beside it.
+    """The sets that are needed by the laws, of those that were ``fitted``, the most probable first; one that is not
+    told to be sure has the next one by the laws beside it.
 
-    That one alone is left of several of which others were never fitted does not make it sure.
+    That one alone is left of several of which others were never fitted does not make it sure. What is told of a set for
+    being next to another one makes it no member: by the laws it may be refuted.
     """
-    p = total.probabilities.effects
-    names, count = [name for name in p if name in fitted], sum(name in fitted for name in _smallest(total.by_laws))
-    if count <= 1 and names and p[names[0]] < VERDICT.sure:
-        return [name for name in names[:2] if p[name] >= VERDICT.least_member]
-    return names[: max(count, 1)]
+    p, by_laws = total.probabilities.effects, [name for name in total.by_laws if name in fitted]
+    names = [name for name in _smallest(total.by_laws) if name in fitted] or by_laws[:1]
+    if len(names) == 1 and p[names[0]] < VERDICT.sure:
+        names += [name for name in by_laws if name not in names and total.by_laws[name] >= VERDICT.least_member][:1]
+    return sorted(names, key=lambda name: -p[name])
 
 
 def _worth_telling(total: Total) -> bool:

@@ -66,7 +66,6 @@ def in_tests(name: str, parts: Sequence[tuple[int, Effect]], one_clock: bool = T
     """The ``parts`` (number of the test, effect) of one effect, under a name.
 
     A constant of the material has one value in tests that go by ``one_clock``: without times a second is a millimetre.
-    What has to explain several tests is mistaken for another effect if it is so in each of them.
     """
     first = parts[0][1]
     coordinates, constant = first.coordinates, first.constant and one_clock
@@ -87,7 +86,7 @@ def in_tests(name: str, parts: Sequence[tuple[int, Effect]], one_clock: bool = T
             "begins": first.begins if len(parts) == 1 else "",
             "like_foreign": first.like_foreign,
             "odds": first.odds,
-            "mistaken": first.mistaken ** len(parts),
+            "mistaken": first.mistaken,
             "remembers": first.remembers,
             "of_the_material": first.of_the_material,
             "constant": constant,

@@ -33,9 +33,17 @@ def test_what_is_alone_gives_less_and_is_never_left_out() -> None:
     assert found == pytest.approx({sets("a"): 0.9, sets("b"): 0.1 * 0.4 / 0.5, sets("c"): 0.1 * 0.1 / 0.5})
 
 
-@pytest.mark.parametrize("names", [(), ("sure",), ("unknown",), ("a", "b", "c")])
-def test_nothing_is_given_by_what_is_never_mistaken_nor_where_there_is_nothing_else(names: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("names", [(), ("sure",), ("unknown",)])
+def test_nothing_is_given_by_what_is_never_mistaken(names: tuple[str, ...]) -> None:
     assert stood_in({sets(*names): 0.7}, OFTEN, 0.5, 0.6) == {sets(*names): pytest.approx(0.7)}
+
+
+def test_where_there_is_nothing_else_effects_are_left_out_and_one_alone_keeps_all() -> None:
+    given = 1 - 0.8 * 0.6 * 0.9
+    found = stood_in({sets("a", "b", "c"): 1.0}, OFTEN, 0.5, 0.6)
+    assert found[sets("a", "b", "c")] == pytest.approx(1 - given)
+    assert found[sets("a", "c")] == pytest.approx(given * 4 / 7)
+    assert stood_in({sets("a"): 1.0}, {"a": 0.2}, 0.5, 0.6) == {sets("a"): 1.0}
 
 
 def test_what_is_hardly_mistaken_is_hardly_what_another_stands_for() -> None:
@@ -56,3 +64,20 @@ def test_each_further_effect_counts_less_and_none_keeps_what_it_has() -> None:
     assert found[sets()] == 0.3
     assert found[sets("a")] / found[sets("a", "b")] == pytest.approx(exp(0.5))
     assert found[sets("a", "b")] / found[sets("a", "b", "c")] == pytest.approx(exp(0.5))
+
+
+def test_what_is_given_beside_every_set_leaves_none_alone() -> None:
+    alone, beside = (stood_in({sets("a"): 1.0}, OFTEN, 0.15, 0.6, n)[sets("a")] for n in (0, 1))
+    assert (alone, beside) == (pytest.approx(0.97), pytest.approx(0.8))
+
+
+def test_what_has_next_to_nothing_gives_nothing() -> None:
+    found = stood_in({sets("sure"): 1.0, sets("a", "b"): 1e-7}, OFTEN, 0.15, 0.5)
+    assert found == {sets("sure"): 1.0, sets("a", "b"): 1e-7}
+
+
+def test_an_effect_of_one_test_is_exchanged_for_those_of_that_test_and_of_the_material() -> None:
+    often = {"slip@one": 0.2, "tear@one": 0.2, "tear@two": 0.2, "damage": 0.2}
+    found = stood_in({sets("slip@one"): 1.0}, often, 0.5, 0.5)
+    assert set(found) == {sets("slip@one"), sets("tear@one"), sets("damage")}
+    assert set(stood_in({sets("damage"): 1.0}, often | {"flow": 0.1}, 0.5, 0.5)) == {sets("damage"), sets("flow")}

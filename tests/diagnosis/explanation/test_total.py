@@ -53,6 +53,7 @@ def summed_up(
     elsewhere: float = 0.0,
     unlisted: float = 0.0,
     left: float = 0.0,
+    mistaken: float = 0.0,
 ) -> total.Total:
     """The sum where friction explains the curve, and Mullins beside it has a ``gain`` in ln Z.
 
@@ -60,7 +61,7 @@ def summed_up(
     ``untried``, where traces of those that were not fitted have a ``promised`` ln of the Bayes factor. Beside the first
     set there is a ``step``, if there is one. ``flatter`` : the power of `Beliefs.flattened`;
     ``elsewhere`` : told of sets that are next to those of the sum; ``unlisted`` : of a fault of no known kind;
-    ``left`` : squares that each model leaves.
+    ``left`` : squares that each model leaves; ``mistaken`` : how often each effect is, for another.
     """
     for module in (total, telling):
         monkeypatch.setattr(module, "BELIEFS", told(flatter, elsewhere, unlisted))
@@ -96,7 +97,7 @@ def summed_up(
     case = SimpleNamespace(
         null=plain,
         plain={"gent": plain},
-        visible=[*untried, *TRIED, *TRIED][:4],
+        visible=[SimpleNamespace(**{**vars(e), "mistaken": mistaken}) for e in [*untried, *TRIED, *TRIED][:4]],
         question=SimpleNamespace(energy=None),
         sees_nothing=sees_nothing,
         tested=lambda _: SimpleNamespace(adequate=adequate),
@@ -180,6 +181,19 @@ def test_no_set_stands_out_that_leaves_more_than_noise(monkeypatch: pytest.Monke
     assert more.effects["friction"] > 1e-2
     assert more.effects["friction+mullins"] + 0.05 < some.effects["friction+mullins"] < 0.95
     assert sum(more.effects.values()) == pytest.approx(1.0)
+
+
+def test_effects_are_told_as_surely_as_they_are_seldom_mistaken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of Mullins and friction together a part is told of each alone, and what is said of a hypothesis follows."""
+    sure, doubted = (summed_up(monkeypatch, seen=0.0, gain=30.0, mistaken=m) for m in (0.0, 0.2))
+    assert sure.probabilities.effects["friction+mullins"] > 0.99
+    p = doubted.probabilities.effects
+    assert p["friction+mullins"] == pytest.approx(0.64 * sure.probabilities.effects["friction+mullins"])
+    assert p["friction"] == pytest.approx(p["mullins"], rel=1e-3) == pytest.approx(0.18, rel=1e-3)
+    assert p[NOTHING] == pytest.approx(sure.probabilities.effects[NOTHING])
+    assert doubted.by_laws == pytest.approx(sure.by_laws)
+    for j in doubted.ranking:
+        assert j.probability == pytest.approx(p["+".join(sorted(j.candidate.names)) or NOTHING])
 
 
 def test_probabilities_add_up_to_one(monkeypatch: pytest.MonkeyPatch) -> None:

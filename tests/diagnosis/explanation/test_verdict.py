@@ -81,6 +81,13 @@ def test_an_answer_has_as_many_sets_as_the_laws_ask_for_and_the_most_probable_on
     assert verdict(told, by_laws=laws)[:2] == ("ambiguous", ["", "friction"])
 
 
+def test_what_is_told_for_being_next_to_another_set_is_no_member() -> None:
+    """By the laws it is refuted: a clamp that slips left 55 in reduced chi-square beside a film that relaxes."""
+    laws = {"viscoelastic": 0.91, "viscoelastic+zero_offset": 0.05, "clamp_slip": 1e-20}
+    told = {"viscoelastic": 0.85, "clamp_slip": 0.1, "viscoelastic+zero_offset": 0.05}
+    assert verdict(told, by_laws=laws)[:2] == ("ambiguous", ["viscoelastic", "viscoelastic+zero_offset"])
+
+
 def test_more_sets_than_can_be_told_are_rivals_that_a_further_test_would_have_to_tell_apart() -> None:
     names = ["friction", "mullins", "tearing", "clamp_slip", "zero_offset", "prestretch", "force_drift", "viscoelastic"]
     case = cast(OpenCase, SimpleNamespace(null=candidate(NOTHING), sees_nothing=False))

@@ -149,11 +149,3 @@ def test_tests_that_go_by_different_clocks_share_no_constant() -> None:
     (unit,) = effects_in_tests(effects, ("one", "two"), one_clock=False)
     assert unit.coordinates[0].name == "0.strength"
     assert len(unit.sizes) == 2
-
-
-def test_what_explains_several_tests_is_mistaken_only_if_it_is_in_each() -> None:
-    kinds = components("effects")
-    effects = [{n: kinds[n]() for n in ("viscoelastic", "clamp_slip")} for _ in range(3)]
-    often = {e.name: e.mistaken for e in effects_in_tests(effects, ("one", "two", "three"))}
-    assert often.pop("viscoelastic") == pytest.approx(kinds["viscoelastic"].mistaken ** 3)
-    assert often == {f"clamp_slip@{n}": kinds["clamp_slip"].mistaken for n in ("one", "two", "three")}
