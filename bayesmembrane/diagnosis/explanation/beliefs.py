@@ -71,9 +71,9 @@ class Beliefs:
     to the power of 0.7, -1.49 to 0.5, -1.46 to 0.2, which on the own generator is worse than none. With priors whole,
     on the cases of `plain_gain`: -1.42 to 0.5, -1.37 to this one, -1.35 to 0.3 (own generator -0.87, -0.89, -0.94)."""
     stands_out: tuple[float, float] = (0.90, 0.95)
-    """From the first of these on what is most probable begins to be left as it is, and from the second on it is: on
-    those fresh seeds 45 of 50 were so (mean 0.98). To flatten these, too, takes two names of three, and one wrong one
-    of two."""
+    """From the first of these on what is most probable begins to be left as it is by `flattened`, and from the second
+    on it is: on those fresh seeds 45 of 50 were so (mean 0.98). To flatten these, too, takes two names of three, and
+    one wrong one of two."""
     spurious: float = 0.5
     """By how much ln of what is told of a set falls with every effect beyond its first one: what a law that is not the
     library's leaves is followed by a further effect that is not there. On 403 films of three generators by hands that

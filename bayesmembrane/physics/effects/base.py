@@ -125,10 +125,11 @@ class Effect(ABC):
     like_foreign : kinds of what no effect describes (`diagnosis.explanation.foreign`) that leave what this one leaves:
         what comes at any moment is a fall of the force, what takes way from the film steps that a drive has lost
     odds : how often it is met beside the others, before anything is measured
-    mistaken : how often something else is behind it where the sum over hypotheses is sure of it beside other effects:
-        it is a matter of many laws, of which the library has one. Less where hardly anything else leaves what it
-        leaves: on 403 films by hands that knew nothing of this package such effects were there on 186 of 196 where they
-        had 0.9 or more (0.01), zero and compliance on 23 of 28 (0.12), and all others on 82 of 127
+    mistaken : how much is told of something else behind it, however sure the sum over hypotheses is of it beside other
+        effects: it is a matter of many laws, of which the library has one. Less where hardly anything else leaves what
+        it leaves: on 403 films by hands that knew nothing of this package such effects were there on 186 of 196 where
+        they had 0.9 or more (0.01), zero and compliance on 23 of 28 (0.12), and all others on 82 of 127. The numbers
+        are those with the best log score there; an effect without such a record has that of the last
     rank : orders effects within a stage; equal ranks go by name
 
     reach : of the test that it is at work in; None: that for which priors and bounds are declared
