@@ -96,7 +96,7 @@ class Search(Weighing):
         return {n + i: step[p.event] for i, p in enumerate(own) if p.event}
 
     def axes(self, hypothesis: Hypothesis) -> Standard:
-        # By identity, as below.
+        # By identity, as `_remembering` does.
         return self._standards.of(id(hypothesis), lambda: (hypothesis, standard(hypothesis, self.measurement)))[1]
 
     def expected_sizes(self, effect: Effect) -> Array:

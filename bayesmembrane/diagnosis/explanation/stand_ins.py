@@ -17,7 +17,7 @@ from bayesmembrane.physics.effects.base import AT
 
 
 def smaller_favoured(p: Mapping[Set, float], spurious: float) -> dict[Set, float]:
-    """p e^(-s n) of sets of n effects, s being ``spurious``, with the sum that they had; none keeps what it has."""
+    """p e^(-s n) of sets of n effects, s being ``spurious``, with the sum that they had; that of no effect stays."""
     weighed = {names: q * exp(-spurious * (len(names) - 1)) for names, q in p.items() if names}
     before, after = sum(q for names, q in p.items() if names), sum(weighed.values())
     return {names: weighed[names] * before / after if names and after > 0 else q for names, q in p.items()}
