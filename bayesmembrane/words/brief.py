@@ -272,7 +272,8 @@ def _improbable(d: Diagnosis) -> str:
 def _ambiguous(course: Course) -> str:
     d = course.telling
     sure, among = _certain(d), _in_all(d) if course.detail.sums else ""
-    which = f"only {sure} nearly certain" if sure else f"{among}this curve cannot tell which"
+    open_yet = "this curve cannot tell which" if len(d.members) > 1 else "another effect may be behind it"
+    which = f"only {sure} nearly certain" if sure else f"{among}{open_yet}"
     first = "the first" if course.detail.told > 1 else "it"
     size = (
         ", yet at a size that is hardly met" if d.members and hardly_met(d.members[0].candidate, d.measurement) else ""
@@ -442,7 +443,7 @@ def _when_unknown(d: Diagnosis) -> str:
 def _tell_apart(d: Diagnosis) -> str:
     best = next(iter(d.experiments), None)
     if len(d.members) == 1:
-        return "Repeat the test in another motion: an effect may be there for which this one stands in."
+        return "Repeat the test in another motion: another effect may be behind what this one explains."
     if best is None or best.separation < NEXT_TEST.helps:
         return "No further test that was simulated tells them apart: rely on what holds for each of them."
     if best.separation < NEXT_TEST.clear:

@@ -45,7 +45,7 @@ def rivals(d: Diagnosis) -> list[str]:
     helps = [e for e in d.experiments if NEXT_TEST.helps <= e.separation < NEXT_TEST.clear]
     rest = [e for e in d.experiments if e.separation < NEXT_TEST.helps]
     told += [f"To tell them apart: {experiment_sentence(e, d.rig)}." for e in clear]
-    if not clear:
+    if not clear and len(d.members) > 1:
         told.append("None of the further tests that were simulated is sure to tell them apart.")
     for words, dim in (("What helps, and may not decide", helps), ("What would not settle it", rest)):
         if dim:

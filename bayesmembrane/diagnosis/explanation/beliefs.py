@@ -79,15 +79,15 @@ class Beliefs:
     library's leaves is followed by a further effect that is not there. On 403 films of three generators by hands that
     knew nothing of this package what had 0.4 to 0.6 was true on 4 of 21 where it was a set of three, 13 of 36 of two,
     25 of 34 of one."""
-    alone: float = 0.15
+    mistaken_alone: float = 0.15
     """Part of how often an effect is mistaken for another beside further ones (`Effect.mistaken`), where nothing is
     beside it. Of those 403 films sets of one effect that had 0.95 or more were true on 45 of 49 (15 of 19 where it is
     one that is often mistaken), of two on 7 of 14, of three on 12 of 23. Reckoned from stored answers of the 291 films
-    of two hands, by which this, `left_out`, `spurious` and `Effect.mistaken` were chosen: log score -1.99 instead of
+    of two hands, by which this, the next, `spurious` and `Effect.mistaken` were chosen: log score -1.99 instead of
     -2.31, the truth in the 95 % set of 263 instead of 250, 35 of 40 names right instead of 46 of 63, what had 0.5 to
     0.95 (mean 0.72) so on 66 of 92 instead of 58 of 93 (0.68). Of the 112 of the third: -1.99 instead of -2.33, 107
     instead of 102, 13 of 14 names instead of 18 of 23. With 0 five names more, and four of them wrong."""
-    left_out: float = 0.5
+    mistaken_for_none: float = 0.5
     """Part of what an effect gives away that is told of the set without it; the rest of those with another one instead.
     Where the first set of two or three effects was wrong, the true one had one effect less on 34 of those films and
     another one instead on 53."""

@@ -24,38 +24,36 @@ def smaller_favoured(p: Mapping[Set, float], spurious: float) -> dict[Set, float
 
 
 def stood_in(
-    p: Mapping[Set, float], mistaken: Mapping[str, float], alone: float, left_out: float, beside: int = 0
+    p: Mapping[Set, float], mistaken: Mapping[str, float], alone: float, for_none: float, beside: int = 0
 ) -> dict[Set, float]:
     """A set with effects i keeps prod (1 - m_i) of p, and gives the rest away by each of them as m_i / sum m.
 
     m is how often an effect is ``mistaken``; of one without others beside it, in its set or among as many as are given
-    ``beside`` every set, the part ``alone`` of that. Of what is given away by one effect the part ``left_out`` goes to
+    ``beside`` every set, the part ``alone`` of that. Of what is given away by one effect the part ``for_none`` goes to
     the set without it, and the rest to those with another one instead that is at work in the same tests, as often as
-    that is mistaken itself; all of it where nothing else is in the set. The sum is kept. What has next to nothing gives
-    nothing.
+    that is mistaken itself; all of it to the one where there is nothing of the other. The sum is kept. What has next to
+    nothing gives nothing.
     """
     whole, out = sum(p.values()), defaultdict[Set, float](float)
     for names, q in p.items():
-        m = {n: mistaken.get(n, 0.0) * (1.0 if len(names) + beside > 1 else alone) for n in sorted(names)}
-        instead = {n: _instead_of(n, names, mistaken) for n in m}
-        m = {n: often for n, often in m.items() if often > 0 and (instead[n] or len(names) > 1)}
-        if not m or q <= NEGLIGIBLE * whole:
-            out[names] += q
-            continue
-        kept = prod(1 - often for often in m.values())
+        part, gives = 1.0 if len(names) + beside > 1 else alone, q > NEGLIGIBLE * whole
+        often = {n: part * mistaken.get(n, 0.0) for n in sorted(names) if gives}
+        near = {n: _next_to(n, names, mistaken, for_none) for n, m in often.items() if m > 0}
+        m = {n: often[n] for n, sets in near.items() if sets}
+        kept = prod(1 - v for v in m.values())
         out[names] += q * kept
-        for n, often in m.items():
-            given, rest = q * (1 - kept) * often / sum(m.values()), names - {n}
-            if rest:
-                part = left_out if instead[n] else 1.0
-                out[rest] += part * given
-                given *= 1 - part
-            for other, of_other in instead[n].items():
-                out[rest | {other}] += given * of_other / sum(instead[n].values())
+        for n, v in m.items():
+            for other, share in near[n].items():
+                out[other] += q * (1 - kept) * share * v / sum(m.values())
     return dict(out)
 
 
-def _instead_of(name: str, names: Set, mistaken: Mapping[str, float]) -> dict[str, float]:
-    """Effects that are not among ``names`` and could be behind what ``name`` explains: of the same test, or of all."""
-    tests = {"", name.partition(AT)[2]}
-    return {n: m for n, m in mistaken.items() if m > 0 and n not in names and n.partition(AT)[2] in tests}
+def _next_to(name: str, names: Set, mistaken: Mapping[str, float], for_none: float) -> dict[Set, float]:
+    """Sets without ``name``, or with another effect of the same test, or of all tests, instead, and the share of each
+    in what it gives away; they add up to one if there are any.
+    """
+    rest, tests = names - {name}, {"", name.partition(AT)[2]}
+    instead = {n: m for n, m in mistaken.items() if m > 0 and n not in names and n.partition(AT)[2] in tests}
+    less = 0.0 if not rest else for_none if instead else 1.0
+    out = {rest | {n}: (1 - less) * m / sum(instead.values()) for n, m in instead.items()}
+    return out | ({rest: less} if rest else {})

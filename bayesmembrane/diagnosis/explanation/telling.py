@@ -92,7 +92,7 @@ def _with_stand_ins(joint: Joint, mistaken: Mapping[str, float], beside: int) ->
     out = dict[tuple[str, str], float]()
     for kind, sets in _by_kind(joint).items():
         fewer = smaller_favoured(sets, BELIEFS.spurious)
-        doubted = stood_in(fewer, mistaken, BELIEFS.alone, BELIEFS.left_out, beside)
+        doubted = stood_in(fewer, mistaken, BELIEFS.mistaken_alone, BELIEFS.mistaken_for_none, beside)
         out |= {(joined(names), kind): q for names, q in doubted.items()}
     return falling(out)
 

@@ -189,6 +189,17 @@ def test_an_energy_that_is_sure_is_told_where_effects_stay_open(named: Loop) -> 
     assert words.other_energy(replace(sure, declared=False)) == ""
 
 
+def test_of_one_explanation_that_is_not_sure_nobody_says_that_it_has_rivals(ambiguous: Loop) -> None:
+    several = only(ambiguous, "ambiguous")
+    one = replace(several, members=several.members[:1], experiments=())
+    for found, rivals in ((several, True), (one, False)):
+        said = " ".join((words.sentence(found), words.finding_sentence(found), *told(compose([found]))))
+        for phrase in ("cannot tell which", "may be right", "tell them apart"):
+            assert (phrase in said.lower()) is rivals, phrase
+        assert ("most probably it is" in said) is not rivals
+        assert ("another effect may be behind" in said) is not rivals
+
+
 def test_a_strip_is_told_in_stretch_and_stress(strip: Diagnosis, tmp_path: Path) -> None:
     content = compose([strip])
     for s in told(content):
