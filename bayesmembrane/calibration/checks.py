@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesmembrane.data.thinning import MOST
 from bayesmembrane.ground.parameters import Array
@@ -13,7 +14,7 @@ from bayesmembrane.ground.symmetric import eigh
 from bayesmembrane.physics.noise.base import Noise, NoiseLikelihood
 
 CURVES = 200
-"""Draws whose curves tell what the parameters can do."""
+"""Draws whose curves tell what the parameters can do, and of long curves all draws that are asked."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,11 @@ def alike(
     found, drawn = (lag_1((r - r @ known.T @ known) / sd) for r in (residual, bound.draw(x, rng)))
     p = (1 + np.count_nonzero(drawn >= found)) / (1 + len(found))
     return Alike(noise.name, float(np.mean(found)), float(np.mean(drawn)), float(p))
+
+
+def asked(draws: int, readings: int) -> NDArray[np.intp]:
+    """Which of so many draws `alike` is to be given: all, but for `CURVES` of them where a draw has many readings."""
+    return np.linspace(0, draws - 1, min(draws, CURVES) if readings > MOST else draws).astype(np.intp)
 
 
 def directions(rows: Array, count: int) -> Array:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesmembrane.calibration.checks import alike
+from bayesmembrane.calibration.checks import alike, asked
 from bayesmembrane.calibration.crosscheck import crosscheck
 from bayesmembrane.calibration.goodness import dominates, goodness
 from bayesmembrane.calibration.layout import Groups, laid_out
@@ -62,13 +62,15 @@ def outcome(posterior: Posterior, sampled: Sampled, wanted: float, seed: int) ->
     )
     best = int(np.argmax(lp))
     square = noise.stated(residual, theta)
+    few = asked(*residual.shape)
+    seen = posterior.noise.at(evaluation.force[few], None if evaluation.traces is None else evaluation.traces[few])
     status = {
         **_answer(hypothesis, data, sampled, wanted),
         "importance": _importance(sampled.chains, masses[hypothesis.convexity.name]),
         "prior_mass": {mode: {"value": m.value, "sd": m.sd} for mode, m in masses.items()},
         **_judgement(posterior, data, evaluation.force[best], None if square is None else float(square[best])),
         "checks": {
-            "alike": alike(hypothesis.noise, noise, residual, theta, hypothesis.curve_size, rng).summary(),
+            "alike": alike(hypothesis.noise, seen, residual[few], theta[few], hypothesis.curve_size, rng).summary(),
         },
         "crosscheck": crosscheck(posterior.forward, flat, seed).summary(),
         "best": _best(hypothesis, measurement, flat[best]),
